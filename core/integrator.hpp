@@ -1,0 +1,144 @@
+#pragma once
+
+#include <diracstep/core/nonlinear_solver.hpp>
+#include <diracstep/core/registry.hpp>
+#include <diracstep/core/saddle_point.hpp>
+#include <diracstep/core/scene.hpp>
+#include <diracstep/core/step_problem.hpp>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace diracstep {
+
+/// Which representative of the momentum class [p] ∈ T*Q/Δ°_Q is reported.
+enum class Momentum {
+  plus,      ///< before the impulse of the next step, p⁺_k: the (+) systems
+  minus,     ///< after it, p⁻_k = p⁺_k + A(q_k)ᵀλ_k: the (−) systems
+  projected  ///< ∂L/∂v(q_k, v_k) with v_k ∈ Δ_Q(q_k)
+};
+
+struct IntegratorOptions {
+  std::string method = "type1/midpoint";
+  int order = 0;      ///< composed to this order; 0 keeps the method's own
+  double step = 0.0;  ///< step size, may be negative; must be given
+  std::optional<StepRule> constraint_rule = std::nullopt;  ///< instead of the method's own
+  int dense_limit = 40;  ///< systems of up to this many unknowns use full matrices
+};
+
+/// What one step did.  A failed step leaves the state as it was.
+struct [[nodiscard]] StepReport {
+  SolveReport solve;
+  long step = 0;      ///< number of the step, from 0
+  double time = 0.0;  ///< where it started
+  std::string failure;  ///< empty, or what went wrong and where, with the residual of each block
+
+  bool ok() const { return solve.ok(); }
+};
+
+/// Work done since the start.
+struct Work {
+  long steps = 0;
+  long solves = 0;
+  long iterations = 0;
+  long residual_evaluations = 0;
+  long jacobian_evaluations = 0;
+};
+
+/// Everything that can be read at one point of a trajectory.
+struct Sample {
+  double time = 0.0;
+  Vector q;       ///< configuration
+  Vector v;       ///< velocity in Δ_Q(q)
+  Vector p;       ///< momentum, in the representative asked for
+  Vector lambda;  ///< forces Λ of the constraint rows at (q, v)
+  double energy = 0.0;
+};
+
+/// One decision of the plan: what is done or left out, and why.
+struct PlanLine {
+  std::string item;
+  std::string decision;
+  std::string reason;
+};
+
+/// Steps a scene with one method.  Owns every workspace and its solvers, and shares nothing: integrators on
+/// different threads do not meet.  The scene's data are planned once, here; a step allocates nothing of its own.
+class Integrator {
+ public:
+  /// Throws Misuse for a bad scene, start, method, order or step.
+  Integrator(std::shared_ptr<const Scene> scene, const Registry& registry, SolverFactory solvers,
+             IntegratorOptions options);
+
+  /// Goes back to the scene's start, or to another consistent one.
+  void reset();
+  void reset(const Start& start);
+
+  /// One step, of the size in the options.
+  StepReport step();
+
+  double time() const { return start_time_ + static_cast<double>(work_.steps) * options_.step; }
+  const Vector& position() const { return q_; }
+  const Work& work() const { return work_; }
+  const Scene& scene() const { return *scene_; }
+  const IntegratorOptions& options() const { return options_; }
+
+  /// Reads the current point.  `minus` solves the next step in advance and keeps the solution for it.
+  SolveReport sample(Momentum momentum, Sample& sample);
+
+  std::vector<PlanLine> plan() const;
+
+ private:
+  SolveReport solve_stage(std::size_t stage, double t, const Vector& q, const Vector& p);
+  void predict(std::size_t stage, VectorRef x) const;
+  void count(const SolveReport& report);
+  StepReport failed(const SolveReport& report, double time) const;
+
+  std::shared_ptr<const Scene> scene_;
+  IntegratorOptions options_;
+  MethodInfo method_;
+  std::span<const double> fractions_;
+  bool dense_;
+  std::unique_ptr<StepProblem> problem_;
+  std::unique_ptr<NonlinearSolver> solver_;
+  VelocityProblem velocity_problem_;
+  AccelerationProblem acceleration_problem_;
+  std::unique_ptr<NonlinearSolver> velocity_solver_;
+  std::unique_ptr<NonlinearSolver> acceleration_solver_;
+
+  double start_time_ = 0.0;
+  Vector q_, p_;
+  Vector v_;  ///< last known velocity, a guess only
+  Vector q_next_, p_next_, q_stage_, p_stage_, impulse_;
+  Vector x_, velocity_unknowns_, acceleration_unknowns_;
+  std::vector<Vector> solutions_;    ///< the unknowns of each stage of the current step
+  bool first_stage_solved_ = false;  ///< solutions_[0] already solves the first stage of the next step
+  /// Solutions of the last steps, newest first, stage by stage: what the next ones are extrapolated from.
+  std::vector<std::vector<Vector>> history_;
+  std::size_t history_length_ = 0;
+  Work work_;
+};
+
+/// Called at kept points; returning false ends the run there.
+using Observer = std::function<bool(const Sample&)>;
+
+/// What a run did; `failure` is empty or says why it stopped early.  What was observed before stays valid.
+struct [[nodiscard]] RunReport {
+  StepReport last;
+  bool ok() const { return last.ok(); }
+};
+
+/// Takes `steps` steps and shows the start, every `every`-th point and the last one to the observer.
+RunReport run(Integrator& integrator, long steps, Momentum momentum, long every, const Observer& observer);
+
+/// Number of steps of about size `step` from `start` to `end` and the size that makes them fit exactly.
+/// Throws Misuse for a step that is zero, not finite, or of the wrong sign.
+struct StepGrid {
+  long steps;
+  double step;
+};
+StepGrid fit_steps(double start, double end, double step);
+
+}  // namespace diracstep

@@ -1,0 +1,66 @@
+#pragma once
+
+#include <array>
+#include <diracstep/core/sparsity_pattern.hpp>
+#include <diracstep/core/types.hpp>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+
+namespace diracstep {
+
+/// Consecutive rows of a residual that share a meaning and a unit.
+struct ResidualBlock {
+  const char* name;    ///< "momentum", "constraint", …
+  int rows;
+  double scale = 1.0;  ///< size of the terms that cancel in these rows at a solution; round-off is ε·scale
+};
+
+/// F(x) = 0, square, with an exact Jacobian on a fixed pattern: all that a solver sees of a step.
+class NonlinearProblem {
+ public:
+  virtual ~NonlinearProblem() = default;
+  virtual int size() const = 0;
+  virtual const SparsityPattern& pattern() const = 0;
+  /// The blocks in row order; their scales may change from one solve to the next.
+  virtual std::span<const ResidualBlock> blocks() const = 0;
+  virtual void residual(ConstVectorRef x, VectorRef f) = 0;
+  virtual void jacobian(ConstVectorRef x, VectorRef values) = 0;
+};
+
+enum class SolveStatus {
+  ok,
+  no_convergence,     ///< iterations used up or the residual no longer falls
+  singular_jacobian,  ///< the linear solver met a zero pivot
+  not_finite,         ///< a residual or Jacobian was NaN or infinite
+};
+
+/// One line a person can read.
+const char* describe(SolveStatus status);
+
+/// What a solve did.  `residual_norms[i]` is the maximum norm of block i at the last point, unscaled.
+struct [[nodiscard]] SolveReport {
+  SolveStatus status = SolveStatus::ok;
+  int iterations = 0;
+  int residual_evaluations = 0;
+  int jacobian_evaluations = 0;
+  std::array<double, 4> residual_norms{};
+
+  bool ok() const { return status == SolveStatus::ok; }
+};
+
+/// Solves F(x) = 0 from the guess in x.  On failure x is the last iterate.
+/// An exception thrown by the problem's own functions passes through.
+class NonlinearSolver {
+ public:
+  virtual ~NonlinearSolver() = default;
+  virtual SolveReport solve(VectorRef x) = 0;
+  /// What does the work, for plans and reports: "KINSOL, dense".
+  virtual std::string description() const = 0;
+};
+
+/// Makes the solver of one problem; the problem outlives it.
+using SolverFactory = std::function<std::unique_ptr<NonlinearSolver>(NonlinearProblem&)>;
+
+}  // namespace diracstep

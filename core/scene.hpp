@@ -1,0 +1,44 @@
+#pragma once
+
+#include <diracstep/core/constraint_rows.hpp>
+#include <diracstep/core/phase_function.hpp>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace diracstep {
+
+/// Where a motion starts: a configuration and a velocity in the distribution.
+struct Start {
+  double time = 0.0;
+  Vector q;
+  Vector v;
+};
+
+/// A continuous system: (L, Δ_Q) and a start.
+///
+///   q̇ = v,   v ∈ Δ_Q(q),   p = ∂L/∂v,   ṗ − ∂L/∂q ∈ Δ°_Q(q)          Leok and Ohsawa (4.7)
+struct Scene {
+  std::string name;
+  std::vector<std::string> coordinates;
+  std::shared_ptr<const Lagrangian> lagrangian;
+  ConstraintBlocks constraints;
+  Start start;
+
+  int dimension() const { return static_cast<int>(coordinates.size()); }
+  int rows() const { return row_count(constraints); }
+  std::vector<std::string> row_names() const;
+
+  /// v·∂L/∂v − L.
+  double energy(double t, ConstVectorRef q, ConstVectorRef v) const;
+};
+
+/// Throws Misuse where sizes disagree or a part is missing.
+void require_well_formed(const Scene& scene);
+
+/// Throws Misuse where the start is of the wrong size, is not finite, violates φ(q) = 0, or has a velocity off
+/// the distribution; names the coordinate or the row, and the amount.  A row counts as violated when its
+/// residual exceeds 1e-10 of the terms that cancel in it.
+void require_consistent(const Scene& scene, const Start& start);
+
+}  // namespace diracstep

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <diracstep/core/discrete_constraint.hpp>
+#include <diracstep/core/generating_function.hpp>
+#include <diracstep/core/nonlinear_solver.hpp>
+#include <memory>
+#include <vector>
+
+namespace diracstep {
+
+/// One discrete Dirac step as a nonlinear problem: the only thing a solver sees.
+class StepProblem : public NonlinearProblem {
+ public:
+  /// Freezes the data of the step from (q0,p0).
+  virtual void begin(Interval step, const Vector& q0, const Vector& p0) = 0;
+
+  /// A guess for the unknowns from a velocity at q0.
+  virtual void guess(const Vector& v0, VectorRef x) const = 0;
+
+  /// The explicit part, once x solves the problem: the end point, and the impulse λ (momentum times the inverse
+  /// unit of a row) that entered at q0 as A(q0)ᵀλ.
+  virtual void finish(ConstVectorRef x, Vector& q1, Vector& p1, Vector& impulse) = 0;
+};
+
+/// The discrete Dirac step of a generating function S (Leok and Ohsawa (4.28), (4.35), (4.45), (4.52)):
+///
+///   p̂0 = p0 + A(q0)ᵀλ,   ((q0,p̂0),(q1,p1)) ∈ graph of S,   c(q0,q1) = 0
+///
+///   type   unknowns     residual
+///   one    q1,   hλ     h (p̂0 + D1S(q0,q1)),     c(q0, q1)
+///   two    h p1, hλ     h (p̂0 − D1S(q0,p1)),     c(q0, D2S)
+///   three  q1,   hλ     q0 + D1S(p̂0,q1),         c(q0, q1)
+///   four   h p1, hλ     q0 − D1S(p̂0,p1),         c(q0, −D2S)
+///
+/// The factors h make all rows and unknowns comparable to positions, so that the Jacobian stays of order 1 as
+/// h → 0.  Without rows there is no λ.  With `dense` the Jacobian is a full matrix; types two to four with rows
+/// always use one.
+std::unique_ptr<StepProblem> generating_function_step(std::unique_ptr<GeneratingFunction> generating_function,
+                                                      const ConstraintBlocks& constraints, StepRule rule,
+                                                      bool dense);
+
+}  // namespace diracstep

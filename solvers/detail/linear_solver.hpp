@@ -1,0 +1,22 @@
+#pragma once
+
+#include <diracstep/core/sparsity_pattern.hpp>
+#include <memory>
+
+namespace diracstep::detail {
+
+/// Factors a matrix on a fixed pattern and solves with it.
+class LinearSolver {
+ public:
+  virtual ~LinearSolver() = default;
+  /// False where a pivot vanishes or is not finite.
+  virtual bool factor(const double* values) = 0;
+  /// Replaces b by the solution.
+  virtual void solve(double* b) = 0;
+  virtual const char* name() const = 0;
+};
+
+/// Dense LU for full patterns, KLU for the others.
+std::unique_ptr<LinearSolver> make_linear_solver(const SparsityPattern& pattern);
+
+}  // namespace diracstep::detail
