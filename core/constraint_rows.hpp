@@ -53,32 +53,10 @@ class ConstraintRows {
   std::vector<std::string> names_;
 };
 
-/// All rows of a scene, block by block: Δ_Q(q) = ker A(q), affine where a block has b.
+/// The constraints of a scene, block by block.
 using ConstraintBlocks = std::vector<std::shared_ptr<const ConstraintRows>>;
 
 /// Number of rows in all blocks.
 int row_count(const ConstraintBlocks& blocks);
-
-/// A and b of every block at one point of the configuration space, and the products taken with them.
-class ConstraintsAtPoint {
- public:
-  explicit ConstraintsAtPoint(const ConstraintBlocks& blocks);
-
-  void evaluate(double t, ConstVectorRef q);
-
-  /// out += factor · Aᵀ λ, an impulse or force in the annihilator.
-  void add_annihilator(ConstVectorRef lambda, VectorRef out, double factor = 1.0) const;
-
-  /// out = A v + b.
-  void velocity_residual(ConstVectorRef v, VectorRef out) const;
-
-  /// A of block number `block`, on its pattern.
-  const Vector& coefficients(std::size_t block) const { return a_[block]; }
-
- private:
-  const ConstraintBlocks& blocks_;
-  std::vector<Vector> a_;
-  std::vector<Vector> b_;
-};
 
 }  // namespace diracstep

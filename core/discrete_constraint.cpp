@@ -2,59 +2,64 @@
 
 namespace diracstep {
 
-DiscreteConstraint::DiscreteConstraint(const ConstraintBlocks& blocks, StepRule rule)
-    : blocks_(blocks), rule_(rule), rows_(row_count(blocks)) {
-  for (const auto& block : blocks_) {
-    const int nonzeros = block->pattern().nonzeros();
-    work_.push_back({Vector::Zero(nonzeros), Vector::Zero(block->rows()), Vector::Zero(nonzeros),
-                     Vector::Zero(nonzeros), Vector::Zero(block->rows())});
-    q_ = increment_ = Vector::Zero(block->dimension());
+DiscreteConstraint::DiscreteConstraint(const ConstraintBlocks& blocks, int dimension, StepRule rule)
+    : rule_(rule),
+      layout_(row_count(blocks), dimension),
+      q_(Vector::Zero(dimension)),
+      increment_(Vector::Zero(dimension)) {
+  int row = 0;
+  for (const auto& block : blocks) {
+    const Vector values = Vector::Zero(block->pattern().nonzeros());
+    blocks_.push_back({block, values, Vector::Zero(block->rows()), values, values});
+    layout_.add(block->pattern(), row, 0);
+    row += block->rows();
   }
+  pattern_ = layout_.assemble(false);
 }
 
 void DiscreteConstraint::residual(Interval step, ConstVectorRef q0, ConstVectorRef q1, VectorRef out) {
-  if (rows_ == 0) return;
   increment_ = q1 - q0;
   int row = 0;
-  for (std::size_t k = 0; k < blocks_.size(); ++k) {
-    const ConstraintRows& block = *blocks_[k];
-    Work& work = work_[k];
-    auto c = out.segment(row, block.rows());
-    row += block.rows();
-    if (block.holonomic()) {
-      block.position(step.start + step.size, q1, c);
-      continue;
-    }
-    c.setZero();
-    for (const StepNode& node : step_nodes(rule_)) {
-      q_ = (1.0 - node.c) * q0 + node.c * q1;
-      block.coefficients(step.start + node.c * step.size, q_, work.coefficients, work.offset);
-      c += node.weight * step.size * work.offset;
-      block.pattern().multiply_add(work.coefficients.data(), increment_.data(), c.data(), node.weight);
-    }
+  for (Block& block : blocks_) {
+    residual(block, step, q0, q1, out.segment(row, block.rows->rows()));
+    row += block.rows->rows();
   }
 }
 
-void DiscreteConstraint::differentiate(Interval step, ConstVectorRef q0, ConstVectorRef q1) {
-  if (rows_ == 0) return;
+void DiscreteConstraint::residual(Block& block, Interval step, ConstVectorRef q0, ConstVectorRef q1,
+                                  VectorRef c) {
+  if (block.rows->holonomic()) return block.rows->position(step.start + step.size, q1, c);
+  c.setZero();
+  for (const StepNode& node : step_nodes(rule_)) {
+    q_ = (1.0 - node.c) * q0 + node.c * q1;
+    block.rows->coefficients(step.start + node.c * step.size, q_, block.coefficients, block.offset);
+    c += node.weight * step.size * block.offset;
+    block.rows->pattern().multiply_add(block.coefficients.data(), increment_.data(), c.data(), node.weight);
+  }
+}
+
+void DiscreteConstraint::end_derivative(Interval step, ConstVectorRef q0, ConstVectorRef q1, VectorRef d) {
   increment_ = q1 - q0;
   for (std::size_t k = 0; k < blocks_.size(); ++k) {
-    const ConstraintRows& block = *blocks_[k];
-    Work& work = work_[k];
-    if (block.holonomic()) {
-      block.coefficients(step.start + step.size, q1, work.derivative, work.offset);
-      continue;
-    }
-    work.derivative.setZero();
-    for (const StepNode& node : step_nodes(rule_)) {
-      const double t = step.start + node.c * step.size;
-      q_ = (1.0 - node.c) * q0 + node.c * q1;
-      block.coefficients(t, q_, work.coefficients, work.offset);
-      work.derivative += node.weight * work.coefficients;
-      if (node.c == 0.0) continue;
-      block.derivative(t, q_, increment_, step.size, work.node_derivative);
-      work.derivative += node.weight * node.c * work.node_derivative;
-    }
+    end_derivative(blocks_[k], step, q0, q1);
+    const auto& places = layout_.positions(static_cast<int>(k));
+    for (std::size_t e = 0; e < places.size(); ++e)
+      d[places[e]] = blocks_[k].derivative[static_cast<Eigen::Index>(e)];
+  }
+}
+
+void DiscreteConstraint::end_derivative(Block& block, Interval step, ConstVectorRef q0, ConstVectorRef q1) {
+  if (block.rows->holonomic())
+    return block.rows->coefficients(step.start + step.size, q1, block.derivative, block.offset);
+  block.derivative.setZero();
+  for (const StepNode& node : step_nodes(rule_)) {
+    const double t = step.start + node.c * step.size;
+    q_ = (1.0 - node.c) * q0 + node.c * q1;
+    block.rows->coefficients(t, q_, block.coefficients, block.offset);
+    block.derivative += node.weight * block.coefficients;
+    if (node.c == 0.0) continue;
+    block.rows->derivative(t, q_, increment_, step.size, block.node_derivative);
+    block.derivative += node.weight * node.c * block.node_derivative;
   }
 }
 

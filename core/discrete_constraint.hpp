@@ -1,6 +1,6 @@
 #pragma once
 
-#include <diracstep/core/constraint_rows.hpp>
+#include <diracstep/core/constraint_distribution.hpp>
 #include <diracstep/core/generating_function.hpp>
 #include <diracstep/core/step_nodes.hpp>
 
@@ -15,28 +15,32 @@ namespace diracstep {
 /// induces Δ_Q back (Leok and Ohsawa (4.17)–(4.19)).
 class DiscreteConstraint {
  public:
-  DiscreteConstraint(const ConstraintBlocks& blocks, StepRule rule);
+  DiscreteConstraint(const ConstraintBlocks& blocks, int dimension, StepRule rule);
 
   StepRule rule() const { return rule_; }
-  int rows() const { return rows_; }
-  const ConstraintBlocks& blocks() const { return blocks_; }
+  int rows() const { return pattern_.rows(); }
+
+  /// Of ∂c/∂q1.
+  const SparsityPattern& pattern() const { return pattern_; }
 
   /// out = c(q0,q1).
   void residual(Interval step, ConstVectorRef q0, ConstVectorRef q1, VectorRef out);
 
-  /// Evaluates ∂c/∂q1; afterwards `end_derivative(k)` holds it for block k, on that block's pattern.
-  void differentiate(Interval step, ConstVectorRef q0, ConstVectorRef q1);
-  const Vector& end_derivative(std::size_t block) const { return work_[block].derivative; }
+  /// d = ∂c/∂q1 on pattern().
+  void end_derivative(Interval step, ConstVectorRef q0, ConstVectorRef q1, VectorRef d);
 
  private:
-  struct Work {
-    Vector coefficients, offset, node_derivative, derivative, rows;
+  struct Block {
+    std::shared_ptr<const ConstraintRows> rows;
+    Vector coefficients, offset, node_derivative, derivative;
   };
+  void residual(Block& block, Interval step, ConstVectorRef q0, ConstVectorRef q1, VectorRef c);
+  void end_derivative(Block& block, Interval step, ConstVectorRef q0, ConstVectorRef q1);
 
-  ConstraintBlocks blocks_;
   StepRule rule_;
-  int rows_;
-  std::vector<Work> work_;
+  std::vector<Block> blocks_;
+  SparsityPattern pattern_;
+  BlockPattern layout_;
   Vector q_, increment_;
 };
 

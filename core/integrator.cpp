@@ -15,18 +15,9 @@ constexpr std::size_t longest_history = 4;
 constexpr std::array<std::array<double, longest_history>, longest_history + 1> extrapolation{{
     {}, {1.0}, {2.0, -1.0}, {3.0, -3.0, 1.0}, {4.0, -6.0, 4.0, -1.0}}};
 
-std::span<const double> fractions_for(const MethodInfo& method, int order) {
-  static constexpr double whole_step[] = {1.0};
-  if (order == method.order) return whole_step;
-  if (!method.self_adjoint || method.order != 2)
-    throw Misuse("method '" + method.name + "' is not a self-adjoint step of order 2, so it cannot be composed to order " +
-                 std::to_string(order) + "; its own order is " + std::to_string(method.order));
-  return composition_fractions(order);
-}
-
+/// Completed, well formed and consistent at its start.
 std::shared_ptr<const Scene> checked(std::shared_ptr<const Scene> scene) {
-  if (!scene) throw Misuse("an integrator needs a scene");
-  require_well_formed(*scene);
+  scene = completed(std::move(scene));
   require_consistent(*scene, scene->start);
   return scene;
 }
@@ -44,24 +35,51 @@ Integrator::Integrator(std::shared_ptr<const Scene> scene, const Registry& regis
                        IntegratorOptions options)
     : scene_(checked(std::move(scene))),
       options_(std::move(options)),
-      method_(registry.info(options_.method)),
-      fractions_(fractions_for(method_, options_.order == 0 ? method_.order : options_.order)),
+      method_(registry.method(options_.method)),
       dense_(scene_->dimension() + scene_->rows() <= options_.dense_limit),
-      problem_(generating_function_step(registry.make(options_.method, *scene_), scene_->constraints,
-                                        options_.constraint_rule.value_or(method_.constraint_rule), dense_)),
-      solver_(solvers(*problem_)),
       velocity_problem_(*scene_, dense_),
       acceleration_problem_(*scene_, dense_),
       velocity_solver_(solvers(velocity_problem_)),
       acceleration_solver_(solvers(acceleration_problem_)) {
   require_step(options_.step);
-  if (options_.order == 0) options_.order = method_.order;
-  x_.setZero(problem_->size());
+  plan_stages(registry, solvers);
   velocity_unknowns_.setZero(velocity_problem_.size());
   acceleration_unknowns_.setZero(acceleration_problem_.size());
-  history_.assign(fractions_.size(), std::vector<Vector>(longest_history, x_));
-  solutions_.assign(fractions_.size(), x_);
   reset(scene_->start);
+}
+
+Integrator::Part Integrator::make_part(const Method& method, bool mirror_rule, const SolverFactory& solvers) const {
+  StepRule rule = method.info.constraint_rule;
+  if (options_.constraint_rule)
+    rule = mirror_rule ? mirrored(*options_.constraint_rule) : *options_.constraint_rule;
+  Part part{dirac_step(method.make(*scene_), scene_->constraints, rule, dense_), nullptr};
+  if (part.problem->size() > 0) part.solver = solvers(*part.problem);
+  return part;
+}
+
+void Integrator::plan_stages(const Registry& registry, const SolverFactory& solvers) {
+  const MethodInfo& info = method_.info;
+  if (options_.order == 0) options_.order = info.order;
+  parts_.push_back(make_part(method_, false, solvers));
+  std::vector<std::pair<double, std::size_t>> sequence;  // fraction and part
+  if (options_.order == info.order) {
+    sequence = {{1.0, 0}};
+  } else if (info.self_adjoint && info.order == 2) {
+    for (const double fraction : composition_fractions(options_.order)) sequence.emplace_back(fraction, 0);
+  } else if (info.order == 1) {
+    parts_.push_back(make_part(registry.adjoint_of(method_), true, solvers));
+    for (const double fraction : composition_fractions(options_.order)) {
+      sequence.emplace_back(fraction / 2.0, 0);
+      sequence.emplace_back(fraction / 2.0, 1);
+    }
+  } else {
+    throw Misuse("method '" + info.name + "' of order " + std::to_string(info.order) +
+                 " cannot be composed to order " + std::to_string(options_.order));
+  }
+  for (const auto& [fraction, part] : sequence) {
+    const Vector unknowns = Vector::Zero(parts_[part].problem->size());
+    stages_.push_back({fraction, part, unknowns, std::vector<Vector>(longest_history, unknowns)});
+  }
 }
 
 void Integrator::reset() { reset(scene_->start); }
@@ -81,11 +99,11 @@ void Integrator::reset(const Start& start) {
   work_ = {};
 }
 
-void Integrator::predict(std::size_t stage, VectorRef x) const {
-  if (history_length_ < 2) return problem_->guess(v_, x);
-  x.setZero();
+void Integrator::predict(Stage& stage) {
+  if (history_length_ < 2) return parts_[stage.part].problem->guess(v_, stage.solution);
+  stage.solution.setZero();
   for (std::size_t k = 0; k < history_length_; ++k)
-    x += extrapolation[history_length_][k] * history_[stage][k];
+    stage.solution += extrapolation[history_length_][k] * stage.history[k];
 }
 
 void Integrator::count(const SolveReport& report) {
@@ -95,20 +113,23 @@ void Integrator::count(const SolveReport& report) {
   work_.jacobian_evaluations += report.jacobian_evaluations;
 }
 
-SolveReport Integrator::solve_stage(std::size_t stage, double t, const Vector& q, const Vector& p) {
-  problem_->begin({t, fractions_[stage] * options_.step}, q, p);
-  predict(stage, solutions_[stage]);
-  const SolveReport report = solver_->solve(solutions_[stage]);
+SolveReport Integrator::solve_stage(std::size_t number, double t, const Vector& q, const Vector& p) {
+  Stage& stage = stages_[number];
+  Part& part = parts_[stage.part];
+  part.problem->begin({t, stage.fraction * options_.step}, q, p);
+  if (!part.solver) return {};
+  predict(stage);
+  const SolveReport report = part.solver->solve(stage.solution);
   count(report);
   return report;
 }
 
-StepReport Integrator::failed(const SolveReport& report, double time) const {
+StepReport Integrator::failed(const SolveReport& report, const StepProblem& problem, double time) const {
   std::ostringstream message;
   message << "step " << work_.steps << " from t = " << time << ": " << describe(report.status) << " after "
           << report.iterations << " iterations";
   const char* separator = "; ";
-  const auto blocks = problem_->blocks();
+  const auto blocks = problem.blocks();
   for (std::size_t b = 0; b < blocks.size(); ++b) {
     message << separator << blocks[b].name << " residual " << report.residual_norms[b];
     separator = ", ";
@@ -122,17 +143,23 @@ StepReport Integrator::step() {
   SolveReport total;
   q_stage_ = q_;
   p_stage_ = p_;
-  for (std::size_t stage = 0; stage < fractions_.size(); ++stage) {
-    const double h = fractions_[stage] * options_.step;
-    if (stage > 0 || !first_stage_solved_) {
-      const SolveReport report = solve_stage(stage, t, q_stage_, p_stage_);
-      if (!report.ok()) return failed(report, start);
+  for (std::size_t k = 0; k < stages_.size(); ++k) {
+    Stage& stage = stages_[k];
+    StepProblem& problem = *parts_[stage.part].problem;
+    const double h = stage.fraction * options_.step;
+    if (k > 0 || !first_stage_solved_) {
+      const SolveReport report = solve_stage(k, t, q_stage_, p_stage_);
+      if (!report.ok()) return failed(report, problem, start);
       total.iterations += report.iterations;
       total.residual_evaluations += report.residual_evaluations;
       total.jacobian_evaluations += report.jacobian_evaluations;
       total.residual_norms = report.residual_norms;
     }
-    problem_->finish(solutions_[stage], q_next_, p_next_, impulse_);
+    problem.finish(stage.solution, q_next_, p_next_, impulse_);
+    if (!(q_next_.allFinite() && p_next_.allFinite())) {
+      total.status = SolveStatus::not_finite;
+      return failed(total, problem, start);
+    }
     if (history_length_ < 2) v_ = (q_next_ - q_stage_) / h;
     std::swap(q_stage_, q_next_);
     std::swap(p_stage_, p_next_);
@@ -140,10 +167,9 @@ StepReport Integrator::step() {
   }
   std::swap(q_, q_stage_);
   std::swap(p_, p_stage_);
-  for (std::size_t stage = 0; stage < fractions_.size(); ++stage) {
-    auto& history = history_[stage];
-    std::rotate(history.begin(), history.end() - 1, history.end());
-    history.front() = solutions_[stage];
+  for (Stage& stage : stages_) {
+    std::rotate(stage.history.begin(), stage.history.end() - 1, stage.history.end());
+    stage.history.front() = stage.solution;
   }
   history_length_ = std::min(history_length_ + 1, longest_history);
   first_stage_solved_ = false;
@@ -178,12 +204,44 @@ SolveReport Integrator::sample(Momentum momentum, Sample& sample) {
       if (!report.ok()) return report;
       first_stage_solved_ = true;
     }
-    problem_->finish(solutions_[0], q_next_, p_next_, impulse_);
-    ConstraintsAtPoint rows(scene_->constraints);
+    parts_[stages_[0].part].problem->finish(stages_[0].solution, q_next_, p_next_, impulse_);
+    ConstraintsAtPoint rows(scene_->constraints, static_cast<int>(n));
     rows.evaluate(t, q_);
     rows.add_annihilator(impulse_, sample.p);
   }
   return report;
+}
+
+std::vector<PlanLine> Integrator::plan() const {
+  const Part& part = parts_.front();
+  const int m = scene_->rows(), size = part.problem->size();
+  std::vector<PlanLine> lines;
+  lines.push_back({"step", method_.info.name, method_.info.summary});
+  lines.push_back({"unknowns", part.problem->unknowns(),
+                   part.solver ? "one nonlinear system in each solve" : "the graph is solved for its end"});
+  if (part.solver)
+    lines.push_back({"nonlinear solver", part.solver->description(), "Newton's method, exact Jacobian"});
+  else
+    lines.push_back({"nonlinear solver", "left out", "the step is explicit and no rows bind"});
+  if (part.solver) {
+    const int nonzeros = part.problem->pattern().nonzeros();
+    lines.push_back({"Jacobian", dense_ ? "full" : "sparse",
+                     std::to_string(size) + " unknowns, " + std::to_string(nonzeros) + " entries"});
+  }
+  if (m == 0) {
+    lines.push_back({"multipliers", "left out", "the scene has no rows"});
+    lines.push_back({"projection", "left out", "every momentum is that of a velocity"});
+  } else {
+    const StepRule rule = options_.constraint_rule.value_or(method_.info.constraint_rule);
+    lines.push_back({"multipliers", std::to_string(m), std::string("nonholonomic rows by the ") + name(rule) +
+                                                           " rule, holonomic rows at the end of the step"});
+    lines.push_back({"projection", "where the state is read", "p is defined up to the annihilator between steps"});
+  }
+  lines.push_back({"composition", stages_.size() == 1 ? "left out" : std::to_string(stages_.size()) + " stages",
+                   "order " + std::to_string(options_.order) + ", the method's own is " +
+                       std::to_string(method_.info.order)});
+  lines.push_back({"Hamiltonian", scene_->hamiltonian ? "given" : "derived only by methods that need it", ""});
+  return lines;
 }
 
 RunReport run(Integrator& integrator, long steps, Momentum momentum, long every, const Observer& observer) {

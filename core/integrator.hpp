@@ -22,7 +22,8 @@ enum class Momentum {
 
 struct IntegratorOptions {
   std::string method = "type1/midpoint";
-  int order = 0;      ///< composed to this order; 0 keeps the method's own
+  int order = 0;      ///< composed to this order, methods that are not self-adjoint with their adjoint; 0 keeps
+                      ///< the method's own
   double step = 0.0;  ///< step size, may be negative; must be given
   std::optional<StepRule> constraint_rule = std::nullopt;  ///< instead of the method's own
   int dense_limit = 40;  ///< systems of up to this many unknowns use full matrices
@@ -91,18 +92,32 @@ class Integrator {
   std::vector<PlanLine> plan() const;
 
  private:
+  /// One of the two steps that a composition is made of: the method, and its adjoint where it is not its own.
+  struct Part {
+    std::unique_ptr<StepProblem> problem;
+    std::unique_ptr<NonlinearSolver> solver;  ///< null where the step is explicit
+  };
+  /// A fraction of the step taken with one of the parts.
+  struct Stage {
+    double fraction;
+    std::size_t part;
+    Vector solution;              ///< the unknowns in the current step
+    std::vector<Vector> history;  ///< in the last ones, newest first: what the next are extrapolated from
+  };
+
+  Part make_part(const Method& method, bool mirror_rule, const SolverFactory& solvers) const;
+  void plan_stages(const Registry& registry, const SolverFactory& solvers);
   SolveReport solve_stage(std::size_t stage, double t, const Vector& q, const Vector& p);
-  void predict(std::size_t stage, VectorRef x) const;
+  void predict(Stage& stage);
   void count(const SolveReport& report);
-  StepReport failed(const SolveReport& report, double time) const;
+  StepReport failed(const SolveReport& report, const StepProblem& problem, double time) const;
 
   std::shared_ptr<const Scene> scene_;
   IntegratorOptions options_;
-  MethodInfo method_;
-  std::span<const double> fractions_;
+  Method method_;
   bool dense_;
-  std::unique_ptr<StepProblem> problem_;
-  std::unique_ptr<NonlinearSolver> solver_;
+  std::vector<Part> parts_;
+  std::vector<Stage> stages_;
   VelocityProblem velocity_problem_;
   AccelerationProblem acceleration_problem_;
   std::unique_ptr<NonlinearSolver> velocity_solver_;
@@ -112,11 +127,8 @@ class Integrator {
   Vector q_, p_;
   Vector v_;  ///< last known velocity, a guess only
   Vector q_next_, p_next_, q_stage_, p_stage_, impulse_;
-  Vector x_, velocity_unknowns_, acceleration_unknowns_;
-  std::vector<Vector> solutions_;    ///< the unknowns of each stage of the current step
-  bool first_stage_solved_ = false;  ///< solutions_[0] already solves the first stage of the next step
-  /// Solutions of the last steps, newest first, stage by stage: what the next ones are extrapolated from.
-  std::vector<std::vector<Vector>> history_;
+  Vector velocity_unknowns_, acceleration_unknowns_;
+  bool first_stage_solved_ = false;  ///< the first stage of the next step is solved already
   std::size_t history_length_ = 0;
   Work work_;
 };

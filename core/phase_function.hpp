@@ -2,6 +2,7 @@
 
 #include <array>
 #include <concepts>
+#include <diracstep/core/dependence.hpp>
 #include <diracstep/core/jet.hpp>
 #include <diracstep/core/sparsity_pattern.hpp>
 #include <diracstep/core/types.hpp>
@@ -10,6 +11,14 @@
 
 namespace diracstep {
 
+/// What is known beforehand of a function's second derivatives; false where it is not known.
+struct PhaseStructure {
+  bool separable = false;           ///< ∂²f/∂x∂y = 0
+  bool y_hessian_constant = false;  ///< ∂²f/∂y² depends on nothing
+  bool y_hessian_diagonal = false;
+  bool quadratic = false;           ///< every second derivative is constant
+};
+
 /// A smooth function f(t, x, y) of two columns of n numbers, with its first and second derivatives.
 ///
 /// Second derivatives come as values on one symmetric n×n pattern shared by the three blocks:
@@ -17,13 +26,15 @@ namespace diracstep {
 /// Objects are immutable and may be used from several threads at once.
 class PhaseFunction {
  public:
-  explicit PhaseFunction(SparsityPattern pattern) : pattern_(std::move(pattern)) {}
+  explicit PhaseFunction(SparsityPattern pattern, PhaseStructure structure = {})
+      : pattern_(std::move(pattern)), structure_(structure) {}
   PhaseFunction(const PhaseFunction&) = delete;
   PhaseFunction& operator=(const PhaseFunction&) = delete;
   virtual ~PhaseFunction() = default;
 
   int dimension() const { return pattern_.rows(); }
   const SparsityPattern& pattern() const { return pattern_; }
+  const PhaseStructure& structure() const { return structure_; }
 
   virtual double value(double t, ConstVectorRef x, ConstVectorRef y) const = 0;
   virtual void gradient(double t, ConstVectorRef x, ConstVectorRef y, VectorRef fx, VectorRef fy) const = 0;
@@ -35,6 +46,7 @@ class PhaseFunction {
 
  private:
   SparsityPattern pattern_;
+  PhaseStructure structure_;
 };
 
 /// L(t, q, v), energy.  May be degenerate: ∂²L/∂v² need not be invertible.
@@ -75,10 +87,40 @@ std::array<Scalar, N> seed(ConstVectorRef x, int first_variable) {
   return seeded;
 }
 
+/// The structure of a formula f(x, y), by running it once on Dependence; nothing where it branches.
+template <int N, class F>
+PhaseStructure structure_of(const F& f) {
+  using Scalar = Dependence<2 * N>;
+  std::array<Scalar, N> x, y;
+  for (std::size_t i = 0; i < N; ++i) {
+    x[i] = Scalar::variable(i);
+    y[i] = Scalar::variable(N + i);
+  }
+  try {
+    const Scalar s = call_with_time(f, Scalar(), x, y);
+    PhaseStructure structure{true, true, true, true};
+    for (std::size_t i = 0; i < 2 * N; ++i)
+      for (std::size_t j = 0; j < 2 * N; ++j) {
+        const bool xy = i < N && j >= N, yy = i >= N && j >= N;
+        if (xy && s.second_derivative(i, j)) structure.separable = false;
+        if (yy && s.second_derivative_varies(i, j)) structure.y_hessian_constant = false;
+        if (yy && i != j && s.second_derivative(i, j)) structure.y_hessian_diagonal = false;
+        if (s.second_derivative_varies(i, j)) structure.quadratic = false;
+      }
+    if constexpr (takes_time<F, std::array<double, N>, std::array<double, N>>) {
+      // The time is no variable here, so nothing is known to be constant.
+      structure.y_hessian_constant = structure.quadratic = false;
+    }
+    return structure;
+  } catch (const typename Scalar::Branches&) {
+    return {};
+  }
+}
+
 template <class Base, int N, class F>
 class PhaseFormula final : public Base {
  public:
-  explicit PhaseFormula(F f) : Base(SparsityPattern::dense(N, N)), f_(std::move(f)) {}
+  explicit PhaseFormula(F f) : Base(SparsityPattern::dense(N, N), structure_of<N>(f)), f_(std::move(f)) {}
 
   double value(double t, ConstVectorRef x, ConstVectorRef y) const override {
     return evaluate<double>(t, x, y);

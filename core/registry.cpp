@@ -1,43 +1,108 @@
 #include <diracstep/core/errors.hpp>
+#include <diracstep/core/generating_functions/adjoint.hpp>
+#include <diracstep/core/generating_functions/euler.hpp>
+#include <diracstep/core/generating_functions/legendre.hpp>
 #include <diracstep/core/generating_functions/quadrature.hpp>
 #include <diracstep/core/registry.hpp>
 #include <regex>
 
 namespace diracstep {
 
+namespace {
+
+std::string prefix_of(GeneratingType type) { return "type" + std::to_string(static_cast<int>(type)) + "/"; }
+
+void add_quadrature(Registry& registry, StepRule rule, int order, std::string summary, std::string adjoint = {}) {
+  registry.add({std::string("type1/") + name(rule), GeneratingType::one, order, order == 2, rule,
+                std::move(summary), std::move(adjoint)},
+               [rule](const Scene& scene) { return quadrature_lagrangian(scene.lagrangian, rule); });
+}
+
+/// "typeN/word(inner)" taken apart.
+struct Transform {
+  GeneratingType type;
+  std::string word;
+  std::string inner;
+};
+
+bool parse_transform(const std::string& name, Transform& transform) {
+  std::smatch match;
+  if (!std::regex_match(name, match, std::regex(R"(type([1-4])/(legendre|adjoint)\((.+)\))"))) return false;
+  transform = {static_cast<GeneratingType>(std::stoi(match[1])), match[2], match[3]};
+  return true;
+}
+
+}  // namespace
+
 Registry Registry::with_built_ins() {
   Registry registry;
-  registry.add({"type1/midpoint", GeneratingType::one, 2, true, StepRule::midpoint,
-                "L_d = h L((q0+q1)/2, (q1-q0)/h)"},
-               [](const Scene& scene) { return quadrature_lagrangian(scene.lagrangian, StepRule::midpoint); });
+  add_quadrature(registry, StepRule::left, 1, "L_d = h L(q0, (q1-q0)/h)", "type1/right");
+  add_quadrature(registry, StepRule::right, 1, "L_d = h L(q1, (q1-q0)/h)", "type1/left");
+  add_quadrature(registry, StepRule::midpoint, 2, "L_d = h L((q0+q1)/2, (q1-q0)/h)");
+  add_quadrature(registry, StepRule::trapezoidal, 2, "L_d = h/2 [L(q0, (q1-q0)/h) + L(q1, (q1-q0)/h)]");
+  registry.add({"type2/euler", GeneratingType::two, 1, false, StepRule::left, "H_d+ = p1 q0 + h H(q0, p1)",
+                "type3/euler"},
+               [](const Scene& scene) { return euler_type2(hamiltonian_of(scene)); });
+  registry.add({"type3/euler", GeneratingType::three, 1, false, StepRule::right, "H_d- = -p0 q1 + h H(q1, p0)",
+                "type2/euler"},
+               [](const Scene& scene) { return euler_type3(hamiltonian_of(scene)); });
   return registry;
 }
 
-void Registry::add(MethodInfo info, GeneratingFunctionFactory factory) {
-  if (!std::regex_match(info.name, std::regex("type[1-4]/[A-Za-z0-9_:()/.-]+")))
-    throw Misuse("method name '" + info.name + "' is not of the form typeN/construction with N = 1, 2, 3, 4");
+void Registry::add(MethodInfo info, GeneratingFunctionFactory make) {
   const std::string name = info.name;
-  if (!entries_.emplace(name, Entry{std::move(info), std::move(factory)}).second)
+  const std::string prefix = prefix_of(info.type);
+  const bool well_formed = std::regex_match(name, std::regex("type[1-4]/[A-Za-z0-9_:.-]+"));
+  if (!well_formed || !name.starts_with(prefix))
+    throw Misuse("method name '" + name + "' is not of the form " + prefix + "construction");
+  if (!methods_.emplace(name, Method{std::move(info), std::move(make)}).second)
     throw Misuse("method '" + name + "' is already registered");
 }
 
-const Registry::Entry& Registry::find(const std::string& name) const {
-  const auto found = entries_.find(name);
-  if (found != entries_.end()) return found->second;
-  std::string message = "unknown method '" + name + "'; the methods are";
-  for (const auto& [known, entry] : entries_) message += " " + known;
-  throw Misuse(message);
+Method Registry::method(const std::string& name) const {
+  const auto found = methods_.find(name);
+  return found != methods_.end() ? found->second : transformed(name);
 }
 
-const MethodInfo& Registry::info(const std::string& name) const { return find(name).info; }
+Method Registry::transformed(const std::string& name) const {
+  Transform transform;
+  if (!parse_transform(name, transform)) {
+    std::string message = "unknown method '" + name + "'; the methods are";
+    for (const std::string& known : names()) message += " " + known;
+    throw Misuse(message + " typeN/adjoint(...)");
+  }
+  const Method inner = method(transform.inner);
+  MethodInfo info = inner.info;
+  info.name = name;
+  info.type = transform.type;
+  info.adjoint.clear();
+  if (transform.word == "legendre") {
+    if (inner.info.type != GeneratingType::one || transform.type == GeneratingType::one)
+      throw Misuse("'" + name + "': the discrete Legendre transform leads from type 1 to types 2, 3 and 4");
+    info.summary = "discrete Legendre transform of " + transform.inner;
+    return {info, [inner, type = transform.type](const Scene& scene) { return legendre(type, inner.make(scene)); }};
+  }
+  if (transform.type != adjoint_type(inner.info.type))
+    throw Misuse("'" + name + "': the adjoint is of another type; use " +
+                 prefix_of(adjoint_type(inner.info.type)) + "adjoint(" + transform.inner + ")");
+  info.summary = "adjoint of " + transform.inner;
+  info.constraint_rule = mirrored(inner.info.constraint_rule);
+  return {info, [inner](const Scene& scene) { return adjoint(inner.make(scene)); }};
+}
 
-std::unique_ptr<GeneratingFunction> Registry::make(const std::string& name, const Scene& scene) const {
-  return find(name).factory(scene);
+Method Registry::adjoint_of(const Method& original) const {
+  if (original.info.self_adjoint) return original;
+  if (!original.info.adjoint.empty()) return method(original.info.adjoint);
+  return method(prefix_of(adjoint_type(original.info.type)) + "adjoint(" + original.info.name + ")");
 }
 
 std::vector<std::string> Registry::names() const {
   std::vector<std::string> names;
-  for (const auto& [name, entry] : entries_) names.push_back(name);
+  for (const auto& [name, method] : methods_) names.push_back(name);
+  for (const char* type : {"type2", "type3", "type4"})
+    for (const auto& [name, method] : methods_)
+      if (method.info.type == GeneratingType::one)
+        names.push_back(std::string(type) + "/legendre(" + name + ")");
   return names;
 }
 

@@ -16,37 +16,48 @@ struct MethodInfo {
   std::string name;          ///< "type1/midpoint"
   GeneratingType type;       ///< the type of its generating function
   int order;                 ///< stated order in q and in projected p
-  bool self_adjoint;         ///< Φ_{−h} = Φ_h⁻¹, so that it can be composed
+  bool self_adjoint;         ///< Φ_{−h} = Φ_h⁻¹
   StepRule constraint_rule;  ///< the rule for Δ^d_Q that keeps its order
-  std::string summary;
+  std::string summary;       ///< its formula in a line
+  std::string adjoint = {};  ///< the method that is its adjoint, if there is one by name; else one is made
 };
 
-/// Makes the generating function of a method for a scene; throws Misuse where the scene lacks what it needs.
+/// Makes the generating function of a method for a scene that has a Lagrangian; throws Misuse where the scene lacks
+/// what the method needs.
 using GeneratingFunctionFactory = std::function<std::unique_ptr<GeneratingFunction>(const Scene&)>;
 
+/// A method ready for use.
+struct Method {
+  MethodInfo info;
+  GeneratingFunctionFactory make;
+};
+
 /// Methods by name.  A registry is a value: nothing is global.
+///
+/// Beside the registered names it knows two constructions from another method:
+///   typeN/legendre(type1/…)   N = 2, 3, 4: the discrete Legendre transform of a method of type 1
+///   typeN/adjoint(…)          the adjoint of a method; N is its type
 class Registry {
  public:
   /// The methods that come with the library.
   static Registry with_built_ins();
 
-  /// Throws Misuse for a name that is taken or is not of the form typeN/construction.
-  void add(MethodInfo info, GeneratingFunctionFactory factory);
+  /// Throws Misuse for a name that is taken, or is not of the form typeN/construction with N the type.
+  void add(MethodInfo info, GeneratingFunctionFactory make);
 
-  /// Both throw Misuse for an unknown name, listing the known ones.
-  const MethodInfo& info(const std::string& name) const;
-  std::unique_ptr<GeneratingFunction> make(const std::string& name, const Scene& scene) const;
+  /// Throws Misuse for an unknown name, listing the known ones.
+  Method method(const std::string& name) const;
 
+  /// The adjoint of a method: itself, the one it names, or one made from it.
+  Method adjoint_of(const Method& method) const;
+
+  /// Registered names and the Legendre transforms of those of type 1.
   std::vector<std::string> names() const;
 
  private:
-  struct Entry {
-    MethodInfo info;
-    GeneratingFunctionFactory factory;
-  };
-  const Entry& find(const std::string& name) const;
+  Method transformed(const std::string& name) const;
 
-  std::map<std::string, Entry> entries_;
+  std::map<std::string, Method> methods_;
 };
 
 }  // namespace diracstep

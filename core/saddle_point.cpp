@@ -9,19 +9,16 @@ SaddlePointProblem::SaddlePointProblem(const Scene& scene, bool dense)
       n_(scene.dimension()),
       m_(scene.rows()),
       q_(Vector::Zero(n_)),
-      rows_(scene.constraints),
+      rows_(scene.constraints, n_),
+      constraints_(scene.constraints, n_),
       lq_(Vector::Zero(n_)),
       lv_(Vector::Zero(n_)),
       layout_(n_ + m_, n_ + m_) {
   const SparsityPattern& mass = scene.lagrangian->pattern();
   for (Vector* values : {&lqq_, &lqv_, &lvv_}) values->setZero(mass.nonzeros());
   layout_.add(mass, 0, 0);
-  int row = n_;
-  for (const auto& block : scene.constraints) {
-    layout_.add(block->pattern(), 0, row, true);
-    layout_.add(block->pattern(), row, 0);
-    row += block->rows();
-  }
+  layout_.add(rows_.pattern(), 0, n_, true);
+  layout_.add(rows_.pattern(), n_, 0);
   pattern_ = layout_.assemble(dense);
   blocks_.push_back({"momentum", n_});
   if (m_ > 0) blocks_.push_back({"velocity", m_});
@@ -39,24 +36,19 @@ void SaddlePointProblem::assemble(ConstVectorRef v, VectorRef values) {
   const auto& mass_places = layout_.positions(0);
   for (std::size_t k = 0; k < mass_places.size(); ++k)
     values[mass_places[k]] = lvv_[static_cast<Eigen::Index>(k)];
-  for (std::size_t b = 0; b < scene_.constraints.size(); ++b) {
-    const Vector& a = rows_.coefficients(b);
-    const auto& force_places = layout_.positions(1 + 2 * static_cast<int>(b));
-    const auto& row_places = layout_.positions(2 + 2 * static_cast<int>(b));
-    for (std::size_t k = 0; k < row_places.size(); ++k) {
-      values[force_places[k]] = -a[static_cast<Eigen::Index>(k)];
-      values[row_places[k]] = a[static_cast<Eigen::Index>(k)];
-    }
+  const Vector& a = rows_.coefficients();
+  const auto& force_places = layout_.positions(1);
+  const auto& row_places = layout_.positions(2);
+  for (std::size_t k = 0; k < row_places.size(); ++k) {
+    values[force_places[k]] = -a[static_cast<Eigen::Index>(k)];
+    values[row_places[k]] = a[static_cast<Eigen::Index>(k)];
   }
 }
 
 void SaddlePointProblem::set_scales(double momentum, double velocity) {
   blocks_[0].scale = momentum > 0.0 && std::isfinite(momentum) ? momentum : 1.0;
   if (m_ == 0) return;
-  double one_forms = 0.0;
-  for (std::size_t b = 0; b < scene_.constraints.size(); ++b)
-    one_forms = std::max(one_forms, rows_.coefficients(b).lpNorm<Eigen::Infinity>());
-  const double scale = one_forms * velocity;
+  const double scale = rows_.coefficients().lpNorm<Eigen::Infinity>() * velocity;
   blocks_[1].scale = scale > 0.0 && std::isfinite(scale) ? scale : 1.0;
 }
 
@@ -88,15 +80,12 @@ void AccelerationProblem::begin(double t, ConstVectorRef q, ConstVectorRef v) {
   known_force_ = lq_ - known_force_;
   // d/dt(∂L/∂v) holds (∂²L/∂v∂q) v, and lqv is its transpose.
   lagrangian.pattern().transposed_multiply_add(lqv_.data(), v_.data(), known_force_.data(), -1.0);
-  known_rate_.setZero(m_);
-  int row = 0;
-  for (const auto& block : scene_.constraints) {
-    Vector derivative(block->pattern().nonzeros()), rate(block->rows());
-    block->time_derivative(t, q, v, rate);
-    block->derivative(t, q, v, 1.0, derivative);
-    block->pattern().multiply_add(derivative.data(), v_.data(), rate.data());
-    known_rate_.segment(row, block->rows()) = rate;
-    row += block->rows();
+  if (m_ > 0) {
+    row_derivative_.resize(constraints_.pattern().nonzeros());
+    known_rate_.resize(m_);
+    constraints_.time_derivative(t, q, v, known_rate_);
+    constraints_.derivative(t, q, v, 1.0, row_derivative_);
+    constraints_.pattern().multiply_add(row_derivative_.data(), v_.data(), known_rate_.data());
   }
   set_scales(known_force_.lpNorm<Eigen::Infinity>(), 1.0);
 }
@@ -107,11 +96,7 @@ void AccelerationProblem::residual(ConstVectorRef x, VectorRef f) {
   if (m_ == 0) return;
   rows_.add_annihilator(x.tail(m_), f.head(n_), -1.0);
   f.tail(m_) = known_rate_;
-  int row = n_;
-  for (std::size_t b = 0; b < scene_.constraints.size(); ++b) {
-    scene_.constraints[b]->pattern().multiply_add(rows_.coefficients(b).data(), x.data(), f.data() + row);
-    row += scene_.constraints[b]->rows();
-  }
+  rows_.pattern().multiply_add(rows_.coefficients().data(), x.data(), f.data() + n_);
 }
 
 void AccelerationProblem::jacobian(ConstVectorRef, VectorRef values) { assemble(v_, values); }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <diracstep/core/constraint_distribution.hpp>
 #include <diracstep/core/nonlinear_solver.hpp>
 #include <diracstep/core/scene.hpp>
 #include <vector>
@@ -33,6 +34,7 @@ class SaddlePointProblem : public NonlinearProblem {
   double t_ = 0.0;
   Vector q_;
   ConstraintsAtPoint rows_;
+  ConstraintDistribution constraints_;
   Vector lq_, lv_, lqq_, lqv_, lvv_;
 
  private:
@@ -64,7 +66,7 @@ class AccelerationProblem final : public SaddlePointProblem {
   void jacobian(ConstVectorRef x, VectorRef values) override;
 
  private:
-  Vector v_, known_force_, known_rate_;
+  Vector v_, known_force_, known_rate_, row_derivative_;
 };
 
 }  // namespace diracstep

@@ -1,5 +1,6 @@
 #include <cmath>
 #include <diracstep/core/errors.hpp>
+#include <diracstep/core/legendre_transform.hpp>
 #include <diracstep/core/scene.hpp>
 #include <sstream>
 
@@ -47,10 +48,44 @@ double Scene::energy(double t, ConstVectorRef q, ConstVectorRef v) const {
 void require_well_formed(const Scene& scene) {
   const std::string prefix = "scene '" + scene.name + "': ";
   if (scene.dimension() == 0) throw Misuse(prefix + "it has no coordinates");
-  if (!scene.lagrangian) throw Misuse(prefix + "it has no Lagrangian");
-  require_size(prefix + "the Lagrangian", scene.lagrangian->dimension(), scene.dimension());
+  if (!scene.lagrangian && !scene.hamiltonian)
+    throw Misuse(prefix + "it has neither a Lagrangian nor a Hamiltonian");
+  if (scene.lagrangian)
+    require_size(prefix + "the Lagrangian", scene.lagrangian->dimension(), scene.dimension());
+  if (scene.hamiltonian)
+    require_size(prefix + "the Hamiltonian", scene.hamiltonian->dimension(), scene.dimension());
   for (const auto& block : scene.constraints)
     require_size(prefix + "a constraint row", block->dimension(), scene.dimension());
+}
+
+std::shared_ptr<const Scene> completed(std::shared_ptr<const Scene> scene) {
+  if (!scene) throw Misuse("no scene was given");
+  require_well_formed(*scene);
+  const Start& start = scene->start;
+  const bool from_momentum = start.v.size() == 0 && start.p.size() > 0;
+  if (scene->lagrangian && !from_momentum) return scene;
+  const std::string prefix = "scene '" + scene->name + "': ";
+  require_size(prefix + "the start q", start.q.size(), scene->dimension());
+  auto complete = std::make_shared<Scene>(*scene);
+  if (from_momentum) {
+    require_size(prefix + "the start p", start.p.size(), scene->dimension());
+    if (!scene->hamiltonian)
+      throw Misuse(prefix + "the start is given by p, which needs a Hamiltonian; give v instead");
+    Vector hq(start.q.size());
+    complete->start.v.resize(start.q.size());
+    scene->hamiltonian->gradient(start.time, start.q, start.p, hq, complete->start.v);
+  }
+  if (!scene->lagrangian) {
+    const Vector& p = from_momentum ? start.p : start.v;  // regularity is tested there
+    require_size(prefix + "the start v", p.size(), scene->dimension());
+    complete->lagrangian = lagrangian_from(scene->hamiltonian, start.time, start.q, p);
+  }
+  return complete;
+}
+
+std::shared_ptr<const Hamiltonian> hamiltonian_of(const Scene& scene) {
+  if (scene.hamiltonian) return scene.hamiltonian;
+  return hamiltonian_from(scene.lagrangian, scene.start.time, scene.start.q, scene.start.v);
 }
 
 void require_consistent(const Scene& scene, const Start& start) {

@@ -8,20 +8,24 @@
 
 namespace diracstep {
 
-/// Where a motion starts: a configuration and a velocity in the distribution.
+/// Where a motion starts: a configuration, and a velocity in the distribution or (for a scene with a Hamiltonian)
+/// a momentum whose velocity ∂H/∂p lies in it.
 struct Start {
   double time = 0.0;
   Vector q;
   Vector v;
+  Vector p = {};  ///< used where v is empty
 };
 
-/// A continuous system: (L, Δ_Q) and a start.
+/// A continuous system: (L, Δ_Q) or (H, Δ_Q), or both, and a start.
 ///
-///   q̇ = v,   v ∈ Δ_Q(q),   p = ∂L/∂v,   ṗ − ∂L/∂q ∈ Δ°_Q(q)          Leok and Ohsawa (4.7)
+///   q̇ = v ∈ Δ_Q(q),   p = ∂L/∂v,   ṗ − ∂L/∂q ∈ Δ°_Q(q)          Leok and Ohsawa (4.7)
+///   q̇ = ∂H/∂p ∈ Δ_Q(q),            ṗ + ∂H/∂q ∈ Δ°_Q(q)          Leok and Ohsawa (4.11)
 struct Scene {
   std::string name;
   std::vector<std::string> coordinates;
   std::shared_ptr<const Lagrangian> lagrangian;
+  std::shared_ptr<const Hamiltonian> hamiltonian;
   ConstraintBlocks constraints;
   Start start;
 
@@ -35,6 +39,13 @@ struct Scene {
 
 /// Throws Misuse where sizes disagree or a part is missing.
 void require_well_formed(const Scene& scene);
+
+/// The scene itself if it has a Lagrangian and a starting velocity; else a copy with both derived from its
+/// Hamiltonian.  Throws Misuse where it is not well formed or the Hamiltonian is degenerate.
+std::shared_ptr<const Scene> completed(std::shared_ptr<const Scene> scene);
+
+/// The scene's Hamiltonian, or the one derived from its Lagrangian.  Throws Misuse where that is degenerate.
+std::shared_ptr<const Hamiltonian> hamiltonian_of(const Scene& scene);
 
 /// Throws Misuse where the start is of the wrong size, is not finite, violates φ(q) = 0, or has a velocity off
 /// the distribution; names the coordinate or the row, and the amount.  A row counts as violated when its

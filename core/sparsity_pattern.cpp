@@ -41,15 +41,29 @@ int SparsityPattern::position(int row, int column) const {
   return found != end && *found == row ? static_cast<int>(found - row_indices_.begin()) : -1;
 }
 
-std::vector<int> SparsityPattern::transposed_positions() const {
-  std::vector<int> mirror;
-  mirror.reserve(row_indices_.size());
+std::vector<std::pair<int, int>> SparsityPattern::entries() const {
+  std::vector<std::pair<int, int>> entries;
+  entries.reserve(row_indices_.size());
   for (int j = 0; j < columns(); ++j)
     for (int k = column_starts_[static_cast<std::size_t>(j)];
          k < column_starts_[static_cast<std::size_t>(j) + 1]; ++k)
-      mirror.push_back(position(j, row_indices_[static_cast<std::size_t>(k)]));
-  if (std::ranges::find(mirror, -1) != mirror.end())
-    throw Misuse("sparsity pattern of second derivatives is not symmetric");
+      entries.emplace_back(row_indices_[static_cast<std::size_t>(k)], j);
+  return entries;
+}
+
+SparsityPattern SparsityPattern::transposed(std::vector<int>& order) const {
+  auto exchanged = entries();
+  for (auto& [row, column] : exchanged) std::swap(row, column);
+  SparsityPattern result(columns(), rows_, exchanged);
+  order.clear();
+  for (const auto& [row, column] : exchanged) order.push_back(result.position(row, column));
+  return result;
+}
+
+std::vector<int> SparsityPattern::transposed_positions() const {
+  std::vector<int> mirror;
+  if (transposed(mirror) != *this)
+    throw Misuse("the sparsity pattern of second derivatives is not symmetric");
   return mirror;
 }
 
@@ -74,15 +88,45 @@ void SparsityPattern::transposed_multiply_add(const double* values, const double
   }
 }
 
+PatternProduct::PatternProduct(const SparsityPattern& a, bool transpose_a, const SparsityPattern& b,
+                               bool transpose_b) {
+  struct Entry {
+    int row, value;
+  };
+  // Entries of each column of A or Aᵀ.
+  const auto columns_of = [](const SparsityPattern& pattern, bool transpose) {
+    std::vector<std::vector<Entry>> columns(
+        static_cast<std::size_t>(transpose ? pattern.rows() : pattern.columns()));
+    int value = 0;
+    for (const auto& [row, column] : pattern.entries()) {
+      const int i = transpose ? column : row, j = transpose ? row : column;
+      columns[static_cast<std::size_t>(j)].push_back({i, value++});
+    }
+    return columns;
+  };
+  const auto left = columns_of(a, transpose_a), right = columns_of(b, transpose_b);
+  std::vector<std::pair<int, int>> entries;
+  for (std::size_t j = 0; j < right.size(); ++j)
+    for (const Entry& eb : right[j])
+      for (const Entry& ea : left[static_cast<std::size_t>(eb.row)]) {
+        entries.emplace_back(ea.row, static_cast<int>(j));
+        terms_.push_back({ea.value, eb.value, 0});
+      }
+  pattern_ = SparsityPattern(transpose_a ? a.columns() : a.rows(), static_cast<int>(right.size()), entries);
+  for (std::size_t k = 0; k < terms_.size(); ++k)
+    terms_[k].c = pattern_.position(entries[k].first, entries[k].second);
+}
+
+void PatternProduct::multiply(const double* a, const double* b, double* c) const {
+  std::fill_n(c, pattern_.nonzeros(), 0.0);
+  for (const Term& term : terms_) c[term.c] += a[term.a] * b[term.b];
+}
+
 int BlockPattern::add(const SparsityPattern& block, int row, int column, bool transposed) {
   auto& entries = entries_.emplace_back();
   entries.reserve(static_cast<std::size_t>(block.nonzeros()));
-  for (int j = 0; j < block.columns(); ++j)
-    for (int k = block.column_starts()[static_cast<std::size_t>(j)];
-         k < block.column_starts()[static_cast<std::size_t>(j) + 1]; ++k) {
-      const int i = block.row_indices()[static_cast<std::size_t>(k)];
-      entries.emplace_back(row + (transposed ? j : i), column + (transposed ? i : j));
-    }
+  for (const auto& [i, j] : block.entries())
+    entries.emplace_back(row + (transposed ? j : i), column + (transposed ? i : j));
   return static_cast<int>(entries_.size()) - 1;
 }
 

@@ -24,8 +24,14 @@ class SparsityPattern {
   std::span<const int> column_starts() const { return column_starts_; }
   std::span<const int> row_indices() const { return row_indices_; }
 
+  /// (row, column) of every value, in order.
+  std::vector<std::pair<int, int>> entries() const;
+
   /// Index into the values of entry (row, column), or -1 where the pattern has none.
   int position(int row, int column) const;
+
+  /// The same entries with rows and columns exchanged; value k of this pattern is value order[k] of the other.
+  SparsityPattern transposed(std::vector<int>& order) const;
 
   /// For each value of this square pattern the position of its mirror entry, which must exist.
   std::vector<int> transposed_positions() const;
@@ -41,6 +47,25 @@ class SparsityPattern {
   int rows_ = 0;
   std::vector<int> column_starts_;
   std::vector<int> row_indices_;
+};
+
+/// A product of two matrices on fixed patterns, either of them transposed: the pattern of the product, and for each
+/// value of it which products of values add up to it.
+class PatternProduct {
+ public:
+  PatternProduct() = default;
+  PatternProduct(const SparsityPattern& a, bool transpose_a, const SparsityPattern& b, bool transpose_b);
+
+  const SparsityPattern& pattern() const { return pattern_; }
+  /// c = A B on pattern().
+  void multiply(const double* a, const double* b, double* c) const;
+
+ private:
+  struct Term {
+    int a, b, c;  ///< positions of values
+  };
+  SparsityPattern pattern_;
+  std::vector<Term> terms_;
 };
 
 /// A matrix pattern made of blocks, and for each block where its values go in the whole.

@@ -28,6 +28,12 @@ std::span<const StepNode> step_nodes(StepRule rule) {
   return {data.nodes.data(), data.size};
 }
 
+StepRule mirrored(StepRule rule) {
+  if (rule == StepRule::left) return StepRule::right;
+  if (rule == StepRule::right) return StepRule::left;
+  return rule;
+}
+
 const char* name(StepRule rule) { return rule_data(rule).name; }
 
 }  // namespace diracstep

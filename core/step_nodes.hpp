@@ -17,6 +17,9 @@ enum class StepRule { left, right, midpoint, trapezoidal };
 /// Nodes and weights of a rule; the weights add up to 1.
 std::span<const StepNode> step_nodes(StepRule rule);
 
+/// The rule of the adjoint step: left and right change places.
+StepRule mirrored(StepRule rule);
+
 /// "left", "right", "midpoint" or "trapezoidal".
 const char* name(StepRule rule);
 

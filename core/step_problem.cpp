@@ -1,4 +1,3 @@
-#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <diracstep/core/step_problem.hpp>
@@ -7,252 +6,379 @@ namespace diracstep {
 
 namespace {
 
-double max_norm(ConstVectorRef x) { return x.size() == 0 ? 0.0 : x.lpNorm<Eigen::Infinity>(); }
+double max_norm(const Eigen::Ref<const Columns>& x) {
+  return x.size() == 0 ? 0.0 : x.lpNorm<Eigen::Infinity>();
+}
 
 /// A positive finite size of terms, 1 where none is known.
 double usable_scale(double scale) { return scale > 0.0 && std::isfinite(scale) ? scale : 1.0; }
 
-class GeneratingFunctionStep final : public StepProblem {
- public:
-  GeneratingFunctionStep(std::unique_ptr<GeneratingFunction> s, const ConstraintBlocks& constraints,
-                         StepRule rule, bool dense)
-      : s_(std::move(s)),
-        type_(s_->type()),
-        discrete_constraint_(constraints, rule),
-        start_rows_(discrete_constraint_.blocks()),
-        n_(s_->dimension()),
-        m_(discrete_constraint_.rows()),
-        products_(m_ > 0 && type_ != GeneratingType::one),
-        dense_(dense || products_) {
-    for (Vector* column : {&q0_, &p0_, &q1_, &a_, &b_, &d1_, &d2_}) column->setZero(n_);
-    last_x_.setConstant(size(), std::nan(""));
-    const int nonzeros = s_->pattern().nonzeros();
-    ab_.setZero(nonzeros);
-    if (products_ && type_ != GeneratingType::two) aa_.setZero(nonzeros);
-    if (products_ && type_ != GeneratingType::three) bb_.setZero(nonzeros);
-    assemble_pattern();
-    blocks_.push_back({"momentum", n_});
-    if (m_ > 0) blocks_.push_back({"constraint", m_});
+/// What both forms of the step share: the frozen data and the two constraints of Δ_Q and Δ^d_Q.
+struct StepData {
+  StepData(const ConstraintBlocks& constraints, int dimension, StepRule rule)
+      : n(dimension), start_rows(constraints, dimension), discrete_constraint(constraints, dimension, rule) {
+    q0.setZero(n);
+    p0.setZero(n);
+    end_derivative.setZero(discrete_constraint.pattern().nonzeros());
   }
 
-  int size() const override { return n_ + m_; }
+  void freeze(Interval interval, const Vector& q, const Vector& p) {
+    step = interval;
+    q0 = q;
+    p0 = p;
+    if (rows() > 0) start_rows.evaluate(step.start, q0);
+  }
+
+  int rows() const { return discrete_constraint.rows(); }
+
+  /// Size of the terms that cancel in c(q0,q1).
+  double constraint_scale() const { return usable_scale(max_norm(start_rows.coefficients()) * max_norm(q0)); }
+
+  int n;
+  ConstraintsAtPoint start_rows;
+  DiscreteConstraint discrete_constraint;
+  Interval step{0.0, 1.0};
+  Vector q0, p0;
+  Vector end_derivative;  ///< ∂c/∂q1, values
+};
+
+/// The graph and the constraint solved together.
+class ImplicitStep final : public StepProblem {
+ public:
+  ImplicitStep(std::unique_ptr<GeneratingFunction> s, const ConstraintBlocks& constraints, StepRule rule,
+               bool dense)
+      : s_(std::move(s)),
+        graph_(graph_of(s_->type())),
+        data_(constraints, s_->dimension(), rule),
+        n_(data_.n),
+        m_(data_.rows()),
+        inner_(n_ * s_->inner_columns()) {
+    y_.setZero(n_, s_->columns());
+    gradient_ = y_;
+    hessian_.setZero(s_->pattern().nonzeros(), s_->pairs());
+    last_x_.setConstant(size(), std::nan(""));
+    q1_.setZero(n_);
+    plan_blocks(dense);
+    blocks_.push_back({"momentum", n_});
+    if (m_ > 0) blocks_.push_back({"constraint", m_});
+    if (inner_ > 0) blocks_.push_back({"stationarity", inner_});
+  }
+
+  int size() const override { return n_ + m_ + inner_; }
   const SparsityPattern& pattern() const override { return pattern_; }
   std::span<const ResidualBlock> blocks() const override { return blocks_; }
 
+  std::string unknowns() const override {
+    std::string text = (graph_.ends_at_position ? "q1 (" : "p1 (") + std::to_string(n_) + ")";
+    if (m_ > 0) text += ", multipliers (" + std::to_string(m_) + ")";
+    if (inner_ > 0) text += ", inner columns (" + std::to_string(inner_) + ")";
+    return text;
+  }
+
   void begin(Interval step, const Vector& q0, const Vector& p0) override {
-    step_ = step;
-    q0_ = q0;
-    p0_ = p0;
+    data_.freeze(step, q0, p0);
     last_x_[0] = std::nan("");
-    if (m_ > 0) start_rows_.evaluate(step.start, q0);
-    if (stiffness_ == 0.0) {
-      a_ = starts_from_position() ? q0 : p0;
-      b_ = ends_at_position() ? q0 : p0;
-      s_->hessian(step_, a_, b_, aa_, ab_, bb_);
-      measure_stiffness();
-    }
+    if (hessian_.isZero(0.0)) sample_hessian();
     update_scales();
   }
 
-  void guess(const Vector& v0, VectorRef x) const override {
-    const double h = step_.size;
-    if (ends_at_position())
-      x.head(n_) = q0_ + h * v0;
+  void guess(const Vector& v0, VectorRef x) override {
+    const double h = data_.step.size;
+    if (graph_.ends_at_position)
+      x.head(n_) = data_.q0 + h * v0;
     else
-      x.head(n_) = h * p0_;
-    x.tail(m_).setZero();
+      x.head(n_) = h * data_.p0;
+    x.segment(n_, m_).setZero();
+    if (inner_ > 0) s_->guess_inner(data_.step, data_.q0, data_.p0, v0, Eigen::Map<Columns>(x.data() + n_ + m_, n_, s_->inner_columns()));
   }
 
   void residual(ConstVectorRef x, VectorRef f) override {
     evaluate(x);
-    const double h = step_.size;
-    auto momentum = f.head(n_);
-    switch (type_) {
-      case GeneratingType::one: momentum = h * (p0_ + d1_); break;
-      case GeneratingType::two: momentum = h * (p0_ - d1_); break;
-      case GeneratingType::three: momentum = q0_ + d1_; break;
-      case GeneratingType::four: momentum = q0_ - d1_; break;
+    auto graph = f.head(n_);
+    if (graph_.starts_from_position)
+      graph = row_factor() * (data_.p0 - graph_.start_sign * gradient_.col(0));
+    else
+      graph = data_.q0 - graph_.start_sign * gradient_.col(0);
+    if (m_ > 0) {
+      if (graph_.starts_from_position) data_.start_rows.add_annihilator(x.segment(n_, m_), graph);
+      data_.discrete_constraint.residual(data_.step, data_.q0, q1_, f.segment(n_, m_));
     }
-    if (m_ == 0) return;
-    if (starts_from_position()) start_rows_.add_annihilator(x.tail(m_), momentum);
-    discrete_constraint_.residual(step_, q0_, q1_, f.tail(m_));
+    if (inner_ > 0) f.tail(inner_) = gradient_.rightCols(s_->inner_columns()).reshaped();
   }
 
   void jacobian(ConstVectorRef x, VectorRef values) override {
     evaluate(x);
-    s_->hessian(step_, a_, b_, aa_, ab_, bb_);
-    measure_stiffness();
-    if (m_ > 0) discrete_constraint_.differentiate(step_, q0_, q1_);
+    s_->hessian(data_.step, y_, hessian_);
     values.setZero();
-    const auto& places = layout_.positions(0);
-    const double factor = graph_factor();
-    for (std::size_t k = 0; k < places.size(); ++k)
-      values[places[k]] = factor * ab_[static_cast<Eigen::Index>(k)];
-    if (products_)
-      add_dense_products(values);
-    else
-      add_constraint_blocks(values);
+    for (const HessianBlock& block : hessian_blocks_) {
+      const double factor = block.row_factor(*this) * block.column_factor(*this);
+      add(values, block.layout, factor, hessian_.col(block.pair).data());
+    }
+    if (m_ == 0) return;
+    data_.discrete_constraint.end_derivative(data_.step, data_.q0, q1_, data_.end_derivative);
+    add_constraint_columns(values);
+    add_constraint_rows(values);
   }
 
   void finish(ConstVectorRef x, Vector& q1, Vector& p1, Vector& impulse) override {
     evaluate(x);
     q1 = q1_;
-    switch (type_) {
-      case GeneratingType::one: p1 = d2_; break;
-      case GeneratingType::three: p1 = -d2_; break;
-      default: p1 = b_;
-    }
-    impulse = x.tail(m_) / step_.size;
+    if (graph_.ends_at_position)
+      p1 = graph_.end_sign * gradient_.col(1);
+    else
+      p1 = y_.col(1);
+    impulse = x.segment(n_, m_) / data_.step.size;
   }
 
  private:
-  bool starts_from_position() const {
-    return type_ == GeneratingType::one || type_ == GeneratingType::two;
-  }
-  bool ends_at_position() const { return type_ == GeneratingType::one || type_ == GeneratingType::three; }
-
-  /// ∂(momentum rows)/∂(first unknowns) = graph_factor · ab.
-  double graph_factor() const {
-    switch (type_) {
-      case GeneratingType::one: return step_.size;
-      case GeneratingType::two: return -1.0;
-      case GeneratingType::three: return 1.0;
-      case GeneratingType::four: return -1.0 / step_.size;
+  /// A block of the Jacobian that is a block of the Hessian of S times factors of h.
+  struct HessianBlock {
+    int row_column;     ///< the column of S whose derivative is the row: 0 graph, 2… stationarity
+    int unknown;        ///< the column of S that is the unknown: 1 end, 2… inner
+    int pair;
+    int layout;
+    double row_factor(const ImplicitStep& step) const {
+      return row_column == 0 ? -step.graph_.start_sign * step.row_factor() : 1.0;
     }
-    return 0.0;
-  }
+    double column_factor(const ImplicitStep& step) const { return unknown == 1 ? step.end_factor() : 1.0; }
+  };
 
-  /// Arguments, first derivatives and end configuration at x, unless x is where they were last taken.
+  /// A product of the constraint's rows or columns with a block of the Hessian of S, for what enters through p̂0 or
+  /// leaves through q1 = ±D2S.
+  struct ProductBlock {
+    int column;  ///< the column of S that the row belongs to, or that the unknown is
+    int pair;
+    int layout;
+    PatternProduct product;
+    Vector values;
+  };
+
+  double row_factor() const { return graph_.starts_from_position ? data_.step.size : 1.0; }
+  /// ∂(end argument)/∂(first unknowns).
+  double end_factor() const { return graph_.ends_at_position ? 1.0 : 1.0 / data_.step.size; }
+
+  /// Columns, gradient and end configuration at x, unless x is where they were last taken.
   void evaluate(ConstVectorRef x) {
     if (last_x_ == x) return;
     last_x_ = x;
-    const double h = step_.size;
-    if (starts_from_position()) {
-      a_ = q0_;
-    } else {
-      a_ = p0_;
-      if (m_ > 0) start_rows_.add_annihilator(x.tail(m_), a_, 1.0 / h);
-    }
-    if (ends_at_position())
-      b_ = x.head(n_);
+    const double h = data_.step.size;
+    y_.col(0) = graph_.starts_from_position ? data_.q0 : data_.p0;
+    if (!graph_.starts_from_position && m_ > 0)
+      data_.start_rows.add_annihilator(x.segment(n_, m_), y_.col(0), 1.0 / h);
+    y_.col(1) = end_factor() * x.head(n_);
+    if (inner_ > 0) y_.rightCols(s_->inner_columns()) = x.tail(inner_).reshaped(n_, s_->inner_columns());
+    s_->gradient(data_.step, y_, gradient_);
+    if (graph_.ends_at_position)
+      q1_ = y_.col(1);
     else
-      b_ = x.head(n_) / h;
-    s_->gradient(step_, a_, b_, d1_, d2_);
-    switch (type_) {
-      case GeneratingType::two: q1_ = d2_; break;
-      case GeneratingType::four: q1_ = -d2_; break;
-      default: q1_ = b_;
-    }
+      q1_ = graph_.end_sign * gradient_.col(1);
   }
 
-  void assemble_pattern() {
+  int row_of(int column) const { return column == 0 ? 0 : n_ + m_ + n_ * (column - 2); }
+  int place_of(int column) const { return column == 1 ? 0 : n_ + m_ + n_ * (column - 2); }
+
+  void plan_blocks(bool dense) {
     BlockPattern layout(size(), size());
-    layout.add(s_->pattern(), 0, 0);
-    int row = n_;
-    for (const auto& block : discrete_constraint_.blocks()) {
-      if (!products_) {
-        layout.add(block->pattern(), 0, row, true);
-        layout.add(block->pattern(), row, 0);
+    for (int row = 0; row < s_->columns(); ++row)
+      for (int unknown = 1; unknown < s_->columns(); ++unknown) {
+        if (row == 1) continue;
+        const bool lower = row > unknown;
+        const int pair = s_->pair(std::min(row, unknown), std::max(row, unknown));
+        const int place = layout.add(s_->pattern(), row_of(row), place_of(unknown), lower);
+        hessian_blocks_.push_back({row, unknown, pair, place});
       }
-      row += block->rows();
-    }
-    pattern_ = layout.assemble(dense_);
+    if (m_ > 0) plan_constraint_blocks(layout);
+    pattern_ = layout.assemble(dense);
     layout_ = std::move(layout);
   }
 
-  /// Type one: A(q0)ᵀ beside the graph rows, ∂c/∂q1 below them.
-  void add_constraint_blocks(VectorRef values) const {
-    for (std::size_t k = 0; k < discrete_constraint_.blocks().size(); ++k) {
-      const Vector& impulse = start_rows_.coefficients(k);
-      const Vector& constraint = discrete_constraint_.end_derivative(k);
-      const auto& impulse_places = layout_.positions(1 + 2 * static_cast<int>(k));
-      const auto& constraint_places = layout_.positions(2 + 2 * static_cast<int>(k));
-      for (std::size_t e = 0; e < impulse_places.size(); ++e) {
-        values[impulse_places[e]] = impulse[static_cast<Eigen::Index>(e)];
-        values[constraint_places[e]] = constraint[static_cast<Eigen::Index>(e)];
+  void plan_constraint_blocks(BlockPattern& layout) {
+    const SparsityPattern& a0 = data_.start_rows.pattern();
+    const SparsityPattern& c1 = data_.discrete_constraint.pattern();
+    if (graph_.starts_from_position) {
+      impulse_layout_ = layout.add(a0, 0, n_, true);
+    } else {
+      for (int row = 0; row < s_->columns(); ++row) {
+        if (row == 1 && graph_.ends_at_position) continue;
+        // Row `row` of S holds a = p̂0 = p0 + A0ᵀλ; block (row, a) is the transpose of pair (a, row).
+        PatternProduct product(s_->pattern(), row > 0, a0, true);
+        const int place = row == 1 ? -1 : layout.add(product.pattern(), row_of(row), n_);
+        const Vector values = Vector::Zero(product.pattern().nonzeros());
+        columns_of_impulse_.push_back({row, s_->pair(0, row), place, std::move(product), values});
       }
     }
+    if (graph_.ends_at_position) {
+      end_layout_ = layout.add(c1, n_, 0);
+      return;
+    }
+    for (int unknown = 1; unknown < s_->columns(); ++unknown) {
+      PatternProduct product(c1, false, s_->pattern(), false);
+      const int place = layout.add(product.pattern(), n_, place_of(unknown));
+      const Vector values = Vector::Zero(product.pattern().nonzeros());
+      rows_of_end_.push_back({unknown, s_->pair(1, unknown), place, std::move(product), values});
+    }
+    if (!graph_.starts_from_position) {
+      impulse_through_end_ = PatternProduct(c1, false, columns_of_impulse_[1].product.pattern(), false);
+      impulse_through_end_layout_ = layout.add(impulse_through_end_.pattern(), n_, n_);
+    }
+    through_end_values_.setZero(impulse_through_end_.pattern().nonzeros());
   }
 
-  /// Types two to four with rows: the chain rule through p̂0 and through q1 = ±D2S, as full matrices.
-  void add_dense_products(VectorRef values) const {
-    using Eigen::MatrixXd;
-    const double h = step_.size;
-    MatrixXd impulse = MatrixXd::Zero(n_, m_), end = MatrixXd::Zero(m_, n_);
-    int row = 0;
-    for (std::size_t k = 0; k < discrete_constraint_.blocks().size(); ++k) {
-      const auto& block = *discrete_constraint_.blocks()[k];
-      impulse.middleCols(row, block.rows()) = full(block.pattern(), start_rows_.coefficients(k)).transpose();
-      end.middleRows(row, block.rows()) = full(block.pattern(), discrete_constraint_.end_derivative(k));
-      row += block.rows();
-    }
-    Eigen::Map<MatrixXd> j(values.data(), size(), size());
-    switch (type_) {
-      case GeneratingType::one: break;  // sparse, see add_constraint_blocks
-      case GeneratingType::two:
-        j.topRightCorner(n_, m_) = impulse;
-        j.bottomLeftCorner(m_, n_) = end * full(s_->pattern(), bb_) / h;
-        break;
-      case GeneratingType::three:
-        j.topRightCorner(n_, m_) = full(s_->pattern(), aa_) * impulse / h;
-        j.bottomLeftCorner(m_, n_) = end;
-        break;
-      case GeneratingType::four:
-        j.topRightCorner(n_, m_) = -full(s_->pattern(), aa_) * impulse / h;
-        j.bottomLeftCorner(m_, n_) = -end * full(s_->pattern(), bb_) / h;
-        j.bottomRightCorner(m_, m_) = -end * full(s_->pattern(), ab_).transpose() * impulse / h;
-        break;
+  /// ∂/∂(hλ) of the graph and stationarity rows.
+  void add_constraint_columns(VectorRef values) {
+    const Vector& a0 = data_.start_rows.coefficients();
+    if (graph_.starts_from_position) return add(values, impulse_layout_, 1.0, a0.data());
+    for (ProductBlock& block : columns_of_impulse_) {
+      block.product.multiply(hessian_.col(block.pair).data(), a0.data(), block.values.data());
+      if (block.column == 1) continue;  // the end is no row; see add_constraint_rows
+      const double factor = block.column == 0 ? -graph_.start_sign : 1.0;
+      add(values, block.layout, factor / data_.step.size, block.values.data());
     }
   }
 
-  static Eigen::MatrixXd full(const SparsityPattern& pattern, const Vector& values) {
-    Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(pattern.rows(), pattern.columns());
-    for (int column = 0, k = 0; column < pattern.columns(); ++column)
-      for (; k < pattern.column_starts()[static_cast<std::size_t>(column) + 1]; ++k)
-        matrix(pattern.row_indices()[static_cast<std::size_t>(k)], column) = values[k];
-    return matrix;
+  /// The rows c(q0,q1): ∂/∂(end) and ∂/∂(inner), and ∂/∂(hλ) for type four.
+  void add_constraint_rows(VectorRef values) {
+    const Vector& c1 = data_.end_derivative;
+    if (graph_.ends_at_position) return add(values, end_layout_, 1.0, c1.data());
+    for (ProductBlock& block : rows_of_end_) {
+      block.product.multiply(c1.data(), hessian_.col(block.pair).data(), block.values.data());
+      const double factor = block.column == 1 ? end_factor() : 1.0;
+      add(values, block.layout, graph_.end_sign * factor, block.values.data());
+    }
+    if (graph_.starts_from_position) return;
+    impulse_through_end_.multiply(c1.data(), columns_of_impulse_[1].values.data(), through_end_values_.data());
+    add(values, impulse_through_end_layout_, graph_.end_sign / data_.step.size, through_end_values_.data());
   }
 
-  void measure_stiffness() { stiffness_ = usable_scale(std::abs(graph_factor()) * max_norm(ab_)); }
+  void add(VectorRef values, int layout, double factor, const double* block) const {
+    const auto& places = layout_.positions(layout);
+    for (std::size_t k = 0; k < places.size(); ++k) values[places[k]] += factor * block[k];
+  }
+
+  /// Before the first solve: the Hessian at a plausible point, for the round-off scales.
+  void sample_hessian() {
+    y_.col(0) = graph_.starts_from_position ? data_.q0 : data_.p0;
+    y_.col(1) = graph_.ends_at_position ? data_.q0 : data_.p0;
+    if (inner_ > 0)
+      s_->guess_inner(data_.step, data_.q0, data_.p0, Vector::Zero(n_), y_.rightCols(s_->inner_columns()));
+    s_->hessian(data_.step, y_, hessian_);
+  }
 
   void update_scales() {
-    const double h = std::abs(step_.size);
-    const double position = max_norm(q0_), momentum = h * max_norm(p0_);
-    const bool graph_at_position = !starts_from_position();
-    blocks_[0].scale = usable_scale(std::max(graph_at_position ? position : momentum,
-                                             stiffness_ * (ends_at_position() ? position : momentum)));
-    if (m_ == 0) return;
-    double one_forms = 0.0;
-    for (std::size_t k = 0; k < discrete_constraint_.blocks().size(); ++k)
-      one_forms = std::max(one_forms, max_norm(start_rows_.coefficients(k)));
-    blocks_[1].scale = usable_scale(one_forms * position);
+    const double h = std::abs(data_.step.size);
+    const double position = max_norm(data_.q0), momentum = max_norm(data_.p0);
+    const double end = graph_.ends_at_position ? position : momentum;
+    const double start = graph_.starts_from_position ? h * momentum : position;
+    blocks_[0].scale =
+        usable_scale(std::max(start, std::abs(row_factor()) * max_norm(hessian_.col(s_->pair(0, 1))) * end));
+    if (m_ > 0) blocks_[1].scale = data_.constraint_scale();
+    if (inner_ > 0) blocks_.back().scale = usable_scale(max_norm(gradient_)) + usable_scale(start / h);
   }
 
   std::unique_ptr<GeneratingFunction> s_;
-  GeneratingType type_;
-  DiscreteConstraint discrete_constraint_;
-  ConstraintsAtPoint start_rows_;
-  int n_;
-  int m_;
-  bool products_;  ///< the Jacobian holds products of blocks, so it is a full matrix
-  bool dense_;
+  GraphOf graph_;
+  StepData data_;
+  int n_, m_, inner_;
   SparsityPattern pattern_;
   BlockPattern layout_{0, 0};
+  std::vector<HessianBlock> hessian_blocks_;
+  int impulse_layout_ = -1, end_layout_ = -1, impulse_through_end_layout_ = -1;
+  std::vector<ProductBlock> columns_of_impulse_, rows_of_end_;
+  PatternProduct impulse_through_end_;
+  Vector through_end_values_;
   std::vector<ResidualBlock> blocks_;
+  Vector last_x_, q1_;
+  Columns y_, gradient_, hessian_;
+};
 
-  Interval step_{0.0, 1.0};
-  Vector q0_, p0_;
-  double stiffness_ = 0.0;  ///< size of the graph rows' derivative, for the round-off scale
+/// The graph is solved for its end by S itself; what is left is c(q0, q1(p0 + A(q0)ᵀλ)) = 0 for hλ.
+class MultiplierStep final : public StepProblem {
+ public:
+  MultiplierStep(std::unique_ptr<GeneratingFunction> s, const ConstraintBlocks& constraints, StepRule rule,
+                 bool dense)
+      : s_(std::move(s)),
+        graph_(*s_->explicit_graph()),
+        data_(constraints, s_->dimension(), rule),
+        displacement_(graph_.mobility_pattern(), false, data_.start_rows.pattern(), true),
+        response_(data_.discrete_constraint.pattern(), false, displacement_.pattern(), false) {
+    layout_.add(response_.pattern(), 0, 0);
+    pattern_ = layout_.assemble(dense);
+    if (data_.rows() > 0) blocks_.push_back({"constraint", data_.rows()});
+    for (Vector* column : {&p_hat_, &q1_, &p1_}) column->setZero(data_.n);
+    mobility_.setZero(graph_.mobility_pattern().nonzeros());
+    displacement_values_.setZero(displacement_.pattern().nonzeros());
+    response_values_.setZero(response_.pattern().nonzeros());
+    last_x_.setConstant(size(), std::nan(""));
+  }
 
-  Vector last_x_, q1_, a_, b_, d1_, d2_, aa_, ab_, bb_;
+  int size() const override { return data_.rows(); }
+  const SparsityPattern& pattern() const override { return pattern_; }
+  std::span<const ResidualBlock> blocks() const override { return blocks_; }
+
+  std::string unknowns() const override {
+    return size() == 0 ? "none" : "multipliers (" + std::to_string(size()) + ")";
+  }
+
+  void begin(Interval step, const Vector& q0, const Vector& p0) override {
+    data_.freeze(step, q0, p0);
+    if (size() == 0) return;
+    last_x_[0] = std::nan("");
+    blocks_[0].scale = data_.constraint_scale();
+  }
+
+  void guess(const Vector&, VectorRef x) override { x.setZero(); }
+
+  void residual(ConstVectorRef x, VectorRef f) override {
+    evaluate(x);
+    data_.discrete_constraint.residual(data_.step, data_.q0, q1_, f);
+  }
+
+  void jacobian(ConstVectorRef x, VectorRef values) override {
+    evaluate(x);
+    data_.discrete_constraint.end_derivative(data_.step, data_.q0, q1_, data_.end_derivative);
+    graph_.mobility(data_.step, mobility_);
+    displacement_.multiply(mobility_.data(), data_.start_rows.coefficients().data(), displacement_values_.data());
+    response_.multiply(data_.end_derivative.data(), displacement_values_.data(), response_values_.data());
+    values.setZero();
+    const auto& places = layout_.positions(0);
+    for (std::size_t k = 0; k < places.size(); ++k)
+      values[places[k]] = response_values_[static_cast<Eigen::Index>(k)] / data_.step.size;
+  }
+
+  void finish(ConstVectorRef x, Vector& q1, Vector& p1, Vector& impulse) override {
+    evaluate(x);
+    q1 = q1_;
+    p1 = p1_;
+    impulse = x / data_.step.size;
+  }
+
+ private:
+  void evaluate(ConstVectorRef x) {
+    if (size() > 0 && last_x_ == x) return;
+    last_x_ = x;
+    p_hat_ = data_.p0;
+    if (size() > 0) data_.start_rows.add_annihilator(x, p_hat_, 1.0 / data_.step.size);
+    graph_.map(data_.step, data_.q0, p_hat_, q1_, p1_);
+  }
+
+  std::unique_ptr<GeneratingFunction> s_;
+  ExplicitGraph& graph_;
+  StepData data_;
+  PatternProduct displacement_;  ///< ∂q1/∂p0 A(q0)ᵀ
+  PatternProduct response_;      ///< ∂c/∂q1 times that
+  SparsityPattern pattern_;
+  BlockPattern layout_{data_.rows(), data_.rows()};
+  std::vector<ResidualBlock> blocks_;
+  Vector last_x_, p_hat_, q1_, p1_, mobility_, displacement_values_, response_values_;
 };
 
 }  // namespace
 
-std::unique_ptr<StepProblem> generating_function_step(std::unique_ptr<GeneratingFunction> generating_function,
-                                                      const ConstraintBlocks& constraints, StepRule rule,
-                                                      bool dense) {
-  return std::make_unique<GeneratingFunctionStep>(std::move(generating_function), constraints, rule, dense);
+std::unique_ptr<StepProblem> dirac_step(std::unique_ptr<GeneratingFunction> generating_function,
+                                        const ConstraintBlocks& constraints, StepRule rule, bool dense) {
+  if (generating_function->explicit_graph() != nullptr)
+    return std::make_unique<MultiplierStep>(std::move(generating_function), constraints, rule, dense);
+  return std::make_unique<ImplicitStep>(std::move(generating_function), constraints, rule, dense);
 }
 
 }  // namespace diracstep

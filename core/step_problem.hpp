@@ -4,22 +4,29 @@
 #include <diracstep/core/generating_function.hpp>
 #include <diracstep/core/nonlinear_solver.hpp>
 #include <memory>
+#include <string>
 #include <vector>
 
 namespace diracstep {
 
 /// One discrete Dirac step as a nonlinear problem: the only thing a solver sees.
+///
+/// A step from (q0,p0) is  begin → solve for the unknowns x → finish.  Its size may be zero: then there is nothing
+/// to solve, and finish does all.
 class StepProblem : public NonlinearProblem {
  public:
-  /// Freezes the data of the step from (q0,p0).
+  /// Freezes the data of the step.
   virtual void begin(Interval step, const Vector& q0, const Vector& p0) = 0;
 
   /// A guess for the unknowns from a velocity at q0.
-  virtual void guess(const Vector& v0, VectorRef x) const = 0;
+  virtual void guess(const Vector& v0, VectorRef x) = 0;
 
-  /// The explicit part, once x solves the problem: the end point, and the impulse λ (momentum times the inverse
-  /// unit of a row) that entered at q0 as A(q0)ᵀλ.
+  /// Once x solves the problem: the end point, and the impulse λ (momentum over the unit of a row) that entered at
+  /// q0 as A(q0)ᵀλ.
   virtual void finish(ConstVectorRef x, Vector& q1, Vector& p1, Vector& impulse) = 0;
+
+  /// What the unknowns are, for plans: "q1 (3), λ (1)".
+  virtual std::string unknowns() const = 0;
 };
 
 /// The discrete Dirac step of a generating function S (Leok and Ohsawa (4.28), (4.35), (4.45), (4.52)):
@@ -32,11 +39,11 @@ class StepProblem : public NonlinearProblem {
 ///   three  q1,   hλ     q0 + D1S(p̂0,q1),         c(q0, q1)
 ///   four   h p1, hλ     q0 − D1S(p̂0,p1),         c(q0, −D2S)
 ///
-/// The factors h make all rows and unknowns comparable to positions, so that the Jacobian stays of order 1 as
-/// h → 0.  Without rows there is no λ.  With `dense` the Jacobian is a full matrix; types two to four with rows
-/// always use one.
-std::unique_ptr<StepProblem> generating_function_step(std::unique_ptr<GeneratingFunction> generating_function,
-                                                      const ConstraintBlocks& constraints, StepRule rule,
-                                                      bool dense);
+/// followed by the inner columns of S with their rows ∂S/∂(inner) = 0.  The factors h make rows and unknowns
+/// comparable to positions, so that the Jacobian stays of order 1 as h → 0.  Without rows of the constraint there is
+/// no λ.  Where S solves its graph for the end, the unknowns are hλ alone with c(q0, q1(p̂0)) = 0, or none.
+/// With `dense` the Jacobian is a full matrix.
+std::unique_ptr<StepProblem> dirac_step(std::unique_ptr<GeneratingFunction> generating_function,
+                                        const ConstraintBlocks& constraints, StepRule rule, bool dense);
 
 }  // namespace diracstep

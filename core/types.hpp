@@ -11,4 +11,9 @@ using Vector = Eigen::VectorXd;
 using ConstVectorRef = const Eigen::Ref<const Vector>&;
 using VectorRef = Eigen::Ref<Vector>;
 
+/// Several columns side by side.
+using Columns = Eigen::MatrixXd;
+using ConstColumnsRef = const Eigen::Ref<const Columns>&;
+using ColumnsRef = Eigen::Ref<Columns>;
+
 }  // namespace diracstep
