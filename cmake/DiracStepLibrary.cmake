@@ -1,0 +1,46 @@
+# How every target of the project is compiled.
+function(diracstep_compile_options target)
+  target_compile_features(${target} PUBLIC cxx_std_20)
+  target_compile_options(${target} PRIVATE
+    -Wall -Wextra -Wpedantic -Wshadow
+    $<$<BOOL:${DIRACSTEP_WARNINGS_AS_ERRORS}>:-Werror>
+    # a*b+c is never fused: machines with and without FMA give the same bits
+    -ffp-contract=off)
+endfunction()
+
+# diracstep_library(<folder> SOURCES ... PUBLIC ... PRIVATE ...)
+# Makes diracstep_<folder>, alias DiracStep::<folder>, and installs it with its headers.
+# A folder without sources becomes a header-only library.
+function(diracstep_library folder)
+  cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "SOURCES;PUBLIC;PRIVATE")
+  set(target diracstep_${folder})
+  if(arg_SOURCES)
+    set(scope PUBLIC)
+    add_library(${target} ${arg_SOURCES})
+    target_link_libraries(${target} PRIVATE ${arg_PRIVATE})
+    diracstep_compile_options(${target})
+    set_target_properties(${target} PROPERTIES VERSION ${PROJECT_VERSION} INSTALL_RPATH $ORIGIN
+      SOVERSION ${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR})
+  else()
+    set(scope INTERFACE)
+    add_library(${target} INTERFACE)
+    target_compile_features(${target} INTERFACE cxx_std_20)
+  endif()
+  add_library(DiracStep::${folder} ALIAS ${target})
+  set_target_properties(${target} PROPERTIES EXPORT_NAME ${folder})
+  target_link_libraries(${target} ${scope} ${arg_PUBLIC})
+
+  # Each library has an include root of its own, which holds only diracstep/<folder>. A file that includes
+  # a folder its library does not link therefore fails to compile.
+  set(include_root ${PROJECT_BINARY_DIR}/include/${folder})
+  file(MAKE_DIRECTORY ${include_root}/diracstep)
+  file(CREATE_LINK ${CMAKE_CURRENT_SOURCE_DIR} ${include_root}/diracstep/${folder} SYMBOLIC)
+  target_include_directories(${target} ${scope}
+    $<BUILD_INTERFACE:${include_root}> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
+
+  install(TARGETS ${target} EXPORT diracstep_${folder})
+  install(EXPORT diracstep_${folder} NAMESPACE DiracStep:: FILE DiracStep-${folder}.cmake
+    DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/DiracStep)
+  install(DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR}/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/diracstep/${folder}
+    FILES_MATCHING PATTERN *.hpp)
+endfunction()
