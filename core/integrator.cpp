@@ -52,7 +52,7 @@ Integrator::Part Integrator::make_part(const Method& method, bool mirror_rule, c
   StepRule rule = method.info.constraint_rule;
   if (options_.constraint_rule)
     rule = mirror_rule ? mirrored(*options_.constraint_rule) : *options_.constraint_rule;
-  Part part{dirac_step(method.make(*scene_), scene_->constraints, rule, dense_), nullptr};
+  Part part{dirac_step(method.make(*scene_), *scene_, rule, dense_), nullptr};
   if (part.problem->size() > 0) part.solver = solvers(*part.problem);
   return part;
 }
@@ -240,6 +240,8 @@ std::vector<PlanLine> Integrator::plan() const {
   lines.push_back({"composition", stages_.size() == 1 ? "left out" : std::to_string(stages_.size()) + " stages",
                    "order " + std::to_string(options_.order) + ", the method's own is " +
                        std::to_string(method_.info.order)});
+  lines.push_back({"forces", scene_->force ? "two impulses a step" : "left out",
+                   scene_->force ? "by the rule of the rows" : "the scene has none"});
   lines.push_back({"Hamiltonian", scene_->hamiltonian ? "given" : "derived only by methods that need it", ""});
   return lines;
 }

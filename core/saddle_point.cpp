@@ -78,6 +78,10 @@ void AccelerationProblem::begin(double t, ConstVectorRef q, ConstVectorRef v) {
   known_force_.resize(n_);
   lagrangian.gradient_rate(t, q, v, known_force_);
   known_force_ = lq_ - known_force_;
+  if (scene_.force) {
+    scene_.force->value(t, q, v, lv_);
+    known_force_ += lv_;
+  }
   // d/dt(∂L/∂v) holds (∂²L/∂v∂q) v, and lqv is its transpose.
   lagrangian.pattern().transposed_multiply_add(lqv_.data(), v_.data(), known_force_.data(), -1.0);
   if (m_ > 0) {

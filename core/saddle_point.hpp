@@ -56,7 +56,7 @@ class VelocityProblem final : public SaddlePointProblem {
   Vector p_;
 };
 
-/// Unknowns (a, Λ), linear:   d/dt(∂L/∂v) − ∂L/∂q = A(q)ᵀΛ,   d/dt(A(q) v + b(q)) = 0,   a = dv/dt.
+/// Unknowns (a, Λ), linear:   d/dt(∂L/∂v) − ∂L/∂q − f = A(q)ᵀΛ,   d/dt(A(q) v + b(q)) = 0,   a = dv/dt.
 /// Λ are the forces of the constraint rows: Aᵀ Λ is a generalised force.
 class AccelerationProblem final : public SaddlePointProblem {
  public:

@@ -54,6 +54,7 @@ void require_well_formed(const Scene& scene) {
     require_size(prefix + "the Lagrangian", scene.lagrangian->dimension(), scene.dimension());
   if (scene.hamiltonian)
     require_size(prefix + "the Hamiltonian", scene.hamiltonian->dimension(), scene.dimension());
+  if (scene.force) require_size(prefix + "the force", scene.force->dimension(), scene.dimension());
   for (const auto& block : scene.constraints)
     require_size(prefix + "a constraint row", block->dimension(), scene.dimension());
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <diracstep/core/constraint_rows.hpp>
+#include <diracstep/core/force.hpp>
 #include <diracstep/core/phase_function.hpp>
 #include <memory>
 #include <string>
@@ -19,14 +20,17 @@ struct Start {
 
 /// A continuous system: (L, Δ_Q) or (H, Δ_Q), or both, and a start.
 ///
-///   q̇ = v ∈ Δ_Q(q),   p = ∂L/∂v,   ṗ − ∂L/∂q ∈ Δ°_Q(q)          Leok and Ohsawa (4.7)
-///   q̇ = ∂H/∂p ∈ Δ_Q(q),            ṗ + ∂H/∂q ∈ Δ°_Q(q)          Leok and Ohsawa (4.11)
+///   q̇ = v ∈ Δ_Q(q),   p = ∂L/∂v,   ṗ − ∂L/∂q − f ∈ Δ°_Q(q)      Leok and Ohsawa (4.7)
+///   q̇ = ∂H/∂p ∈ Δ_Q(q),            ṗ + ∂H/∂q − f ∈ Δ°_Q(q)      Leok and Ohsawa (4.11)
+///
+/// with an external force f beyond the paper.
 struct Scene {
   std::string name;
   std::vector<std::string> coordinates;
   std::shared_ptr<const Lagrangian> lagrangian;
   std::shared_ptr<const Hamiltonian> hamiltonian;
   ConstraintBlocks constraints;
+  std::shared_ptr<const Force> force;  ///< null where there is none
   Start start;
 
   int dimension() const { return static_cast<int>(coordinates.size()); }

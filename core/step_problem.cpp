@@ -1,6 +1,9 @@
 #include <algorithm>
 #include <cmath>
+#include <diracstep/core/discrete_force.hpp>
+#include <diracstep/core/errors.hpp>
 #include <diracstep/core/step_problem.hpp>
+#include <optional>
 
 namespace diracstep {
 
@@ -45,11 +48,10 @@ struct StepData {
 /// The graph and the constraint solved together.
 class ImplicitStep final : public StepProblem {
  public:
-  ImplicitStep(std::unique_ptr<GeneratingFunction> s, const ConstraintBlocks& constraints, StepRule rule,
-               bool dense)
+  ImplicitStep(std::unique_ptr<GeneratingFunction> s, const Scene& scene, StepRule rule, bool dense)
       : s_(std::move(s)),
         graph_(graph_of(s_->type())),
-        data_(constraints, s_->dimension(), rule),
+        data_(scene.constraints, s_->dimension(), rule),
         n_(data_.n),
         m_(data_.rows()),
         inner_(n_ * s_->inner_columns()) {
@@ -58,6 +60,11 @@ class ImplicitStep final : public StepProblem {
     hessian_.setZero(s_->pattern().nonzeros(), s_->pairs());
     last_x_.setConstant(size(), std::nan(""));
     q1_.setZero(n_);
+    if (scene.force) {
+      if (s_->type() == GeneratingType::four) throw Misuse("generating functions of type 4 take no forces");
+      force_.emplace(scene.force, rule);
+      force_by_end_.setZero(force_->pattern().nonzeros());
+    }
     plan_blocks(dense);
     blocks_.push_back({"momentum", n_});
     if (m_ > 0) blocks_.push_back({"constraint", m_});
@@ -99,6 +106,7 @@ class ImplicitStep final : public StepProblem {
       graph = row_factor() * (data_.p0 - graph_.start_sign * gradient_.col(0));
     else
       graph = data_.q0 - graph_.start_sign * gradient_.col(0);
+    if (force_ && graph_.starts_from_position) graph += row_factor() * force_->minus();
     if (m_ > 0) {
       if (graph_.starts_from_position) data_.start_rows.add_annihilator(x.segment(n_, m_), graph);
       data_.discrete_constraint.residual(data_.step, data_.q0, q1_, f.segment(n_, m_));
@@ -114,6 +122,7 @@ class ImplicitStep final : public StepProblem {
       const double factor = block.row_factor(*this) * block.column_factor(*this);
       add(values, block.layout, factor, hessian_.col(block.pair).data());
     }
+    if (force_) add_force(values);
     if (m_ == 0) return;
     data_.discrete_constraint.end_derivative(data_.step, data_.q0, q1_, data_.end_derivative);
     add_constraint_columns(values);
@@ -127,6 +136,7 @@ class ImplicitStep final : public StepProblem {
       p1 = graph_.end_sign * gradient_.col(1);
     else
       p1 = y_.col(1);
+    if (force_) p1 += force_->plus();
     impulse = x.segment(n_, m_) / data_.step.size;
   }
 
@@ -166,12 +176,17 @@ class ImplicitStep final : public StepProblem {
     if (!graph_.starts_from_position && m_ > 0)
       data_.start_rows.add_annihilator(x.segment(n_, m_), y_.col(0), 1.0 / h);
     y_.col(1) = end_factor() * x.head(n_);
+    if (force_ && graph_.ends_at_position) {
+      force_->evaluate(data_.step, data_.q0, y_.col(1));
+      if (!graph_.starts_from_position) y_.col(0) += force_->minus();
+    }
     if (inner_ > 0) y_.rightCols(s_->inner_columns()) = x.tail(inner_).reshaped(n_, s_->inner_columns());
     s_->gradient(data_.step, y_, gradient_);
     if (graph_.ends_at_position)
       q1_ = y_.col(1);
     else
       q1_ = graph_.end_sign * gradient_.col(1);
+    if (force_ && !graph_.ends_at_position) force_->evaluate(data_.step, data_.q0, q1_);
   }
 
   int row_of(int column) const { return column == 0 ? 0 : n_ + m_ + n_ * (column - 2); }
@@ -188,6 +203,7 @@ class ImplicitStep final : public StepProblem {
         hessian_blocks_.push_back({row, unknown, pair, place});
       }
     if (m_ > 0) plan_constraint_blocks(layout);
+    if (force_) plan_force_blocks(layout);
     pattern_ = layout.assemble(dense);
     layout_ = std::move(layout);
   }
@@ -222,6 +238,41 @@ class ImplicitStep final : public StepProblem {
       impulse_through_end_layout_ = layout.add(impulse_through_end_.pattern(), n_, n_);
     }
     through_end_values_.setZero(impulse_through_end_.pattern().nonzeros());
+  }
+
+  /// F⁻ depends on the end: directly (one), through q1 = D2S (two), and as part of the argument p̂0 (three).
+  void plan_force_blocks(BlockPattern& layout) {
+    const SparsityPattern& f1 = force_->pattern();
+    const auto plan = [&](int column, int pair, int row, int place, PatternProduct product) {
+      const Vector values = Vector::Zero(product.pattern().nonzeros());
+      const int number = layout.add(product.pattern(), row, place);
+      force_products_.push_back({column, pair, number, std::move(product), values});
+    };
+    if (graph_.ends_at_position && graph_.starts_from_position) {
+      force_layout_ = layout.add(f1, 0, 0);
+    } else if (graph_.ends_at_position) {
+      for (int row = 0; row < s_->columns(); ++row)
+        if (row != 1)
+          plan(row, s_->pair(0, row), row_of(row), 0, PatternProduct(s_->pattern(), row > 0, f1, false));
+    } else {
+      for (int unknown = 1; unknown < s_->columns(); ++unknown)
+        plan(unknown, s_->pair(1, unknown), 0, place_of(unknown), PatternProduct(f1, false, s_->pattern(), false));
+    }
+  }
+
+  void add_force(VectorRef values) {
+    force_->minus_by_end(data_.step, data_.q0, q1_, force_by_end_);
+    if (force_layout_ >= 0) return add(values, force_layout_, row_factor(), force_by_end_.data());
+    for (ProductBlock& block : force_products_) {
+      const double* s = hessian_.col(block.pair).data();
+      const double* f = force_by_end_.data();
+      const bool in_argument = graph_.ends_at_position;
+      block.product.multiply(in_argument ? s : f, in_argument ? f : s, block.values.data());
+      double factor = 1.0;
+      if (!in_argument) factor = row_factor() * graph_.end_sign * (block.column == 1 ? end_factor() : 1.0);
+      if (in_argument && block.column == 0) factor = -graph_.start_sign;
+      add(values, block.layout, factor, block.values.data());
+    }
   }
 
   /// ∂/∂(hλ) of the graph and stationarity rows.
@@ -285,6 +336,10 @@ class ImplicitStep final : public StepProblem {
   int impulse_layout_ = -1, end_layout_ = -1, impulse_through_end_layout_ = -1;
   std::vector<ProductBlock> columns_of_impulse_, rows_of_end_;
   PatternProduct impulse_through_end_;
+  std::optional<DiscreteForce> force_;
+  Vector force_by_end_;
+  int force_layout_ = -1;
+  std::vector<ProductBlock> force_products_;
   Vector through_end_values_;
   std::vector<ResidualBlock> blocks_;
   Vector last_x_, q1_;
@@ -294,11 +349,10 @@ class ImplicitStep final : public StepProblem {
 /// The graph is solved for its end by S itself; what is left is c(q0, q1(p0 + A(q0)ᵀλ)) = 0 for hλ.
 class MultiplierStep final : public StepProblem {
  public:
-  MultiplierStep(std::unique_ptr<GeneratingFunction> s, const ConstraintBlocks& constraints, StepRule rule,
-                 bool dense)
+  MultiplierStep(std::unique_ptr<GeneratingFunction> s, const Scene& scene, StepRule rule, bool dense)
       : s_(std::move(s)),
         graph_(*s_->explicit_graph()),
-        data_(constraints, s_->dimension(), rule),
+        data_(scene.constraints, s_->dimension(), rule),
         displacement_(graph_.mobility_pattern(), false, data_.start_rows.pattern(), true),
         response_(data_.discrete_constraint.pattern(), false, displacement_.pattern(), false) {
     layout_.add(response_.pattern(), 0, 0);
@@ -374,11 +428,11 @@ class MultiplierStep final : public StepProblem {
 
 }  // namespace
 
-std::unique_ptr<StepProblem> dirac_step(std::unique_ptr<GeneratingFunction> generating_function,
-                                        const ConstraintBlocks& constraints, StepRule rule, bool dense) {
-  if (generating_function->explicit_graph() != nullptr)
-    return std::make_unique<MultiplierStep>(std::move(generating_function), constraints, rule, dense);
-  return std::make_unique<ImplicitStep>(std::move(generating_function), constraints, rule, dense);
+std::unique_ptr<StepProblem> dirac_step(std::unique_ptr<GeneratingFunction> generating_function, const Scene& scene,
+                                        StepRule rule, bool dense) {
+  if (generating_function->explicit_graph() != nullptr && !scene.force)
+    return std::make_unique<MultiplierStep>(std::move(generating_function), scene, rule, dense);
+  return std::make_unique<ImplicitStep>(std::move(generating_function), scene, rule, dense);
 }
 
 }  // namespace diracstep

@@ -3,6 +3,7 @@
 #include <diracstep/core/discrete_constraint.hpp>
 #include <diracstep/core/generating_function.hpp>
 #include <diracstep/core/nonlinear_solver.hpp>
+#include <diracstep/core/scene.hpp>
 #include <memory>
 #include <string>
 #include <vector>
@@ -31,7 +32,9 @@ class StepProblem : public NonlinearProblem {
 
 /// The discrete Dirac step of a generating function S (Leok and Ohsawa (4.28), (4.35), (4.45), (4.52)):
 ///
-///   p̂0 = p0 + A(q0)ᵀλ,   ((q0,p̂0),(q1,p1)) ∈ graph of S,   c(q0,q1) = 0
+///   p̂0 = p0 + A(q0)ᵀλ + F⁻,   ((q0,p̂0),(q1,p1 − F⁺)) ∈ graph of S,   c(q0,q1) = 0
+///
+/// where F⁻ and F⁺ are the impulses of a force, absent where the scene has none (discrete_force.hpp).
 ///
 ///   type   unknowns     residual
 ///   one    q1,   hλ     h (p̂0 + D1S(q0,q1)),     c(q0, q1)
@@ -42,8 +45,9 @@ class StepProblem : public NonlinearProblem {
 /// followed by the inner columns of S with their rows ∂S/∂(inner) = 0.  The factors h make rows and unknowns
 /// comparable to positions, so that the Jacobian stays of order 1 as h → 0.  Without rows of the constraint there is
 /// no λ.  Where S solves its graph for the end, the unknowns are hλ alone with c(q0, q1(p̂0)) = 0, or none.
-/// With `dense` the Jacobian is a full matrix.
-std::unique_ptr<StepProblem> dirac_step(std::unique_ptr<GeneratingFunction> generating_function,
-                                        const ConstraintBlocks& constraints, StepRule rule, bool dense);
+/// With `dense` the Jacobian is a full matrix.  Throws Misuse for a force with type four, whose end point is not known
+/// before its momentum.
+std::unique_ptr<StepProblem> dirac_step(std::unique_ptr<GeneratingFunction> generating_function, const Scene& scene,
+                                        StepRule rule, bool dense);
 
 }  // namespace diracstep

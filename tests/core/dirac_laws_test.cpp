@@ -186,6 +186,14 @@ TEST_P(DiracLaws, MeasuredOrderIsTheStatedOne) {
   }
 }
 
+TEST_P(DiracLaws, ForcesKeepTheStatedOrder) {
+  if (method().info.type == GeneratingType::four) GTEST_SKIP() << "type 4 takes no forces";
+  for (const auto& scene : testing::every_constraint_class()) {
+    const double order = measured_order(testing::forced(scene), options(), 1.0 / 160.0);
+    EXPECT_NEAR(order, method().info.order, 0.1) << scene->name;
+  }
+}
+
 TEST_P(DiracLaws, SymmetrisedWithItsAdjointTheOrderIsTwo) {
   if (method().info.order != 1) GTEST_SKIP() << "self-adjoint already";
   for (const auto& scene : testing::every_constraint_class()) {

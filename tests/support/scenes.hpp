@@ -84,6 +84,22 @@ inline std::shared_ptr<const Scene> mixed() {
   return std::make_shared<const Scene>(scene);
 }
 
+/// A force that depends on q and v and is no gradient.
+struct Drag {
+  template <class T>
+  std::array<T, 3> operator()(const std::array<T, 3>& q, const std::array<T, 3>& v) const {
+    return {-0.3 * v[0] * v[0] + 0.2 * q[1], -0.4 * v[1] * q[0], 0.1 * v[0] - 0.2 * v[2]};
+  }
+};
+
+/// The same scene under that force.
+inline std::shared_ptr<const Scene> forced(const std::shared_ptr<const Scene>& scene) {
+  Scene copy = *scene;
+  copy.name += ", forced";
+  copy.force = force<3>(Drag{});
+  return std::make_shared<const Scene>(copy);
+}
+
 inline const std::array<std::shared_ptr<const Scene>, 4>& every_constraint_class() {
   static const std::array<std::shared_ptr<const Scene>, 4> scenes{unconstrained(), nonholonomic(),
                                                                   holonomic_sphere(), mixed()};

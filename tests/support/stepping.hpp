@@ -33,7 +33,7 @@ inline Vector join(const Vector& a, const Vector& b) {
 class SingleStep {
  public:
   SingleStep(const Method& method, const Scene& scene)
-      : problem_(dirac_step(method.make(scene), scene.constraints, method.info.constraint_rule, true)) {
+      : problem_(dirac_step(method.make(scene), scene, method.info.constraint_rule, true)) {
     if (problem_->size() > 0) solver_ = kinsol()(*problem_);
   }
 
