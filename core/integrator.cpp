@@ -49,10 +49,9 @@ Integrator::Integrator(std::shared_ptr<const Scene> scene, const Registry& regis
 }
 
 Integrator::Part Integrator::make_part(const Method& method, bool mirror_rule, const SolverFactory& solvers) const {
-  StepRule rule = method.info.constraint_rule;
-  if (options_.constraint_rule)
-    rule = mirror_rule ? mirrored(*options_.constraint_rule) : *options_.constraint_rule;
-  Part part{dirac_step(method.make(*scene_), *scene_, rule, dense_), nullptr};
+  std::optional<StepRule> rule = options_.constraint_rule;
+  if (rule && mirror_rule) rule = mirrored(*rule);
+  Part part{method.step(*scene_, dense_, rule), nullptr};
   if (part.problem->size() > 0) part.solver = solvers(*part.problem);
   return part;
 }
@@ -233,8 +232,10 @@ std::vector<PlanLine> Integrator::plan() const {
     lines.push_back({"projection", "left out", "every momentum is that of a velocity"});
   } else {
     const StepRule rule = options_.constraint_rule.value_or(method_.info.constraint_rule);
-    lines.push_back({"multipliers", std::to_string(m), std::string("nonholonomic rows by the ") + name(rule) +
-                                                           " rule, holonomic rows at the end of the step"});
+    lines.push_back({"multipliers", std::to_string(m) + (method_.make_step ? " a node" : ""),
+                     method_.make_step ? "nonholonomic rows at the Gauss, holonomic rows at the Lobatto nodes"
+                                       : std::string("nonholonomic rows by the ") + name(rule) +
+                                             " rule, holonomic rows at the end of the step"});
     lines.push_back({"projection", "where the state is read", "p is defined up to the annihilator between steps"});
   }
   lines.push_back({"composition", stages_.size() == 1 ? "left out" : std::to_string(stages_.size()) + " stages",

@@ -3,6 +3,8 @@
 #include <diracstep/core/generating_functions/euler.hpp>
 #include <diracstep/core/generating_functions/legendre.hpp>
 #include <diracstep/core/generating_functions/quadrature.hpp>
+#include <diracstep/core/gauss_lobatto_step.hpp>
+#include <diracstep/core/gauss_lobatto_tableau.hpp>
 #include <diracstep/core/registry.hpp>
 #include <regex>
 
@@ -32,7 +34,24 @@ bool parse_transform(const std::string& name, Transform& transform) {
   return true;
 }
 
+/// "typeN/gl:S", N = 1, 2, 3.
+std::optional<Method> gauss_lobatto_method(const std::string& name) {
+  std::smatch match;
+  if (!std::regex_match(name, match, std::regex("type([1-3])/gl:([0-9]{1,4})"))) return std::nullopt;
+  const int s = std::stoi(match[2]);
+  gauss_lobatto_tableau(s);  // throws for a number of stages that is not allowed
+  const MethodInfo info{name, static_cast<GeneratingType>(std::stoi(match[1])), 2 * s, true, StepRule::midpoint,
+                        "Gauss-Lobatto Dirac step, " + std::to_string(s) + (s == 1 ? " stage" : " stages")};
+  return Method{info, nullptr, [s](const Scene& scene, bool dense) { return gauss_lobatto_step(s, scene, dense); }};
+}
+
 }  // namespace
+
+std::unique_ptr<StepProblem> Method::step(const Scene& scene, bool dense, std::optional<StepRule> rule) const {
+  if (!make_step) return dirac_step(make(scene), scene, rule.value_or(info.constraint_rule), dense);
+  if (rule) throw Misuse("method '" + info.name + "' has its own nodes for the constraint; no other rule applies");
+  return make_step(scene, dense);
+}
 
 Registry Registry::with_built_ins() {
   Registry registry;
@@ -61,7 +80,9 @@ void Registry::add(MethodInfo info, GeneratingFunctionFactory make) {
 
 Method Registry::method(const std::string& name) const {
   const auto found = methods_.find(name);
-  return found != methods_.end() ? found->second : transformed(name);
+  if (found != methods_.end()) return found->second;
+  if (const auto gauss_lobatto = gauss_lobatto_method(name)) return *gauss_lobatto;
+  return transformed(name);
 }
 
 Method Registry::transformed(const std::string& name) const {
@@ -69,9 +90,10 @@ Method Registry::transformed(const std::string& name) const {
   if (!parse_transform(name, transform)) {
     std::string message = "unknown method '" + name + "'; the methods are";
     for (const std::string& known : names()) message += " " + known;
-    throw Misuse(message + " typeN/adjoint(...)");
+    throw Misuse(message + " typeN/gl:S typeN/adjoint(...)");
   }
   const Method inner = method(transform.inner);
+  if (!inner.make) throw Misuse("'" + name + "': " + transform.inner + " is no generating function of its end points");
   MethodInfo info = inner.info;
   info.name = name;
   info.type = transform.type;
@@ -103,6 +125,8 @@ std::vector<std::string> Registry::names() const {
     for (const auto& [name, method] : methods_)
       if (method.info.type == GeneratingType::one)
         names.push_back(std::string(type) + "/legendre(" + name + ")");
+  for (const char* type : {"type1", "type2", "type3"})
+    for (const char* stages : {"1", "2", "3", "4"}) names.push_back(std::string(type) + "/gl:" + stages);
   return names;
 }
 

@@ -3,9 +3,11 @@
 #include <diracstep/core/generating_function.hpp>
 #include <diracstep/core/scene.hpp>
 #include <diracstep/core/step_nodes.hpp>
+#include <diracstep/core/step_problem.hpp>
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -26,15 +28,25 @@ struct MethodInfo {
 /// what the method needs.
 using GeneratingFunctionFactory = std::function<std::unique_ptr<GeneratingFunction>(const Scene&)>;
 
+/// Makes the step of a method that is more than the graph of a generating function between its end points.
+using StepFactory = std::function<std::unique_ptr<StepProblem>(const Scene&, bool dense)>;
+
 /// A method ready for use.
 struct Method {
   MethodInfo info;
-  GeneratingFunctionFactory make;
+  GeneratingFunctionFactory make;  ///< empty where the method has a step of its own
+  StepFactory make_step = {};      ///< empty where the step is that of the generating function
+
+  /// The step on a scene, with the method's own rule for Δ^d_Q or another.  Throws Misuse for another rule where the
+  /// method has a step of its own.
+  std::unique_ptr<StepProblem> step(const Scene& scene, bool dense, std::optional<StepRule> rule = {}) const;
 };
 
 /// Methods by name.  A registry is a value: nothing is global.
 ///
-/// Beside the registered names it knows two constructions from another method:
+/// Beside the registered names it knows three families:
+///   typeN/gl:S                N = 1, 2, 3: the Gauss–Lobatto Dirac step with S stages, order 2S (gauss_lobatto_step.hpp);
+///                             the three types are one system, written with other data given
 ///   typeN/legendre(type1/…)   N = 2, 3, 4: the discrete Legendre transform of a method of type 1
 ///   typeN/adjoint(…)          the adjoint of a method; N is its type
 class Registry {
@@ -51,7 +63,7 @@ class Registry {
   /// The adjoint of a method: itself, the one it names, or one made from it.
   Method adjoint_of(const Method& method) const;
 
-  /// Registered names and the Legendre transforms of those of type 1.
+  /// Registered names, the Legendre transforms of those of type 1, and GL(1) to GL(4).
   std::vector<std::string> names() const;
 
  private:

@@ -33,7 +33,7 @@ inline Vector join(const Vector& a, const Vector& b) {
 class SingleStep {
  public:
   SingleStep(const Method& method, const Scene& scene)
-      : problem_(dirac_step(method.make(scene), scene, method.info.constraint_rule, true)) {
+      : problem_(method.step(scene, true)) {
     if (problem_->size() > 0) solver_ = kinsol()(*problem_);
   }
 
