@@ -22,6 +22,8 @@ class GaussLobattoStep final : public StepProblem {
         n_(scene.dimension()),
         m_(scene.rows()),
         table_(gauss_lobatto_tableau(s)),
+        next_velocities_(lagrange_basis(table_.c, table_.c.array() + 1.0)),
+        next_impulses_(lagrange_basis(table_.lobatto_c.head(s), table_.lobatto_c.head(s).array() + 1.0)),
         mirror_(lagrangian_->pattern().transposed_positions()) {
     for (Columns* stages : {&q_, &lq_, &lv_}) stages->setZero(n_, s_);
     lobatto_q_.setZero(n_, s_ + 1);
@@ -45,6 +47,13 @@ class GaussLobattoStep final : public StepProblem {
   }
 
   int size() const override { return s_ * (n_ + m_); }
+  int leading_unknowns() const override { return s_ * n_; }
+
+  bool extrapolate_stages(ConstVectorRef last, VectorRef x) const override {
+    x.head(n_ * s_).reshaped(n_, s_) = last.head(n_ * s_).reshaped(n_, s_) * next_velocities_.transpose();
+    if (m_ > 0) x.tail(m_ * s_).reshaped(m_, s_) = last.tail(m_ * s_).reshaped(m_, s_) * next_impulses_.transpose();
+    return true;
+  }
   const SparsityPattern& pattern() const override { return pattern_; }
   std::span<const ResidualBlock> blocks() const override { return blocks_; }
 
@@ -273,6 +282,7 @@ class GaussLobattoStep final : public StepProblem {
   std::shared_ptr<const Force> force_;
   int s_, n_, m_;
   GaussLobattoTableau table_;
+  Columns next_velocities_, next_impulses_;  ///< stages of the next step from those of this one
   std::vector<int> mirror_;
   std::vector<Rows> rows_;
   SparsityPattern pattern_;

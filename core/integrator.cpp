@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <diracstep/core/composition.hpp>
 #include <diracstep/core/errors.hpp>
@@ -9,11 +8,6 @@
 namespace diracstep {
 
 namespace {
-
-/// Extrapolation of 2, 3 or 4 equally spaced values, newest first, to the next one.
-constexpr std::size_t longest_history = 4;
-constexpr std::array<std::array<double, longest_history>, longest_history + 1> extrapolation{{
-    {}, {1.0}, {2.0, -1.0}, {3.0, -3.0, 1.0}, {4.0, -6.0, 4.0, -1.0}}};
 
 /// Completed, well formed and consistent at its start.
 std::shared_ptr<const Scene> checked(std::shared_ptr<const Scene> scene) {
@@ -76,8 +70,8 @@ void Integrator::plan_stages(const Registry& registry, const SolverFactory& solv
                  " cannot be composed to order " + std::to_string(options_.order));
   }
   for (const auto& [fraction, part] : sequence) {
-    const Vector unknowns = Vector::Zero(parts_[part].problem->size());
-    stages_.push_back({fraction, part, unknowns, std::vector<Vector>(longest_history, unknowns)});
+    StepProblem& problem = *parts_[part].problem;
+    stages_.push_back({fraction, part, Vector::Zero(problem.size()), Predictor(problem)});
   }
 }
 
@@ -94,15 +88,8 @@ void Integrator::reset(const Start& start) {
   if (!p_.allFinite())
     throw Misuse("scene '" + scene_->name + "': the momentum ∂L/∂v is not finite at the start");
   first_stage_solved_ = false;
-  history_length_ = 0;
+  for (Stage& stage : stages_) stage.predictor.reset();
   work_ = {};
-}
-
-void Integrator::predict(Stage& stage) {
-  if (history_length_ < 2) return parts_[stage.part].problem->guess(v_, stage.solution);
-  stage.solution.setZero();
-  for (std::size_t k = 0; k < history_length_; ++k)
-    stage.solution += extrapolation[history_length_][k] * stage.history[k];
 }
 
 void Integrator::count(const SolveReport& report) {
@@ -117,8 +104,16 @@ SolveReport Integrator::solve_stage(std::size_t number, double t, const Vector& 
   Part& part = parts_[stage.part];
   part.problem->begin({t, stage.fraction * options_.step}, q, p);
   if (!part.solver) return {};
-  predict(stage);
-  const SolveReport report = part.solver->solve(stage.solution);
+  const bool predicted = stage.predictor.ready();
+  if (predicted)
+    stage.predictor.predict(stage.solution);
+  else
+    part.problem->guess(v_, stage.solution);
+  SolveReport report = part.solver->solve(stage.solution);
+  count(report);
+  if (report.ok() || !predicted) return report;
+  part.problem->guess(v_, stage.solution);
+  report = part.solver->solve(stage.solution);
   count(report);
   return report;
 }
@@ -159,18 +154,14 @@ StepReport Integrator::step() {
       total.status = SolveStatus::not_finite;
       return failed(total, problem, start);
     }
-    if (history_length_ < 2) v_ = (q_next_ - q_stage_) / h;
+    v_ = (q_next_ - q_stage_) / h;
     std::swap(q_stage_, q_next_);
     std::swap(p_stage_, p_next_);
     t += h;
   }
   std::swap(q_, q_stage_);
   std::swap(p_, p_stage_);
-  for (Stage& stage : stages_) {
-    std::rotate(stage.history.begin(), stage.history.end() - 1, stage.history.end());
-    stage.history.front() = stage.solution;
-  }
-  history_length_ = std::min(history_length_ + 1, longest_history);
+  for (Stage& stage : stages_) stage.predictor.learn(stage.solution);
   first_stage_solved_ = false;
   return {total, work_.steps++, start, {}};
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <diracstep/core/nonlinear_solver.hpp>
+#include <diracstep/core/predictor.hpp>
 #include <diracstep/core/registry.hpp>
 #include <diracstep/core/saddle_point.hpp>
 #include <diracstep/core/scene.hpp>
@@ -101,14 +102,13 @@ class Integrator {
   struct Stage {
     double fraction;
     std::size_t part;
-    Vector solution;              ///< the unknowns in the current step
-    std::vector<Vector> history;  ///< in the last ones, newest first: what the next are extrapolated from
+    Vector solution;  ///< the unknowns in the current step
+    Predictor predictor;
   };
 
   Part make_part(const Method& method, bool mirror_rule, const SolverFactory& solvers) const;
   void plan_stages(const Registry& registry, const SolverFactory& solvers);
   SolveReport solve_stage(std::size_t stage, double t, const Vector& q, const Vector& p);
-  void predict(Stage& stage);
   void count(const SolveReport& report);
   StepReport failed(const SolveReport& report, const StepProblem& problem, double time) const;
 
@@ -125,11 +125,10 @@ class Integrator {
 
   double start_time_ = 0.0;
   Vector q_, p_;
-  Vector v_;  ///< last known velocity, a guess only
+  Vector v_;  ///< the velocity, roughly: a guess only
   Vector q_next_, p_next_, q_stage_, p_stage_, impulse_;
   Vector velocity_unknowns_, acceleration_unknowns_;
   bool first_stage_solved_ = false;  ///< the first stage of the next step is solved already
-  std::size_t history_length_ = 0;
   Work work_;
 };
 

@@ -72,6 +72,7 @@ class ImplicitStep final : public StepProblem {
   }
 
   int size() const override { return n_ + m_ + inner_; }
+  int leading_unknowns() const override { return n_; }
   const SparsityPattern& pattern() const override { return pattern_; }
   std::span<const ResidualBlock> blocks() const override { return blocks_; }
 

@@ -26,6 +26,13 @@ class StepProblem : public NonlinearProblem {
   /// q0 as A(q0)ᵀλ.
   virtual void finish(ConstVectorRef x, Vector& q1, Vector& p1, Vector& impulse) = 0;
 
+  /// For steps with stages: x from the polynomials through the stages of the last step, taken into this one.  False
+  /// where the step has none.
+  virtual bool extrapolate_stages(ConstVectorRef /*last*/, VectorRef /*x*/) const { return false; }
+
+  /// How many unknowns come before the multipliers, whose guess hardly matters.
+  virtual int leading_unknowns() const { return size(); }
+
   /// What the unknowns are, for plans: "q1 (3), λ (1)".
   virtual std::string unknowns() const = 0;
 };

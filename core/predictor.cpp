@@ -1,0 +1,75 @@
+#include <algorithm>
+#include <cmath>
+#include <array>
+#include <diracstep/core/predictor.hpp>
+
+namespace diracstep {
+
+namespace {
+
+constexpr std::size_t longest = 5;
+
+/// Weights, newest first, of the polynomial through k equally spaced values, taken one spacing further.
+constexpr std::array<std::array<double, longest>, longest + 1> extrapolation{{{},
+                                                                              {1.0},
+                                                                              {2.0, -1.0},
+                                                                              {3.0, -3.0, 1.0},
+                                                                              {4.0, -6.0, 4.0, -1.0},
+                                                                              {5.0, -10.0, 10.0, -5.0, 1.0}}};
+
+/// The rules are compared at every step of the first ones, then now and then.
+constexpr long always_until = 12, later_every = 16;
+
+}  // namespace
+
+Predictor::Predictor(StepProblem& problem) : problem_(problem) {
+  for (std::size_t terms = 2; terms <= longest; ++terms) rules_.push_back({false, terms});
+  candidate_.setZero(problem.size());
+  missed_ = candidate_;
+  history_.assign(longest, candidate_);
+  if (problem.extrapolate_stages(candidate_, missed_))
+    for (std::size_t terms = 1; terms < longest; ++terms) rules_.push_back({true, terms});
+}
+
+void Predictor::evaluate(const Rule& rule, VectorRef x) {
+  if (!rule.through_stages) {
+    x = extrapolation[rule.terms][0] * history_[0];
+    for (std::size_t k = 1; k < rule.terms; ++k) x += extrapolation[rule.terms][k] * history_[k];
+    return;
+  }
+  // E x_1 + Σ_k w_k d_k with d_k = x_k − E x_{k+1}, the defects of the stage polynomials in the past.
+  const std::size_t defects = rule.terms - 1;
+  problem_.extrapolate_stages(history_[0], x);
+  for (std::size_t k = 0; k < defects; ++k) {
+    problem_.extrapolate_stages(history_[k + 1], missed_);
+    x += extrapolation[defects][k] * (history_[k] - missed_);
+  }
+}
+
+void Predictor::predict(VectorRef x) {
+  if (rules_[best_].terms > known_) best_ = 0;
+  evaluate(rules_[best_], x);
+}
+
+void Predictor::elect(ConstVectorRef solution) {
+  const Eigen::Index leading = problem_.leading_unknowns();
+  double smallest = HUGE_VAL;
+  for (std::size_t r = 0; r < rules_.size(); ++r) {
+    if (rules_[r].terms > known_) continue;
+    evaluate(rules_[r], candidate_);
+    const double error = (candidate_ - solution).head(leading).lpNorm<Eigen::Infinity>();
+    if (!(error < smallest)) continue;
+    smallest = error;
+    best_ = r;
+  }
+}
+
+void Predictor::learn(ConstVectorRef solution) {
+  if (known_ >= 2 && (learned_ < always_until || learned_ % later_every == 0)) elect(solution);
+  ++learned_;
+  std::rotate(history_.begin(), history_.end() - 1, history_.end());
+  history_.front() = solution;
+  known_ = std::min(known_ + 1, longest);
+}
+
+}  // namespace diracstep
