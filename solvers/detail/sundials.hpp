@@ -47,12 +47,13 @@ class Context {
 };
 
 #if SUNDIALS_VERSION_MAJOR < 7
-/// Where KINSOL 6 writes its messages: nowhere.  A file of its own keeps it from flushing the program's streams.
+/// Where KINSOL and IDA 6 write their messages: nowhere.  A file of its own keeps them from flushing the program's
+/// streams.
 class MessageSink {
  public:
   MessageSink() : file_(std::fopen("/dev/null", "w")) {}
-  void attach(void* kinsol_memory) const {
-    if (file_) require(KINSetErrFile(kinsol_memory, file_.get()), "KINSetErrFile");
+  void attach(void* memory, int (*set_error_file)(void*, std::FILE*) = KINSetErrFile) const {
+    if (file_) require(set_error_file(memory, file_.get()), "SetErrFile");
   }
 
  private:

@@ -103,35 +103,8 @@ TEST(GaussLobattoStep, OrderIsTwiceTheStagesInConfigurationVelocityAndMultiplier
       for (const int s : {1, 2, 3, 4}) expect_order(scene, s);
 }
 
-/// Affine, time-dependent rows of both kinds and a driven Lagrangian.
-std::shared_ptr<const Scene> driven() {
-  Scene scene = testing::particle("driven");
-  scene.lagrangian = lagrangian<3>([](const auto& q, const auto& v, const auto& t) {
-    using std::cos, std::sin;
-    return 0.5 * (1.0 + 0.2 * sin(t)) * (v[0] * v[0] + v[1] * v[1]) + 0.5 * v[2] * v[2] * (1.0 + 0.1 * q[0] * q[0]) -
-           0.5 * q[1] * q[1] * (1.0 + q[2] * q[2]) * cos(t);
-  });
-  scene.constraints = {affine<3, 1>(
-                           []<class T>(const std::array<T, 3>& q, const T& t) {
-                             using std::sin;
-                             return std::array<std::array<T, 3>, 1>{{{T(1.0), 0.5 * sin(t), q[1]}}};
-                           },
-                           []<class T>(const std::array<T, 3>& q, const T& t) {
-                             using std::cos;
-                             return std::array<T, 1>{0.3 * cos(2.0 * t) + 0.2 * q[2]};
-                           }),
-                       holonomic<3, 1>([]<class T>(const std::array<T, 3>& q, const T& t) {
-                         using std::sin;
-                         return std::array<T, 1>{q[2] + 0.3 * q[1] * q[1] - 0.5 * sin(t) - 0.8};
-                       })};
-  const double y = 0.5, z = 0.8 - 0.3 * y * y, vy = -0.4, vz = 0.5 - 0.6 * y * vy;
-  scene.start.q << 1.0, y, z;
-  scene.start.v << -(y * vz + 0.3 + 0.2 * z), vy, vz;
-  return std::make_shared<const Scene>(scene);
-}
-
 TEST(GaussLobattoStep, OrderHoldsForAffineAndTimeDependentRows) {
-  for (const int s : {1, 2, 3, 4}) expect_order(driven(), s, 2);
+  for (const int s : {1, 2, 3, 4}) expect_order(testing::driven(), s, 2);
 }
 
 TEST(GaussLobattoStep, IsSelfAdjoint) {

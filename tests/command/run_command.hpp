@@ -1,0 +1,84 @@
+#pragma once
+
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <string>
+#include <vector>
+
+/// Runs the built command as a user's shell would.
+namespace diracstep::testing {
+
+struct Outcome {
+  int status;
+  std::string out;
+  std::string err;
+};
+
+inline std::string contents(const std::filesystem::path& path) {
+  std::ifstream file(path);
+  return (std::ostringstream() << file.rdbuf()).str();
+}
+
+inline std::vector<std::string> lines(const std::string& text) {
+  std::istringstream stream(text);
+  std::vector<std::string> all;
+  for (std::string line; std::getline(stream, line);) all.push_back(line);
+  return all;
+}
+
+inline std::vector<std::string> fields(const std::string& line) {
+  std::istringstream stream(line);
+  std::vector<std::string> all;
+  for (std::string field; std::getline(stream, field, ',');) all.push_back(field);
+  return all;
+}
+
+/// A directory of its own for each test, removed afterwards.
+class Command : public ::testing::Test {
+ protected:
+  Command()
+      : directory_(std::filesystem::temp_directory_path() /
+                   ("diracstep_" +
+                    std::string(::testing::UnitTest::GetInstance()->current_test_info()->name()) + "_" +
+                    std::to_string(getpid()))) {
+    std::filesystem::create_directories(directory_);
+  }
+  ~Command() override { std::filesystem::remove_all(directory_); }
+
+  std::string path(const std::string& name) const { return (directory_ / name).string(); }
+
+  /// `arguments` as typed in a shell; `before` precedes the command, "VAR=x" or "timeout 1".
+  Outcome run(const std::string& arguments, const std::string& before = "") const {
+    const std::string line = before + " '" DIRACSTEP_COMMAND "' " + arguments + " 2>'" + path("stderr") + "'";
+    Outcome outcome{-1, {}, {}};
+    std::FILE* pipe = popen(line.c_str(), "r");
+    if (pipe == nullptr) return outcome;
+    char buffer[4096];
+    for (std::size_t n; (n = std::fread(buffer, 1, sizeof buffer, pipe)) > 0;) outcome.out.append(buffer, n);
+    const int status = pclose(pipe);
+    outcome.status = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+    outcome.err = contents(path("stderr"));
+    return outcome;
+  }
+
+  /// Expects exit status 2, nothing on standard output, and each of `words` on standard error.
+  void expect_misuse(const std::string& arguments, const std::vector<std::string>& words) const {
+    const Outcome outcome = run(arguments);
+    EXPECT_EQ(outcome.status, 2) << arguments << '\n' << outcome.err;
+    EXPECT_EQ(outcome.out, "") << arguments;
+    for (const auto& word : words)
+      EXPECT_NE(outcome.err.find(word), std::string::npos) << arguments << ": '" << word << "' not in\n"
+                                                           << outcome.err;
+  }
+
+ private:
+  std::filesystem::path directory_;
+};
+
+}  // namespace diracstep::testing

@@ -1,0 +1,114 @@
+#include <nlohmann/json.hpp>
+
+#include "run_command.hpp"
+
+namespace diracstep::testing {
+namespace {
+
+using Json = nlohmann::json;
+
+class StudyCommand : public Command {
+ protected:
+  const std::string small = "--orders 2,4 --steps 0.1,0.05,0.025 --rtols 1e-6,1e-8 --repeat 2 --end 5";
+};
+
+TEST_F(StudyCommand, JsonHasTheKeysOfTheContract) {
+  const Outcome outcome = run("study knife_edge --json " + small);
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  const Json study = Json::parse(outcome.out)["studies"][0];
+  EXPECT_EQ(study["scene"], "knife_edge");
+  EXPECT_EQ(study["t_end"], 5.0);
+  EXPECT_EQ(study["unknowns"], 4);
+  EXPECT_EQ(study["reference"]["kind"], "exact");
+  EXPECT_TRUE(study["reference"]["self_error"].is_number());
+  ASSERT_EQ(study["rows"].size(), 8u);
+  for (const Json& row : study["rows"]) {
+    EXPECT_EQ(row["status"], "ok");
+    for (const char* key : {"error_q", "error_p", "constraint", "energy_error", "steps", "newton_iterations",
+                            "residual_evaluations", "jacobian_evaluations"})
+      EXPECT_TRUE(row[key].is_number()) << key << row;
+    for (const char* key : {"median", "min", "max"})
+      EXPECT_GT(row["cpu_seconds"][key].get<double>(), 0.0) << key;
+    EXPECT_EQ(row["cpu_seconds"]["repeats"], 2);
+    const bool ida = row["method"] == "ida";
+    EXPECT_EQ(row.contains("rtol"), ida);
+    EXPECT_EQ(row.contains("self_error"), ida);
+    for (const char* key : {"order", "momentum", "step"}) EXPECT_EQ(row.contains(key), !ida) << key;
+  }
+  ASSERT_EQ(study["measured_order"].size(), 2u);
+  EXPECT_NEAR(study["measured_order"][0]["slope"].get<double>(), 2.0, 0.1);
+  EXPECT_NEAR(study["measured_order"][1]["slope"].get<double>(), 4.0, 0.1);
+  ASSERT_EQ(study["at_error"].size(), 6u);
+  for (const Json& at : study["at_error"])
+    for (const char* key : {"error", "method", "order", "cpu_seconds", "ida_cpu_seconds", "ratio"})
+      EXPECT_TRUE(at.contains(key)) << key;
+  EXPECT_TRUE(study["at_error"].back()["cpu_seconds"].is_null()) << "1e-9 is out of reach here";
+}
+
+TEST_F(StudyCommand, WritesTablesAndPictures) {
+  const Outcome outcome =
+      run("study knife_edge pendulum_cartesian --out \"" + path("a b/it's") + "\" " + small);
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_NE(outcome.out.find("IDA / ours"), std::string::npos);
+  const Json json = Json::parse(contents(path("a b/it's/study.json")));
+  EXPECT_EQ(json["studies"].size(), 2u);
+  const auto csv = lines(contents(path("a b/it's/study.csv")));
+  EXPECT_EQ(csv.size(), 17u);
+  EXPECT_EQ(csv[0].rfind("scene,method,order,momentum,step,rtol,status,error_q,error_p", 0), 0u);
+  if (outcome.err.find("gnuplot was not found") != std::string::npos) GTEST_SKIP() << "no gnuplot here";
+  for (const char* scene : {"knife_edge", "pendulum_cartesian"}) {
+    EXPECT_NE(contents(path("a b/it's/" + std::string(scene) + ".svg")).find("<svg"), std::string::npos);
+    EXPECT_EQ(contents(path("a b/it's/" + std::string(scene) + ".png")).substr(1, 3), "PNG");
+  }
+}
+
+TEST_F(StudyCommand, WithoutGnuplotEverythingElseIsWritten) {
+  const Outcome outcome = run("study knife_edge --out " + path("out") + ' ' + small, "PATH=/nonexistent");
+  EXPECT_EQ(outcome.status, 0);
+  EXPECT_NE(outcome.err.find("gnuplot was not found"), std::string::npos) << outcome.err;
+  EXPECT_EQ(Json::parse(contents(path("out/study.json")))["studies"].size(), 1u);
+}
+
+TEST_F(StudyCommand, FailedRunIsARowAndAMessage) {
+  const Outcome outcome = run("study pendulum_cartesian --orders 2 --steps 0.2,0.01 --without-ida --json");
+  EXPECT_EQ(outcome.status, 1);
+  EXPECT_NE(outcome.err.find("no convergence"), std::string::npos) << outcome.err;
+  const Json rows = Json::parse(outcome.out)["studies"][0]["rows"];
+  ASSERT_EQ(rows.size(), 2u);
+  EXPECT_NE(rows[0]["status"].get<std::string>().find("no convergence"), std::string::npos);
+  EXPECT_TRUE(rows[0]["error_q"].is_null());
+  EXPECT_EQ(rows[1]["status"], "ok");
+}
+
+TEST_F(StudyCommand, InterruptKeepsFinishedRows) {
+  const Outcome outcome =
+      run("study kepler_e06 --json --out " + path("out"), "timeout --preserve-status -s INT 1");
+  EXPECT_EQ(outcome.status, 1);
+  const Json study = Json::parse(outcome.out)["studies"][0];
+  EXPECT_TRUE(study["interrupted"].get<bool>());
+  EXPECT_FALSE(study["rows"].empty());
+  EXPECT_EQ(Json::parse(contents(path("out/study.json")))["studies"][0]["rows"].size(), study["rows"].size());
+}
+
+TEST_F(StudyCommand, MisuseNamesTheValueAndWhatIsAllowed) {
+  expect_misuse("study nowhere", {"nowhere", "knife_edge"});
+  expect_misuse("study knife_edge --methods type1/none", {"type1/none", "type1/midpoint"});
+  expect_misuse("study knife_edge --methods ''", {"--methods"});
+  expect_misuse("study knife_edge --orders 3", {"3", "2, 4, 6, 8"});
+  expect_misuse("study knife_edge --orders 2.5", {"2.5"});
+  expect_misuse("study knife_edge --steps ''", {"--steps"});
+  expect_misuse("study knife_edge --steps 0.1,,0.2", {"0.1,,0.2"});
+  expect_misuse("study knife_edge --steps 0.1,x", {"x"});
+  expect_misuse("study knife_edge --steps 0", {"0"});
+  expect_misuse("study knife_edge --steps nan", {"nan"});
+  expect_misuse("study knife_edge --rtols 1", {"1", "[1e-14, 1e-1]"});
+  expect_misuse("study knife_edge --repeat 0", {"0", "1 or more"});
+  expect_misuse("study knife_edge --budget 0", {"0"});
+  expect_misuse("study knife_edge --end 0", {"0"});
+  expect_misuse("study knife_edge --momentum x", {"plus", "minus", "projected"});
+  expect_misuse("study knife_edge --set e=1", {"'e'", "J"});
+  expect_misuse("study knife_edge --out /dev/null/x", {"/dev/null/x"});
+}
+
+}  // namespace
+}  // namespace diracstep::testing

@@ -1,0 +1,86 @@
+#include <fmt/format.h>
+
+#include <CLI/App.hpp>
+#include <algorithm>
+#include <cmath>
+#include <diracstep/core/errors.hpp>
+#include <diracstep/validation/command/interrupt.hpp>
+#include <diracstep/validation/command/verbs.hpp>
+#include <diracstep/validation/order_table.hpp>
+#include <fstream>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+namespace diracstep::command {
+
+namespace {
+
+struct Options {
+  std::string out;
+  bool json = false;
+};
+
+constexpr const char* explanation =
+    "# Orders, claimed and measured\n\n"
+    "Written by `diracstep orders --out FILE`. Each number is the slope of the error in q and projected p at "
+    "t = 2.4\n"
+    "between two steps h and h/2, on non-linear scenes with a position-dependent mass and no special "
+    "symmetry\n"
+    "(`validation/law_scenes.hpp`), against GL(6) at h = 0.025; errors below 1e-12 are left out.\n\n"
+    "* *reversal*: |Φ_{-h}(Φ_h(y)) - y| on the mixed scene, h = 0.05, for self-adjoint steps.\n"
+    "* *symplecticity*: largest entry of MᵀΩM - Ω on the unconstrained scene, M by sixth-order differences.\n"
+    "* *membership*: largest residual of membership in the discrete Dirac structures over 20 steps of every "
+    "class.\n\n"
+    "A dash: not stated for that method, or it does not take that class (type 4 takes no forces).\n\n";
+
+nlohmann::ordered_json as_json(const OrderTableRow& row, const std::vector<OrderScene>& scenes) {
+  const auto number = [](double x) {
+    return std::isfinite(x) ? nlohmann::ordered_json(x) : nlohmann::ordered_json();
+  };
+  nlohmann::ordered_json json{
+      {"method", row.method}, {"order", row.order}, {"measured", nlohmann::json::object()}};
+  for (std::size_t k = 0; k < scenes.size(); ++k)
+    json["measured"][scenes[k].constraint_class] = number(row.measured[k].order);
+  json["reversal_defect"] = number(row.reversal_defect);
+  json["symplecticity_defect"] = number(row.symplecticity_defect);
+  json["membership_residual"] = number(row.membership_residual);
+  json["holds"] = holds(row);
+  return json;
+}
+
+void orders(const Options& options, Session& session) {
+  const std::vector<OrderScene> scenes = order_scenes();
+  std::vector<OrderTableRow> rows;
+  for (const TableMethod& method : table_methods(session.registry)) {
+    if (interrupted()) break;
+    rows.push_back(measure_row(session.registry, method, scenes));
+  }
+  const std::string table = order_table_markdown(rows, scenes);
+  if (!options.out.empty()) {
+    std::ofstream file(options.out);
+    file << explanation << table << std::flush;
+    if (!file) throw Misuse("cannot write '" + options.out + "'");
+  }
+  nlohmann::ordered_json json{{"orders", nlohmann::json::array()}};
+  for (const OrderTableRow& row : rows) json["orders"].push_back(as_json(row, scenes));
+  print(options.json ? json.dump(2) + '\n' : table);
+  for (const OrderTableRow& row : rows)
+    if (!holds(row)) {
+      say(fmt::format("{} composed to order {}: claim and measurement differ", row.method, row.order));
+      session.exit_status = failed;
+    }
+}
+
+}  // namespace
+
+void add_orders(CLI::App& app, Session& session) {
+  CLI::App* verb =
+      app.add_subcommand("orders", "Claimed and measured order of every method on every constraint class");
+  const auto options = std::make_shared<Options>();
+  verb->add_option("--out", options->out, "Also write the table, with its explanation, as Markdown");
+  verb->add_flag("--json", options->json, "One JSON document on standard output");
+  verb->footer("Example:  diracstep orders --out docs/orders.md");
+  verb->callback([options, &session] { orders(*options, session); });
+}
+
+}  // namespace diracstep::command

@@ -1,0 +1,68 @@
+#include <fmt/format.h>
+
+#include <CLI/App.hpp>
+#include <cmath>
+#include <diracstep/core/integrator.hpp>
+#include <diracstep/validation/command/arguments.hpp>
+#include <diracstep/validation/command/verbs.hpp>
+#include <diracstep/validation/report.hpp>
+#include <diracstep/validation/scene_catalogue.hpp>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+namespace diracstep::command {
+
+namespace {
+
+struct Options {
+  std::string scene;
+  std::string method = "type1/midpoint";
+  int order = 0;
+  std::vector<std::string> set;
+  bool json = false;
+};
+
+std::string as_json(const Integrator& integrator) {
+  nlohmann::ordered_json json;
+  json["scene"] = integrator.scene().name;
+  json["method"] = integrator.options().method;
+  json["order"] = integrator.options().order;
+  json["plan"] = nlohmann::ordered_json::array();
+  for (const PlanLine& line : integrator.plan())
+    json["plan"].push_back({{"item", line.item}, {"decision", line.decision}, {"reason", line.reason}});
+  return json.dump(2) + '\n';
+}
+
+std::string as_text(const Integrator& integrator) {
+  std::vector<std::vector<std::string>> rows{{"item", "decision", "reason"}};
+  for (const PlanLine& line : integrator.plan()) rows.push_back({line.item, line.decision, line.reason});
+  return fmt::format("{} with {}, order {}\n\n{}", integrator.scene().name, integrator.options().method,
+                     integrator.options().order, aligned(rows));
+}
+
+void plan(const Options& options, Session& session) {
+  const CatalogueScene entry = make_scene(options.scene, parameters(options.set));
+  const Integrator integrator(entry.scene, session.registry, session.solvers,
+                              {options.method, options.order, entry.natural_step, {}});
+  print(options.json ? as_json(integrator) : as_text(integrator));
+}
+
+}  // namespace
+
+void add_plan(CLI::App& app, Session& session) {
+  CLI::App* verb = app.add_subcommand("plan", "What is assembled for a scene, and what is left out and why");
+  const auto options = std::make_shared<Options>();
+  verb->add_option("SCENE", options->scene, "A scene; see diracstep list scenes")->required();
+  verb->add_option("--method", options->method, "A method; see diracstep list methods")
+      ->capture_default_str();
+  verb->add_option("--order", options->order, "Compose to this order; 0 keeps the method's own")
+      ->capture_default_str();
+  verb->add_option("--set", options->set, "Set a parameter of the scene; may be repeated")
+      ->type_name("NAME=VALUE")
+      ->allow_extra_args(false);
+  verb->add_flag("--json", options->json, "One JSON document on standard output");
+  verb->footer("Example:  diracstep plan knife_edge --method type1/midpoint");
+  verb->callback([options, &session] { plan(*options, session); });
+}
+
+}  // namespace diracstep::command

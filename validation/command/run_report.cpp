@@ -1,0 +1,98 @@
+#include <fmt/format.h>
+
+#include <cmath>
+#include <diracstep/validation/command/run_report.hpp>
+#include <diracstep/validation/convergence_study.hpp>
+#include <diracstep/validation/report.hpp>
+#include <nlohmann/json.hpp>
+
+namespace diracstep::command {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+
+Json by_name(const std::vector<std::string>& names, const Vector& values) {
+  Json json = Json::object();
+  for (std::size_t i = 0; i < names.size(); ++i)
+    json[names[i]] = number(values[static_cast<Eigen::Index>(i)]);
+  return json;
+}
+
+Json end_json(const RunResult& result, const Scene& scene) {
+  if (!result.has_end()) return nullptr;
+  return {{"t", number(result.end.time)},
+          {"q", by_name(scene.coordinates, result.end.q)},
+          {"v", by_name(scene.coordinates, result.end.v)},
+          {"p", by_name(scene.coordinates, result.end.p)},
+          {"lambda", by_name(scene.row_names(), result.end.lambda)},
+          {"energy", number(result.end.energy)}};
+}
+
+std::string end_table(const Sample& end, const Scene& scene) {
+  std::vector<std::vector<std::string>> rows{{"", "q", "v", "p"}};
+  for (int i = 0; i < scene.dimension(); ++i)
+    rows.push_back({scene.coordinates[static_cast<std::size_t>(i)], fmt::format("{:.15g}", end.q[i]),
+                    fmt::format("{:.15g}", end.v[i]), fmt::format("{:.15g}", end.p[i])});
+  std::string text = aligned(rows);
+  const auto names = scene.row_names();
+  for (int r = 0; r < scene.rows(); ++r)
+    text += fmt::format("force of row {}: {:.15g}\n", names[static_cast<std::size_t>(r)], end.lambda[r]);
+  return text;
+}
+
+}  // namespace
+
+void compare_with_reference(RunResult& result, const CatalogueScene& entry, const Scene& scene) {
+  if (!result.has_end()) return;
+  const bool known = entry.reference.at && entry.reference.at(result.end.time);
+  Truth truth{.kind = {}, .how = {}, .missing = "no reference", .q = {}, .p = {}};
+  if (known) truth = true_end(entry, result.end.time);
+  judge(result.check, scene, result.end, truth);
+}
+
+std::string run_text(const RunResult& result, const CatalogueScene& entry, const IntegratorOptions& options) {
+  std::string text =
+      fmt::format("{}: {}, order {}, {} steps of {:g}, momentum {}\n", entry.scene->name, options.method,
+                  options.order, result.work.steps, options.step, name(result.momentum));
+  if (result.has_end()) {
+    text += fmt::format("\nt = {:.15g}\n{}energy: {:.15g}, changed by {:.2e}\n", result.end.time,
+                        end_table(result.end, *entry.scene), result.end.energy, result.check.energy_error);
+    if (std::isfinite(result.check.error_q))
+      text += fmt::format("error against the {} reference: q {:.2e}, p {:.2e}\n", entry.reference.kind,
+                          result.check.error_q, result.check.error_p);
+    if (entry.scene->rows() > 0)
+      text += fmt::format("largest residual of the constraint rows: {:.2e}\n", result.check.constraint);
+  }
+  return text + fmt::format("work: {} solves, {} Newton iterations, {} residuals, {} Jacobians\n",
+                            result.work.solves, result.work.iterations, result.work.residual_evaluations,
+                            result.work.jacobian_evaluations);
+}
+
+std::string run_json(const RunResult& result, const CatalogueScene& entry, const IntegratorOptions& options) {
+  const StudyRow& check = result.check;
+  Json json{{"scene", entry.scene->name},
+            {"parameters", Json::object()},
+            {"method", options.method},
+            {"order", options.order},
+            {"momentum", name(result.momentum)},
+            {"step", options.step},
+            {"status", result.failure.empty() ? "ok" : result.failure}};
+  for (const auto& [key, value] : entry.parameters) json["parameters"][key] = number(value);
+  json["end"] = end_json(result, *entry.scene);
+  json["error_q"] = number(check.error_q);
+  json["error_p"] = number(check.error_p);
+  json["constraint"] = number(check.constraint);
+  json["energy_error"] = number(check.energy_error);
+  json["steps"] = result.work.steps;
+  json["newton_iterations"] = result.work.iterations;
+  json["residual_evaluations"] = result.work.residual_evaluations;
+  json["jacobian_evaluations"] = result.work.jacobian_evaluations;
+  json["out"] = result.out.empty() ? Json(nullptr) : Json(result.out);
+  json["points"] = result.lines;
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + '\n';
+}
+
+}  // namespace diracstep::command

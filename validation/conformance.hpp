@@ -1,0 +1,49 @@
+#pragma once
+
+#include <diracstep/core/integrator.hpp>
+#include <memory>
+#include <string>
+#include <vector>
+
+/// Measurements that hold a method to what is stated of it: orders, reversibility, symplecticity, and membership in the
+/// discrete Dirac structures.  They run on the scenes of law_scenes.hpp and need nothing but a registry.
+namespace diracstep {
+
+/// A scene of one constraint class on which orders are measured, and the finest solution known on it.
+struct OrderScene {
+  std::string constraint_class;
+  std::shared_ptr<const Scene> scene;
+  double t_end = 0.0;
+  Sample reference;
+};
+
+/// One scene of each class: unconstrained, holonomic, nonholonomic, mixed, affine and time-dependent, forced.
+std::vector<OrderScene> order_scenes();
+
+/// An order found by halving the step until the errors are asymptotic.
+struct MeasuredOrder {
+  double order = 0.0;     ///< NaN where it could not be measured
+  double error = 0.0;     ///< at the finer step of the last pair
+  double step = 0.0;
+  std::string failure;    ///< empty, or why there is no order
+};
+
+/// Order of q and of the momentum representative in the maximum norm at the end: the slope of log(error) over log(h)
+/// through the four finest of the steps h, h/√2, h/2, … that lie above round-off (1e-12, or where the error stops falling).
+MeasuredOrder measure_order(const Registry& registry, const OrderScene& scene, IntegratorOptions options,
+                            Momentum momentum = Momentum::projected);
+
+/// |Φ_{−h}(Φ_h(y)) − y| in q and projected p, with the method's own step both ways: round-off for a self-adjoint method.
+double reversal_defect(const Registry& registry, const std::shared_ptr<const Scene>& scene,
+                       const IntegratorOptions& options);
+
+/// Largest entry of MᵀΩM − Ω for the Jacobian M of one step on an unconstrained scene, by central differences of sixth
+/// order: about 1e-11 for a symplectic step.
+double symplecticity_defect(const Registry& registry, const std::shared_ptr<const Scene>& scene,
+                            const IntegratorOptions& options);
+
+/// Largest residual of membership in D_{d+} and D_{d−} over `steps` steps; NaN for a method for which none is stated.
+double membership_residual(const Registry& registry, const std::shared_ptr<const Scene>& scene,
+                           const IntegratorOptions& options, long steps);
+
+}  // namespace diracstep

@@ -1,0 +1,79 @@
+#pragma once
+
+#include <diracstep/core/integrator.hpp>
+#include <diracstep/core/scene.hpp>
+#include <diracstep/core/sparsity_pattern.hpp>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace diracstep {
+
+struct IdaOptions {
+  double rtol = 1e-8;  ///< relative tolerance, in [1e-14, 1e-1]
+  double atol = 0.0;   ///< absolute tolerance on q, v and p; 0 takes rtol
+  long max_steps = 5'000'000;
+};
+
+/// One run of IDA.  `failure` is empty, or says why and where it stopped; the state is then the last one
+/// reached.
+struct IdaRun {
+  std::string failure;
+  Sample end;  ///< q, v, p, the multipliers as forces, and the energy at the end
+  long steps = 0;
+  long residual_evaluations = 0;
+  long jacobian_evaluations = 0;
+  long newton_iterations = 0;
+  long error_test_failures = 0;
+  double cpu_seconds = 0.0;  ///< thread time of the integration, set-up and start included
+
+  bool ok() const { return failure.empty(); }
+};
+
+/// The continuous implicit Lagrangian system (Leok and Ohsawa (4.7)) as F(t, y, ẏ) = 0 with y = (q, v, p, Λ,
+/// M), in the posing with multipliers as derivatives (index 1):
+///
+///   q̇ − v − A_holᵀ Ṁ = 0,   ṗ − ∂L/∂q − f − Aᵀ Λ̇ = 0,   p − ∂L/∂v = 0,   A v + b = 0,   φ = 0
+///
+/// where Λ̇ are the forces of all rows and Ṁ, present for holonomic rows only, keeps φ = 0 (stabilisation of
+/// Gear, Gupta and Leimkuhler).
+class ImplicitLagrangianDae {
+ public:
+  /// With `dense` the Jacobian is a full matrix.
+  ImplicitLagrangianDae(const Scene& scene, bool dense);
+
+  int size() const { return size_; }
+  const SparsityPattern& pattern() const { return pattern_; }
+
+  void residual(double t, ConstVectorRef y, ConstVectorRef rate, VectorRef f);
+
+  /// ∂F/∂y + cj ∂F/∂ẏ on pattern().
+  void jacobian(double t, double cj, ConstVectorRef y, ConstVectorRef rate, VectorRef values);
+
+ private:
+  /// A block of rows, the places of its Λ and M among the unknowns, and its values at the last point.
+  struct Rows {
+    std::shared_ptr<const ConstraintRows> rows;
+    int force, drift;
+    Vector a, b, derivative, force_derivative, drift_derivative;
+  };
+
+  template <class Visit>
+  void for_each_block(double cj, Visit visit);
+
+  std::shared_ptr<const Lagrangian> lagrangian_;
+  std::shared_ptr<const Force> force_;  ///< may be null
+  int n_;
+  int size_;
+  std::vector<Rows> rows_;
+  BlockPattern layout_;
+  SparsityPattern pattern_, diagonal_;
+  Vector ones_, lq_, lv_, lqq_, lqv_, lvv_, f_, fq_, fv_;
+};
+
+/// Integrates the system above from the scene's start to `t_end` with SUNDIALS IDA and the analytic Jacobian.
+/// The start is made consistent by the acceleration system of core. Throws Misuse for a bad scene, start, end
+/// or option; what a user's function throws passes through.
+IdaRun integrate_with_ida(const Scene& scene, double t_end, const IdaOptions& options);
+
+}  // namespace diracstep

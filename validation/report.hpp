@@ -1,0 +1,25 @@
+#pragma once
+
+#include <diracstep/validation/convergence_study.hpp>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace diracstep {
+
+/// A study as tables for a person: the rows, the measured orders, and the time to reach an error.
+std::string study_table(const Study& study);
+
+/// All rows of all studies, one line each, with a header; a number that does not apply is left empty.
+std::string studies_csv(const std::vector<Study>& studies);
+
+/// {"studies": [...]}; a number that does not apply or is not finite is null.
+std::string studies_json(const std::vector<Study>& studies);
+
+/// A field of a CSV file, quoted where it must be.
+std::string csv_field(std::string_view text);
+
+/// Columns of text, each as wide as its widest cell; the first row is the header.
+std::string aligned(const std::vector<std::vector<std::string>>& rows);
+
+}  // namespace diracstep

@@ -1,0 +1,165 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <ctime>
+#include <diracstep/validation/ida_reference.hpp>
+#include <diracstep/validation/study_run.hpp>
+#include <diracstep/validation/work_precision.hpp>
+
+namespace diracstep {
+
+namespace {
+
+constexpr double long_run = 0.3;          // CPU seconds above which a run is repeated less often
+constexpr double own_warm_up = 1.0;       // … above which it is not run once more to warm up
+constexpr double reference_rtol = 1e-13;  // of IDA, where a scene has no reference
+constexpr long steps_between_looks = 4096;
+
+double thread_seconds() {
+  std::timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+CpuSeconds summary(std::vector<double> seconds) {
+  std::ranges::sort(seconds);
+  const std::size_t n = seconds.size();
+  const double median = n % 2 == 1 ? seconds[n / 2] : 0.5 * (seconds[n / 2 - 1] + seconds[n / 2]);
+  return {median, seconds.front(), seconds.back(), static_cast<int>(n)};
+}
+
+/// Times a run as often as its length allows; `run` returns its CPU seconds, or a negative number to stop.
+template <class Run>
+CpuSeconds repeat(Run run, int repeats) {
+  const double first = run();
+  if (first < 0.0) return {};
+  if (first > own_warm_up) return summary({first});
+  const int count = first <= long_run ? repeats : std::max(1, static_cast<int>(repeats * long_run / first));
+  std::vector<double> seconds;
+  for (int i = 0; i < count; ++i) seconds.push_back(run());
+  return summary(std::move(seconds));
+}
+
+double largest_violation(const ConstraintRows& rows, const Sample& end) {
+  Vector a(rows.pattern().nonzeros()), residual(rows.rows()), phi = Vector::Zero(rows.rows());
+  rows.coefficients(end.time, end.q, a, residual);
+  rows.pattern().multiply_add(a.data(), end.v.data(), residual.data());
+  if (rows.holonomic()) rows.position(end.time, end.q, phi);
+  return std::max(residual.lpNorm<Eigen::Infinity>(), phi.lpNorm<Eigen::Infinity>());
+}
+
+Truth true_end_by_ida(const Scene& scene, double t_end) {
+  const IdaRun fine = integrate_with_ida(scene, t_end, {.rtol = reference_rtol});
+  const IdaRun coarse = integrate_with_ida(scene, t_end, {.rtol = 10.0 * reference_rtol});
+  Truth truth{.kind = ida_method,
+              .how = fmt::format("IDA at rtol {:g}, beside {:g}", reference_rtol, 10.0 * reference_rtol),
+              .missing = fine.ok() ? "" : "no reference: IDA stopped: " + fine.failure,
+              .q = fine.end.q,
+              .p = fine.end.p};
+  if (fine.ok() && coarse.ok()) truth.self_error = truth.distance(coarse.end);
+  return truth;
+}
+
+/// The start, the steps and the reading of the end.  Empty, or why that failed; `looking` is time spent in
+/// `look`.
+std::string run_once(Integrator& integrator, long steps, Momentum momentum, const Look& look, Sample& end,
+                     double& looking) {
+  integrator.reset();
+  for (long k = 1; k <= steps; ++k) {
+    const StepReport report = integrator.step();
+    if (!report.ok()) return report.failure;
+    if (!look || k % steps_between_looks != 0) continue;
+    const double before = thread_seconds();
+    look();
+    looking += thread_seconds() - before;
+  }
+  const SolveReport reading = integrator.sample(momentum, end);
+  if (reading.ok()) return {};
+  return fmt::format("reading the state at t = {}: {}", integrator.time(), describe(reading.status));
+}
+
+}  // namespace
+
+double Truth::distance(const Sample& end) const {
+  return std::max(relative_error(end.q, q), relative_error(end.p, p));
+}
+
+Truth true_end(const CatalogueScene& scene, double t_end) {
+  const auto point = scene.reference.at ? scene.reference.at(t_end) : std::nullopt;
+  const auto complete = completed(scene.scene);
+  if (!point) return true_end_by_ida(*complete, t_end);
+  Truth truth{.kind = scene.reference.kind,
+              .how = scene.reference.how,
+              .self_error = scene.reference.self_error,
+              .missing = {},
+              .q = point->q,
+              .p = Vector::Zero(point->q.size())};
+  Vector force = truth.p;
+  complete->lagrangian->gradient(t_end, point->q, point->v, force, truth.p);
+  return truth;
+}
+
+void judge(StudyRow& row, const Scene& scene, const Sample& end, const Truth& truth) {
+  const double energy = scene.energy(scene.start.time, scene.start.q, scene.start.v);
+  row.constraint = 0.0;
+  for (const auto& rows : scene.constraints)
+    row.constraint = std::max(row.constraint, largest_violation(*rows, end));
+  row.energy_error = std::abs(end.energy - energy) / std::max(std::abs(energy), 1.0);
+  if (truth.missing.empty()) {
+    row.error_q = relative_error(end.q, truth.q);
+    row.error_p = relative_error(end.p, truth.p);
+  }
+  if (!end.q.allFinite() || !end.p.allFinite())
+    row.status = "the end point is not finite";
+  else if (!truth.missing.empty())
+    row.status = truth.missing;
+}
+
+StudyRow run_ours(Integrator& integrator, long steps, Momentum momentum, int repeats, const Truth& truth,
+                  const Look& look) {
+  Sample end;
+  std::string failure;
+  const auto once = [&] {
+    double looking = 0.0;
+    const double before = thread_seconds();
+    failure = run_once(integrator, steps, momentum, look, end, looking);
+    return failure.empty() ? thread_seconds() - before - looking : -1.0;
+  };
+  const IntegratorOptions& options = integrator.options();
+  StudyRow row{.method = options.method, .order = options.order, .step = options.step};
+  row.cpu_seconds = repeat(once, repeats);
+  const Work& work = integrator.work();
+  row.steps = work.steps;
+  row.newton_iterations = work.iterations;
+  row.residual_evaluations = work.residual_evaluations;
+  row.jacobian_evaluations = work.jacobian_evaluations;
+  if (failure.empty())
+    judge(row, integrator.scene(), end, truth);
+  else
+    row.status = failure;
+  return row;
+}
+
+StudyRow run_ida(const Scene& scene, double t_end, double rtol, int repeats, const Truth& truth,
+                 Sample& end) {
+  IdaRun run;
+  const auto once = [&] {
+    run = integrate_with_ida(scene, t_end, {.rtol = rtol});
+    return run.ok() ? run.cpu_seconds : -1.0;
+  };
+  StudyRow row{.method = ida_method, .rtol = rtol};
+  row.cpu_seconds = repeat(once, repeats);
+  row.steps = run.steps;
+  row.newton_iterations = run.newton_iterations;
+  row.residual_evaluations = run.residual_evaluations;
+  row.jacobian_evaluations = run.jacobian_evaluations;
+  if (run.ok())
+    judge(row, scene, run.end, truth);
+  else
+    row.status = run.failure;
+  end = std::move(run.end);
+  return row;
+}
+
+}  // namespace diracstep

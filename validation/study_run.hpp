@@ -1,0 +1,78 @@
+#pragma once
+
+#include <diracstep/core/integrator.hpp>
+#include <diracstep/validation/scene_catalogue.hpp>
+#include <functional>
+#include <limits>
+#include <string>
+
+namespace diracstep {
+
+/// CPU time of the calling thread over the repeats of one run.
+struct CpuSeconds {
+  double median = 0.0;
+  double min = 0.0;
+  double max = 0.0;
+  int repeats = 0;
+};
+
+/// The method name of IDA's rows.
+inline constexpr const char* ida_method = "ida";
+
+/// One run of a study.  A number that does not apply or was not reached is NaN.
+struct StudyRow {
+  static constexpr double none = std::numeric_limits<double>::quiet_NaN();
+
+  std::string method;
+  int order = 0;       ///< 0 for IDA
+  double step = none;  ///< ours: the step size, fitted to the interval
+  double rtol = none;  ///< IDA's
+  std::string status = "ok";
+  double error_q = none;
+  double error_p = none;
+  double self_error = none;    ///< IDA's: how far its result is from that of the next tighter tolerance
+  double constraint = none;    ///< largest |φ(q)| and |A(q)v + b| at the end
+  double energy_error = none;  ///< |E(end) − E(start)| / max(|E(start)|, 1)
+  CpuSeconds cpu_seconds = {};
+  long steps = 0;
+  long newton_iterations = 0;
+  long residual_evaluations = 0;
+  long jacobian_evaluations = 0;
+
+  bool ok() const { return status == "ok"; }
+  bool is_ida() const { return method == ida_method; }
+  double error() const { return error_q > error_p ? error_q : error_p; }
+};
+
+/// The true end of a motion, and where it is known from.
+struct Truth {
+  std::string kind;  ///< "exact", "published" or "ida"
+  std::string how;
+  double self_error = StudyRow::none;
+  std::string missing;  ///< empty, or why there is no reference
+  Vector q, p;
+
+  /// The larger of the relative errors in q and p.
+  double distance(const Sample& end) const;
+};
+
+/// The scene's reference at t_end with p = ∂L/∂v, or IDA's result at the tolerance 1e-13 where there is none.
+Truth true_end(const CatalogueScene& scene, double t_end);
+
+/// Fills in the errors, the violation of the rows and the change of the energy at the end of a run.  Like
+/// run_ida it needs a scene with a Lagrangian, see completed().
+void judge(StudyRow& row, const Scene& scene, const Sample& end, const Truth& truth);
+
+/// Called now and then within a run of ours, outside the time taken; may throw to end it.
+using Look = std::function<void()>;
+
+/// Runs from the start to the end of `steps` steps, once to warm up and `repeats` times for the clock.  The
+/// time of a run holds the start, all steps and the reading of the end; construction is left out.  A run
+/// above 0.3 s is repeated less often, and one above 1 s is its own warm-up.
+StudyRow run_ours(Integrator& integrator, long steps, Momentum momentum, int repeats, const Truth& truth,
+                  const Look& look = {});
+
+/// The same for IDA; `end` receives where it got to.
+StudyRow run_ida(const Scene& scene, double t_end, double rtol, int repeats, const Truth& truth, Sample& end);
+
+}  // namespace diracstep
