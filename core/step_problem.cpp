@@ -317,14 +317,23 @@ class ImplicitStep final : public StepProblem {
   }
 
   void update_scales() {
-    const double h = std::abs(data_.step.size);
-    const double position = max_norm(data_.q0), momentum = max_norm(data_.p0);
-    const double end = graph_.ends_at_position ? position : momentum;
-    const double start = graph_.starts_from_position ? h * momentum : position;
-    blocks_[0].scale =
-        usable_scale(std::max(start, std::abs(row_factor()) * max_norm(hessian_.col(s_->pair(0, 1))) * end));
+    const double own = graph_.starts_from_position ? std::abs(data_.step.size) * max_norm(data_.p0) : max_norm(data_.q0);
+    blocks_[0].scale = usable_scale(std::max(own, std::abs(row_factor()) * cancelling_terms(0)));
     if (m_ > 0) blocks_[1].scale = data_.constraint_scale();
-    if (inner_ > 0) blocks_.back().scale = usable_scale(max_norm(gradient_)) + usable_scale(start / h);
+    if (inner_ == 0) return;
+    double largest = 0.0;
+    for (int i = 2; i < s_->columns(); ++i) largest = std::max(largest, cancelling_terms(i));
+    blocks_.back().scale = usable_scale(largest);
+  }
+
+  /// Size of the terms that make up column i of the gradient: second derivatives times what they multiply.
+  double cancelling_terms(int i) const {
+    double largest = 0.0;
+    for (int j = 0; j < s_->columns(); ++j) {
+      const auto block = hessian_.col(s_->pair(std::min(i, j), std::max(i, j)));
+      largest = std::max(largest, max_norm(block) * max_norm(y_.col(j)));
+    }
+    return largest;
   }
 
   std::unique_ptr<GeneratingFunction> s_;

@@ -55,19 +55,26 @@ std::shared_ptr<const Scene> starting_at(const Scene& scene, const Sample& point
   return copy;
 }
 
+/// Whether the slopes of the last points and of those before them agree closely: finer steps would tell nothing new.
+bool settled(const std::vector<Point>& points) {
+  if (std::ssize(points) < 6 * fitted_points) return false;
+  const auto end = points.end();
+  return std::abs(slope_of({end - fitted_points, end}) - slope_of({end - 2 * fitted_points, end - fitted_points})) < 0.01;
+}
+
 }  // namespace
 
 std::vector<OrderScene> order_scenes() {
   std::vector<OrderScene> scenes;
-  scenes.push_back({"unconstrained", laws::unconstrained(), 4.8, {}});
-  scenes.push_back({"holonomic", laws::holonomic_sphere(), 4.8, {}});
-  scenes.push_back({"nonholonomic", laws::nonholonomic(), 4.8, {}});
-  scenes.push_back({"mixed", laws::mixed(), 4.8, {}});
-  scenes.push_back({"affine, driven", laws::driven(), 4.8, {}});
-  scenes.push_back({"forced, mixed", laws::forced(laws::mixed()), 4.8, {}});
+  scenes.push_back({"unconstrained", laws::unconstrained(), 6.0, {}});
+  scenes.push_back({"holonomic", laws::holonomic_sphere(), 6.0, {}});
+  scenes.push_back({"nonholonomic", laws::nonholonomic(), 6.0, {}});
+  scenes.push_back({"mixed", laws::mixed(), 6.0, {}});
+  scenes.push_back({"affine, driven", laws::driven(), 6.0, {}});
+  scenes.push_back({"forced, mixed", laws::forced(laws::mixed()), 6.0, {}});
   const Registry registry = Registry::with_built_ins();
   for (OrderScene& scene : scenes) {
-    const StepGrid grid = fit_steps(0.0, scene.t_end, scene.t_end / 192.0);
+    const StepGrid grid = fit_steps(0.0, scene.t_end, scene.t_end / 240.0);
     end_of(registry, scene.scene, {.method = "type1/gl:6", .step = grid.step}, grid.steps, Momentum::projected,
            scene.reference);
   }
@@ -79,8 +86,8 @@ MeasuredOrder measure_order(const Registry& registry, const OrderScene& scene, I
   const Vector expected = join(scene.reference.q, scene.reference.p);
   std::vector<Point> points;
   MeasuredOrder result{std::nan(""), 0.0, 0.0, {}};
-  for (int half_octave = 0; half_octave <= 20; ++half_octave) {
-    const long steps = std::lround(4.0 * std::pow(2.0, 0.5 * half_octave));
+  for (int quarter_octave = 0; quarter_octave <= 40; ++quarter_octave) {
+    const long steps = std::lround(4.0 * std::pow(2.0, 0.25 * quarter_octave));
     options.step = scene.t_end / static_cast<double>(steps);
     Sample end;
     const std::string failure = end_of(registry, scene.scene, options, steps, momentum, end);
@@ -91,9 +98,16 @@ MeasuredOrder measure_order(const Registry& registry, const OrderScene& scene, I
       continue;
     }
     const double error = (join(end.q, end.p) - expected).lpNorm<Eigen::Infinity>();
-    const bool plateau = !points.empty() && error < 1e-8 && error > 0.8 * points.back().error;
-    if (error < round_off || plateau) break;
+    if (error < round_off) break;
+    const std::size_t known = points.size();
+    if (known >= 2 && error < 1e-8 &&
+        slope_of({points[known - 1], {options.step, error}}) < 0.6 * slope_of({points[known - 2], points[known - 1]})) {
+      // Round-off takes over; it has touched the points close above this one too.
+      std::erase_if(points, [error](const Point& point) { return point.error < 30.0 * error; });
+      break;
+    }
     points.push_back({options.step, error});
+    if (settled(points)) break;
   }
   if (std::ssize(points) < fitted_points) {
     if (result.failure.empty()) result.failure = "too few points above round-off";
