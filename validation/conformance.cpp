@@ -41,10 +41,12 @@ Vector join(const Vector& a, const Vector& b) {
 
 /// The state after a number of steps; throws nothing, returns the failure.
 std::string end_of(const Registry& registry, const std::shared_ptr<const Scene>& scene,
-                   const IntegratorOptions& options, long steps, Momentum momentum, Sample& end) {
+                   const IntegratorOptions& options, long steps, Momentum momentum, Sample& end,
+                   long* solves = nullptr) {
   Integrator integrator(scene, registry, kinsol(), options);
   const RunReport report = run(integrator, steps, momentum, 1, nullptr);
   if (!report.ok()) return report.last.failure;
+  if (solves != nullptr) *solves = integrator.work().solves;
   const SolveReport read = integrator.sample(momentum, end);
   return read.ok() ? "" : std::string("reading the state: ") + describe(read.status);
 }
@@ -84,13 +86,15 @@ std::vector<OrderScene> order_scenes() {
 MeasuredOrder measure_order(const Registry& registry, const OrderScene& scene, IntegratorOptions options,
                             Momentum momentum) {
   const Vector expected = join(scene.reference.q, scene.reference.p);
+  const double claimed = options.order > 0 ? options.order : registry.method(options.method).info.order;
   std::vector<Point> points;
   MeasuredOrder result{std::nan(""), 0.0, 0.0, {}};
   for (int quarter_octave = 0; quarter_octave <= 40; ++quarter_octave) {
     const long steps = std::lround(4.0 * std::pow(2.0, 0.25 * quarter_octave));
     options.step = scene.t_end / static_cast<double>(steps);
     Sample end;
-    const std::string failure = end_of(registry, scene.scene, options, steps, momentum, end);
+    long solves = 0;
+    const std::string failure = end_of(registry, scene.scene, options, steps, momentum, end, &solves);
     if (!failure.empty()) {
       // Coarse steps may be beyond the method; only fine ones count.
       if (options.step < 0.02) result.failure = failure;
@@ -98,13 +102,15 @@ MeasuredOrder measure_order(const Registry& registry, const OrderScene& scene, I
       continue;
     }
     const double error = (join(end.q, end.p) - expected).lpNorm<Eigen::Infinity>();
-    if (error < round_off) break;
-    const std::size_t known = points.size();
-    if (known >= 2 && error < 1e-8 &&
-        slope_of({points[known - 1], {options.step, error}}) < 0.6 * slope_of({points[known - 2], points[known - 1]})) {
-      // Round-off takes over; it has touched the points close above this one too.
-      std::erase_if(points, [error](const Point& point) { return point.error < 30.0 * error; });
-      break;
+    if (error < std::max(round_off, 1e-13 * std::sqrt(static_cast<double>(solves)))) break;
+    if (std::ssize(points) >= fitted_points && error < 1e-9) {
+      std::vector<Point> last(points.end() - fitted_points + 1, points.end());
+      last.push_back({options.step, error});
+      if (slope_of(last) < 0.5 * claimed) {
+        // Round-off takes over; it has touched the points close above this one too.
+        std::erase_if(points, [error](const Point& point) { return point.error < 30.0 * error; });
+        break;
+      }
     }
     points.push_back({options.step, error});
     if (settled(points)) break;

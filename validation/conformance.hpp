@@ -29,8 +29,9 @@ struct MeasuredOrder {
 };
 
 /// Order of q and of the momentum representative in the maximum norm at the end: the slope of log(error) over log(h)
-/// through the four finest of a ladder of steps, four to an octave, that lie above round-off: above 1e-12 and, where the error falls
-/// markedly slower before, above 30 times that.
+/// through the four finest of a ladder of steps, four to an octave, that lie above round-off: above 1e-12 and 1e-13 times the
+/// square root of the solves (it grows like a random walk), and, where the slope
+/// falls below half the claimed order before, above 30 times the error there.
 MeasuredOrder measure_order(const Registry& registry, const OrderScene& scene, IntegratorOptions options,
                             Momentum momentum = Momentum::projected);
 

@@ -1,0 +1,67 @@
+#include <diracstep/validation/order_table.hpp>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace diracstep {
+namespace {
+
+const std::vector<OrderScene>& scenes() {
+  static const std::vector<OrderScene> all = order_scenes();
+  return all;
+}
+
+std::string label(std::string name) {
+  for (char& c : name)
+    if (!std::isalnum(static_cast<unsigned char>(c))) c = '_';
+  return name;
+}
+
+class OrderTable : public ::testing::TestWithParam<TableMethod> {};
+
+TEST_P(OrderTable, ClaimAndMeasurementAgreeOnEveryConstraintClass) {
+  const OrderTableRow row = measure_row(Registry::with_built_ins(), GetParam(), scenes());
+  EXPECT_TRUE(holds(row));
+  for (std::size_t k = 0; k < scenes().size(); ++k)
+    if (!std::isnan(row.measured[k].order)) {
+      EXPECT_NEAR(row.measured[k].order, row.order, 0.2) << scenes()[k].constraint_class;
+    }
+  if (!std::isnan(row.reversal_defect)) {
+    EXPECT_LT(row.reversal_defect, 1e-13);
+  }
+  if (!std::isnan(row.symplecticity_defect)) {
+    EXPECT_LT(row.symplecticity_defect, 1e-10);
+  }
+  if (!std::isnan(row.membership_residual)) {
+    EXPECT_LT(row.membership_residual, 1e-12);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(EveryMethod, OrderTable,
+                         ::testing::ValuesIn(table_methods(Registry::with_built_ins())), [](const auto& test) {
+                           return label(test.param.name) + "_order_" + std::to_string(test.param.order);
+                         });
+
+TEST(OrderTable, AOneSidedRuleForTheRowsIsFoundOut) {
+  const Registry registry = Registry::with_built_ins();
+  for (const OrderScene& scene : scenes()) {
+    if (scene.constraint_class != "nonholonomic") continue;
+    const MeasuredOrder measured =
+        measure_order(registry, scene, {.method = "type1/midpoint", .constraint_rule = StepRule::left});
+    EXPECT_NEAR(measured.order, 1.0, 0.1);
+    EXPECT_FALSE(holds({"type1/midpoint", 2, {measured}, 0.0, 0.0, 0.0}));
+  }
+}
+
+TEST(OrderTable, TheUnprojectedMomentumIsOneOrderLower) {
+  const Registry registry = Registry::with_built_ins();
+  for (const OrderScene& scene : scenes()) {
+    if (scene.constraint_class != "nonholonomic") continue;
+    const MeasuredOrder measured =
+        measure_order(registry, scene, {.method = "type1/midpoint"}, Momentum::plus);
+    EXPECT_NEAR(measured.order, 1.0, 0.1);
+  }
+}
+
+}  // namespace
+}  // namespace diracstep
