@@ -28,17 +28,17 @@ struct MethodInfo {
 /// what the method needs.
 using GeneratingFunctionFactory = std::function<std::unique_ptr<GeneratingFunction>(const Scene&)>;
 
-/// Makes the step of a method that is more than the graph of a generating function between its end points.
+/// Makes the step of a method that has one of its own.
 using StepFactory = std::function<std::unique_ptr<StepProblem>(const Scene&, bool dense)>;
 
 /// A method ready for use.
 struct Method {
   MethodInfo info;
-  GeneratingFunctionFactory make;  ///< empty where the method has a step of its own
-  StepFactory make_step = {};      ///< empty where the step is that of the generating function
+  GeneratingFunctionFactory make;  ///< empty where the method is no generating function of its end points
+  StepFactory make_step = {};      ///< a step of its own; empty where it is that of the generating function
 
   /// The step on a scene, with the method's own rule for Δ^d_Q or another.  Throws Misuse for another rule where the
-  /// method has a step of its own.
+  /// method is no generating function of its end points.
   std::unique_ptr<StepProblem> step(const Scene& scene, bool dense, std::optional<StepRule> rule = {}) const;
 };
 
@@ -55,7 +55,8 @@ class Registry {
   static Registry with_built_ins();
 
   /// Throws Misuse for a name that is taken, or is not of the form typeN/construction with N the type.
-  void add(MethodInfo info, GeneratingFunctionFactory make);
+  /// `make_step`, where given, must solve the step of the generating function; it may do so in other unknowns.
+  void add(MethodInfo info, GeneratingFunctionFactory make, StepFactory make_step = {});
 
   /// Throws Misuse for an unknown name, listing the known ones.
   Method method(const std::string& name) const;
