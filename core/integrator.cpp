@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <diracstep/core/composition.hpp>
+#include <diracstep/core/consistent_start.hpp>
 #include <diracstep/core/errors.hpp>
 #include <diracstep/core/integrator.hpp>
 #include <sstream>
@@ -9,11 +10,13 @@ namespace diracstep {
 
 namespace {
 
-/// Completed, well formed and consistent at its start.
-std::shared_ptr<const Scene> checked(std::shared_ptr<const Scene> scene) {
-  scene = completed(std::move(scene));
-  require_consistent(*scene, scene->start);
-  return scene;
+/// Above this many rows their dependence is not looked for at the start: the test takes full matrices.
+constexpr int most_rows_to_test = 1000;
+
+std::string joined(const std::vector<std::string>& names) {
+  std::string list;
+  for (const std::string& name : names) list += (list.empty() ? "'" : ", '") + name + "'";
+  return list;
 }
 
 void require_step(double step) {
@@ -25,9 +28,42 @@ void require_step(double step) {
 
 }  // namespace
 
+Integrator::Preparation Integrator::prepare(std::shared_ptr<const Scene> given, const IntegratorOptions& options,
+                                           const SolverFactory& solvers) {
+  Preparation result{completed(std::move(given)), {}};
+  auto& scene = result.scene;
+  require_size("scene '" + scene->name + "': the start q", scene->start.q.size(), scene->dimension());
+  if (scene->rows() > 0 && scene->rows() <= most_rows_to_test && scene->start.q.allFinite()) {
+    const std::vector<std::string> dependent = dependent_rows(*scene, scene->start);
+    if (!dependent.empty() && !options.drop_dependent_rows)
+      throw Misuse("scene '" + scene->name + "': rows that depend on others at the start: " + joined(dependent) +
+                   "; remove them, or ask for dependent rows to be dropped");
+    if (!dependent.empty()) {
+      scene = without_rows(*scene, dependent);
+      result.lines.push_back({"dropped rows", joined(dependent), "they depend on others at the start"});
+    }
+  }
+  if (options.project_start) {
+    const ConsistentStart moved = project_start(*scene, scene->start, solvers);
+    auto copy = std::make_shared<Scene>(*scene);
+    copy->start = moved.start;
+    scene = copy;
+    std::ostringstream text;
+    text << "q moved by " << moved.position_moved << ", v by " << moved.velocity_moved;
+    result.lines.push_back({"start", "projected", text.str()});
+  }
+  require_consistent(*scene, scene->start);
+  return result;
+}
+
 Integrator::Integrator(std::shared_ptr<const Scene> scene, const Registry& registry, SolverFactory solvers,
                        IntegratorOptions options)
-    : scene_(checked(std::move(scene))),
+    : Integrator(prepare(std::move(scene), options, solvers), registry, solvers, options) {}
+
+Integrator::Integrator(Preparation preparation, const Registry& registry, const SolverFactory& solvers,
+                       IntegratorOptions options)
+    : scene_(std::move(preparation.scene)),
+      preparation_(std::move(preparation.lines)),
       options_(std::move(options)),
       method_(registry.method(options_.method)),
       dense_(scene_->dimension() + scene_->rows() <= options_.dense_limit),
@@ -205,7 +241,7 @@ SolveReport Integrator::sample(Momentum momentum, Sample& sample) {
 std::vector<PlanLine> Integrator::plan() const {
   const Part& part = parts_.front();
   const int m = scene_->rows(), size = part.problem->size();
-  std::vector<PlanLine> lines;
+  std::vector<PlanLine> lines = preparation_;
   lines.push_back({"step", method_.info.name, method_.info.summary});
   lines.push_back({"unknowns", part.problem->unknowns(),
                    part.solver ? "one nonlinear system in each solve" : "the graph is solved for its end"});

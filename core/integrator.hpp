@@ -28,6 +28,8 @@ struct IntegratorOptions {
   double step = 0.0;  ///< step size, may be negative; must be given
   std::optional<StepRule> constraint_rule = std::nullopt;  ///< instead of the method's own
   int dense_limit = 40;  ///< systems of up to this many unknowns use full matrices
+  bool project_start = false;         ///< move an inconsistent start onto the constraints instead of refusing it
+  bool drop_dependent_rows = false;   ///< leave out rows that depend on others at the start instead of refusing
 };
 
 /// What one step did.  A failed step leaves the state as it was.
@@ -70,7 +72,8 @@ struct PlanLine {
 /// different threads do not meet.  The scene's data are planned once, here; a step allocates nothing of its own.
 class Integrator {
  public:
-  /// Throws Misuse for a bad scene, start, method, order or step.
+  /// Throws Misuse for a bad scene, start, method, order or step; for an inconsistent start, and for rows that depend on
+  /// others there, unless the options say otherwise.  What was moved or dropped stands in plan().
   Integrator(std::shared_ptr<const Scene> scene, const Registry& registry, SolverFactory solvers,
              IntegratorOptions options);
 
@@ -106,6 +109,15 @@ class Integrator {
     Predictor predictor;
   };
 
+  struct Preparation {
+    std::shared_ptr<const Scene> scene;
+    std::vector<PlanLine> lines;
+  };
+  static Preparation prepare(std::shared_ptr<const Scene> scene, const IntegratorOptions& options,
+                             const SolverFactory& solvers);
+  Integrator(Preparation preparation, const Registry& registry, const SolverFactory& solvers,
+             IntegratorOptions options);
+
   Part make_part(const Method& method, bool mirror_rule, const SolverFactory& solvers) const;
   void plan_stages(const Registry& registry, const SolverFactory& solvers);
   SolveReport solve_stage(std::size_t stage, double t, const Vector& q, const Vector& p);
@@ -113,6 +125,7 @@ class Integrator {
   StepReport failed(const SolveReport& report, const StepProblem& problem, double time) const;
 
   std::shared_ptr<const Scene> scene_;
+  std::vector<PlanLine> preparation_;
   IntegratorOptions options_;
   Method method_;
   bool dense_;

@@ -1,0 +1,223 @@
+#include <Eigen/QR>
+#include <algorithm>
+#include <diracstep/core/consistent_start.hpp>
+#include <diracstep/core/constraint_distribution.hpp>
+#include <diracstep/core/errors.hpp>
+#include <diracstep/core/saddle_point.hpp>
+#include <sstream>
+
+namespace diracstep {
+
+namespace {
+
+ConstraintBlocks holonomic_blocks(const Scene& scene) {
+  ConstraintBlocks blocks;
+  std::ranges::copy_if(scene.constraints, std::back_inserter(blocks),
+                       [](const auto& block) { return block->holonomic(); });
+  return blocks;
+}
+
+/// Unknowns (q, ν):   q − q̂ + Dφ(q)ᵀν = 0,   φ(t,q) = 0: the nearest point of the constraint, full matrices.
+class NearestPointProblem final : public NonlinearProblem {
+ public:
+  NearestPointProblem(ConstraintBlocks blocks, double t, const Vector& given)
+      : blocks_(std::move(blocks)),
+        rows_(blocks_, static_cast<int>(given.size())),
+        t_(t),
+        given_(given),
+        n_(static_cast<int>(given.size())),
+        m_(rows_.rows()),
+        pattern_(SparsityPattern::dense(n_ + m_, n_ + m_)),
+        residual_blocks_{{"distance", n_, 1.0 + given.lpNorm<Eigen::Infinity>()}, {"constraint", m_, 1.0}} {}
+
+  int size() const override { return n_ + m_; }
+  const SparsityPattern& pattern() const override { return pattern_; }
+  std::span<const ResidualBlock> blocks() const override { return residual_blocks_; }
+
+  void residual(ConstVectorRef x, VectorRef f) override {
+    rows_.evaluate(t_, x.head(n_));
+    f.head(n_) = x.head(n_) - given_;
+    rows_.add_annihilator(x.tail(m_), f.head(n_));
+    int row = n_;
+    for (const auto& block : blocks_) {
+      block->position(t_, x.head(n_), f.segment(row, block->rows()));
+      row += block->rows();
+    }
+  }
+
+  void jacobian(ConstVectorRef x, VectorRef values) override {
+    rows_.evaluate(t_, x.head(n_));
+    auto j = values.reshaped(size(), size());
+    j.setZero();
+    j.topLeftCorner(n_, n_).setIdentity();
+    int row = n_;
+    for (const auto& block : blocks_) {
+      Vector curvature(block->curvature_pattern().nonzeros());
+      block->annihilator_derivative(t_, x.head(n_), x.segment(row, block->rows()), curvature);
+      Eigen::Index k = 0;
+      for (const auto& [i, c] : block->curvature_pattern().entries()) j(i, c) += curvature[k++];
+      row += block->rows();
+    }
+    Eigen::Index k = 0;
+    for (const auto& [i, c] : rows_.pattern().entries()) {
+      j(n_ + i, c) = j(c, n_ + i) = rows_.coefficients()[k];
+      ++k;
+    }
+  }
+
+ private:
+  ConstraintBlocks blocks_;
+  ConstraintsAtPoint rows_;
+  double t_;
+  Vector given_;
+  int n_, m_;
+  SparsityPattern pattern_;
+  std::vector<ResidualBlock> residual_blocks_;
+};
+
+[[noreturn]] void throw_not_found(const Scene& scene, const char* what, const SolveReport& report) {
+  std::ostringstream message;
+  message << "scene '" << scene.name << "': the start cannot be projected: " << what << ": "
+          << describe(report.status) << " after " << report.iterations << " iterations, residuals "
+          << report.residual_norms[0] << " and " << report.residual_norms[1];
+  throw Misuse(message.str());
+}
+
+/// Some rows of a block, in order.
+class RowSubset final : public ConstraintRows {
+ public:
+  RowSubset(std::shared_ptr<const ConstraintRows> block, std::vector<int> kept)
+      : ConstraintRows(block->holonomic(), subset(block->pattern(), kept), block->curvature_pattern(),
+                       names_of(*block, kept)),
+        block_(std::move(block)),
+        kept_(std::move(kept)) {
+    int k = 0;
+    for (const auto& [row, column] : block_->pattern().entries()) {
+      const auto found = std::ranges::find(kept_, row);
+      if (found != kept_.end()) places_.push_back(k);
+      ++k;
+    }
+  }
+
+  void position(double t, ConstVectorRef q, VectorRef phi) const override {
+    Vector all(block_->rows());
+    block_->position(t, q, all);
+    take_rows(all, phi);
+  }
+  void coefficients(double t, ConstVectorRef q, VectorRef a, VectorRef b) const override {
+    Vector all(block_->pattern().nonzeros()), offset(block_->rows());
+    block_->coefficients(t, q, all, offset);
+    take_values(all, a);
+    take_rows(offset, b);
+  }
+  void derivative(double t, ConstVectorRef q, ConstVectorRef w, double s, VectorRef d) const override {
+    Vector all(block_->pattern().nonzeros());
+    block_->derivative(t, q, w, s, all);
+    take_values(all, d);
+  }
+  void time_derivative(double t, ConstVectorRef q, ConstVectorRef v, VectorRef d) const override {
+    Vector all(block_->rows());
+    block_->time_derivative(t, q, v, all);
+    take_rows(all, d);
+  }
+  void annihilator_derivative(double t, ConstVectorRef q, ConstVectorRef lambda, VectorRef d) const override {
+    Vector all = Vector::Zero(block_->rows());
+    for (std::size_t r = 0; r < kept_.size(); ++r) all[kept_[r]] = lambda[static_cast<Eigen::Index>(r)];
+    block_->annihilator_derivative(t, q, all, d);
+  }
+
+ private:
+  static SparsityPattern subset(const SparsityPattern& pattern, const std::vector<int>& kept) {
+    std::vector<std::pair<int, int>> entries;
+    for (const auto& [row, column] : pattern.entries()) {
+      const auto found = std::ranges::find(kept, row);
+      if (found != kept.end()) entries.emplace_back(static_cast<int>(found - kept.begin()), column);
+    }
+    return {static_cast<int>(kept.size()), pattern.columns(), entries};
+  }
+  static std::vector<std::string> names_of(const ConstraintRows& block, const std::vector<int>& kept) {
+    std::vector<std::string> names;
+    for (const int row : kept) names.push_back(block.names()[static_cast<std::size_t>(row)]);
+    return names;
+  }
+  void take_rows(const Vector& all, VectorRef out) const {
+    for (std::size_t r = 0; r < kept_.size(); ++r) out[static_cast<Eigen::Index>(r)] = all[kept_[r]];
+  }
+  void take_values(const Vector& all, VectorRef out) const {
+    for (std::size_t k = 0; k < places_.size(); ++k) out[static_cast<Eigen::Index>(k)] = all[places_[k]];
+  }
+
+  std::shared_ptr<const ConstraintRows> block_;
+  std::vector<int> kept_;    ///< ascending, so the entries keep their order
+  std::vector<int> places_;  ///< values of the kept rows among all
+};
+
+}  // namespace
+
+ConsistentStart project_start(const Scene& scene, const Start& start, const SolverFactory& solvers) {
+  require_size("the start q", start.q.size(), scene.dimension());
+  require_size("the start v", start.v.size(), scene.dimension());
+  ConsistentStart result{start, 0.0, 0.0};
+  const Eigen::Index n = start.q.size();
+  const ConstraintBlocks holonomic = holonomic_blocks(scene);
+  if (!holonomic.empty()) {
+    NearestPointProblem problem(holonomic, start.time, start.q);
+    Vector x = Vector::Zero(problem.size());
+    x.head(n) = start.q;
+    const SolveReport report = solvers(problem)->solve(x);
+    if (!report.ok()) throw_not_found(scene, "no nearest point of the holonomic rows", report);
+    result.start.q = x.head(n);
+    result.position_moved = (result.start.q - start.q).norm();
+  }
+  if (scene.rows() == 0) return result;
+  Vector lq(n), p(n), x = Vector::Zero(n + scene.rows());
+  scene.lagrangian->gradient(start.time, result.start.q, start.v, lq, p);
+  VelocityProblem problem(scene, true);
+  problem.begin(start.time, result.start.q, p);
+  x.head(n) = start.v;
+  const SolveReport report = solvers(problem)->solve(x);
+  if (!report.ok()) throw_not_found(scene, "no nearest velocity of the distribution", report);
+  result.start.v = x.head(n);
+  result.velocity_moved = (result.start.v - start.v).norm();
+  return result;
+}
+
+std::vector<std::string> dependent_rows(const Scene& scene, const Start& start, double tolerance) {
+  const int m = scene.rows();
+  if (m == 0) return {};
+  ConstraintsAtPoint rows(scene.constraints, scene.dimension());
+  rows.evaluate(start.time, start.q);
+  Eigen::MatrixXd one_forms = Eigen::MatrixXd::Zero(scene.dimension(), m);
+  Eigen::Index k = 0;
+  for (const auto& [row, column] : rows.pattern().entries()) one_forms(column, row) = rows.coefficients()[k++];
+  for (int r = 0; r < m; ++r) {
+    const double size = one_forms.col(r).norm();
+    if (size > 0.0) one_forms.col(r) /= size;  // rows may come in any units
+  }
+  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr;
+  qr.setThreshold(tolerance);
+  qr.compute(one_forms);
+  const auto& order = qr.colsPermutation().indices();
+  const std::vector<std::string> names = scene.row_names();
+  std::vector<std::string> dependent;
+  for (Eigen::Index r = qr.rank(); r < m; ++r) dependent.push_back(names[static_cast<std::size_t>(order[r])]);
+  std::ranges::sort(dependent);
+  return dependent;
+}
+
+std::shared_ptr<const Scene> without_rows(const Scene& scene, const std::vector<std::string>& names) {
+  auto copy = std::make_shared<Scene>(scene);
+  copy->constraints.clear();
+  for (const auto& block : scene.constraints) {
+    std::vector<int> kept;
+    for (int r = 0; r < block->rows(); ++r)
+      if (std::ranges::find(names, block->names()[static_cast<std::size_t>(r)]) == names.end()) kept.push_back(r);
+    if (static_cast<int>(kept.size()) == block->rows())
+      copy->constraints.push_back(block);
+    else if (!kept.empty())
+      copy->constraints.push_back(std::make_shared<const RowSubset>(block, kept));
+  }
+  return copy;
+}
+
+}  // namespace diracstep
