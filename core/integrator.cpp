@@ -68,10 +68,15 @@ Integrator::Integrator(Preparation preparation, const Registry& registry, const 
       method_(registry.method(options_.method)),
       dense_(scene_->dimension() + scene_->rows() <= options_.dense_limit),
       velocity_problem_(*scene_, dense_),
-      acceleration_problem_(*scene_, dense_),
-      velocity_solver_(solvers(velocity_problem_)),
-      acceleration_solver_(solvers(acceleration_problem_)) {
+      acceleration_problem_(*scene_, dense_) {
   require_step(options_.step);
+  if (scene_->lagrangian->structure().y_hessian_zero) {
+    phase_space_velocity_problem_.emplace(*scene_, dense_);
+    velocity_solver_ = solvers(*phase_space_velocity_problem_);
+  } else {
+    velocity_solver_ = solvers(velocity_problem_);
+    acceleration_solver_ = solvers(acceleration_problem_);
+  }
   plan_stages(registry, solvers);
   velocity_unknowns_.setZero(velocity_problem_.size());
   acceleration_unknowns_.setZero(acceleration_problem_.size());
@@ -81,7 +86,7 @@ Integrator::Integrator(Preparation preparation, const Registry& registry, const 
 Integrator::Part Integrator::make_part(const Method& method, bool mirror_rule, const SolverFactory& solvers) const {
   std::optional<StepRule> rule = options_.constraint_rule;
   if (rule && mirror_rule) rule = mirrored(*rule);
-  Part part{method.step(*scene_, dense_, rule), nullptr};
+  Part part{method.step(*scene_, dense_, rule, options_.force_degenerate), nullptr};
   if (part.problem->size() > 0) part.solver = solvers(*part.problem);
   return part;
 }
@@ -202,17 +207,27 @@ StepReport Integrator::step() {
   return {total, work_.steps++, start, {}};
 }
 
-SolveReport Integrator::sample(Momentum momentum, Sample& sample) {
-  const Eigen::Index n = q_.size(), m = acceleration_unknowns_.size() - n;
-  const double t = time();
+/// v, and the forces of the rows into acceleration_unknowns_.
+SolveReport Integrator::solve_velocity(double t) {
+  const Eigen::Index n = q_.size();
+  if (phase_space_velocity_problem_) {
+    phase_space_velocity_problem_->begin(t, q_);
+    return velocity_solver_->solve(v_);
+  }
   velocity_problem_.begin(t, q_, p_);
   velocity_unknowns_.head(n) = v_;
-  velocity_unknowns_.tail(m).setZero();
-  SolveReport report = velocity_solver_->solve(velocity_unknowns_);
+  velocity_unknowns_.tail(velocity_unknowns_.size() - n).setZero();
+  const SolveReport report = velocity_solver_->solve(velocity_unknowns_);
   if (!report.ok()) return report;
   v_ = velocity_unknowns_.head(n);
   acceleration_problem_.begin(t, q_, v_);
-  report = acceleration_solver_->solve(acceleration_unknowns_);
+  return acceleration_solver_->solve(acceleration_unknowns_);
+}
+
+SolveReport Integrator::sample(Momentum momentum, Sample& sample) {
+  const Eigen::Index n = q_.size(), m = acceleration_unknowns_.size() - n;
+  const double t = time();
+  SolveReport report = solve_velocity(t);
   if (!report.ok()) return report;
 
   sample.time = t;

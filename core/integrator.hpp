@@ -1,6 +1,7 @@
 #pragma once
 
 #include <diracstep/core/nonlinear_solver.hpp>
+#include <diracstep/core/phase_space_step.hpp>
 #include <diracstep/core/predictor.hpp>
 #include <diracstep/core/registry.hpp>
 #include <diracstep/core/saddle_point.hpp>
@@ -28,6 +29,7 @@ struct IntegratorOptions {
   double step = 0.0;  ///< step size, may be negative; must be given
   std::optional<StepRule> constraint_rule = std::nullopt;  ///< instead of the method's own
   int dense_limit = 40;  ///< systems of up to this many unknowns use full matrices
+  bool force_degenerate = false;      ///< use a method on a degenerate scene that is known to be unstable there
   bool project_start = false;         ///< move an inconsistent start onto the constraints instead of refusing it
   bool drop_dependent_rows = false;   ///< leave out rows that depend on others at the start instead of refusing
 };
@@ -120,6 +122,7 @@ class Integrator {
 
   Part make_part(const Method& method, bool mirror_rule, const SolverFactory& solvers) const;
   void plan_stages(const Registry& registry, const SolverFactory& solvers);
+  SolveReport solve_velocity(double t);
   SolveReport solve_stage(std::size_t stage, double t, const Vector& q, const Vector& p);
   void count(const SolveReport& report);
   StepReport failed(const SolveReport& report, const StepProblem& problem, double time) const;
@@ -133,6 +136,7 @@ class Integrator {
   std::vector<Stage> stages_;
   VelocityProblem velocity_problem_;
   AccelerationProblem acceleration_problem_;
+  std::optional<PhaseSpaceVelocityProblem> phase_space_velocity_problem_;  ///< instead of both, where L is linear in v
   std::unique_ptr<NonlinearSolver> velocity_solver_;
   std::unique_ptr<NonlinearSolver> acceleration_solver_;
 

@@ -17,6 +17,7 @@ struct PhaseStructure {
   bool y_hessian_constant = false;  ///< ∂²f/∂y² depends on nothing
   bool y_hessian_diagonal = false;
   bool quadratic = false;           ///< every second derivative is constant
+  bool y_hessian_zero = false;      ///< f is linear in y: a phase-space Lagrangian
 };
 
 /// A smooth function f(t, x, y) of two columns of n numbers, with its first and second derivatives.
@@ -98,13 +99,14 @@ PhaseStructure structure_of(const F& f) {
   }
   try {
     const Scalar s = call_with_time(f, Scalar(), x, y);
-    PhaseStructure structure{true, true, true, true};
+    PhaseStructure structure{true, true, true, true, true};
     for (std::size_t i = 0; i < 2 * N; ++i)
       for (std::size_t j = 0; j < 2 * N; ++j) {
         const bool xy = i < N && j >= N, yy = i >= N && j >= N;
         if (xy && s.second_derivative(i, j)) structure.separable = false;
         if (yy && s.second_derivative_varies(i, j)) structure.y_hessian_constant = false;
         if (yy && i != j && s.second_derivative(i, j)) structure.y_hessian_diagonal = false;
+        if (yy && s.second_derivative(i, j)) structure.y_hessian_zero = false;
         if (s.second_derivative_varies(i, j)) structure.quadratic = false;
       }
     if constexpr (takes_time<F, std::array<double, N>, std::array<double, N>>) {

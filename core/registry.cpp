@@ -5,6 +5,7 @@
 #include <diracstep/core/generating_functions/quadrature.hpp>
 #include <diracstep/core/gauss_lobatto_step.hpp>
 #include <diracstep/core/gauss_lobatto_tableau.hpp>
+#include <diracstep/core/phase_space_step.hpp>
 #include <diracstep/core/registry.hpp>
 #include <regex>
 
@@ -20,7 +21,8 @@ void add_quadrature(Registry& registry, StepRule rule, int order, std::string su
   if (rule == StepRule::midpoint) step = [](const Scene& scene, bool dense) { return gauss_lobatto_step(1, scene, dense); };
   registry.add({std::string("type1/") + name(rule), GeneratingType::one, order, order == 2, rule,
                 std::move(summary), std::move(adjoint)},
-               [rule](const Scene& scene) { return quadrature_lagrangian(scene.lagrangian, rule); }, std::move(step));
+               [rule](const Scene& scene) { return quadrature_lagrangian(scene.lagrangian, rule); }, std::move(step),
+               rule == StepRule::midpoint ? 1 : 0);
 }
 
 /// "typeN/word(inner)" taken apart.
@@ -45,12 +47,18 @@ std::optional<Method> gauss_lobatto_method(const std::string& name) {
   gauss_lobatto_tableau(s);  // throws for a number of stages that is not allowed
   const MethodInfo info{name, static_cast<GeneratingType>(std::stoi(match[1])), 2 * s, true, StepRule::midpoint,
                         "Gauss-Lobatto Dirac step, " + std::to_string(s) + (s == 1 ? " stage" : " stages")};
-  return Method{info, nullptr, [s](const Scene& scene, bool dense) { return gauss_lobatto_step(s, scene, dense); }};
+  return Method{info, nullptr, [s](const Scene& scene, bool dense) { return gauss_lobatto_step(s, scene, dense); }, s};
 }
 
 }  // namespace
 
-std::unique_ptr<StepProblem> Method::step(const Scene& scene, bool dense, std::optional<StepRule> rule) const {
+std::unique_ptr<StepProblem> Method::step(const Scene& scene, bool dense, std::optional<StepRule> rule,
+                                          bool force_degenerate) const {
+  if (scene.lagrangian->structure().y_hessian_zero && !force_degenerate) {
+    if (stages > 0) return phase_space_step(stages, scene, dense);
+    throw Misuse("scene '" + scene.name + "': its Lagrangian is linear in v, where '" + info.name +
+                 "' is unstable or leaves p = ∂L/∂v; use type1/midpoint or typeN/gl:S");
+  }
   const bool own_rule = !rule || *rule == info.constraint_rule;
   if (make_step && own_rule) return make_step(scene, dense);
   if (make) return dirac_step(make(scene), scene, rule.value_or(info.constraint_rule), dense);
@@ -72,13 +80,13 @@ Registry Registry::with_built_ins() {
   return registry;
 }
 
-void Registry::add(MethodInfo info, GeneratingFunctionFactory make, StepFactory make_step) {
+void Registry::add(MethodInfo info, GeneratingFunctionFactory make, StepFactory make_step, int stages) {
   const std::string name = info.name;
   const std::string prefix = prefix_of(info.type);
   const bool well_formed = std::regex_match(name, std::regex("type[1-4]/[A-Za-z0-9_:.-]+"));
   if (!well_formed || !name.starts_with(prefix))
     throw Misuse("method name '" + name + "' is not of the form " + prefix + "construction");
-  if (!methods_.emplace(name, Method{std::move(info), std::move(make), std::move(make_step)}).second)
+  if (!methods_.emplace(name, Method{std::move(info), std::move(make), std::move(make_step), stages}).second)
     throw Misuse("method '" + name + "' is already registered");
 }
 

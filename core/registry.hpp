@@ -36,10 +36,14 @@ struct Method {
   MethodInfo info;
   GeneratingFunctionFactory make;  ///< empty where the method is no generating function of its end points
   StepFactory make_step = {};      ///< a step of its own; empty where it is that of the generating function
+  int stages = 0;                  ///< S for a step GL(S); 0 for others
 
   /// The step on a scene, with the method's own rule for Δ^d_Q or another.  Throws Misuse for another rule where the
-  /// method is no generating function of its end points.
-  std::unique_ptr<StepProblem> step(const Scene& scene, bool dense, std::optional<StepRule> rule = {}) const;
+  /// method is no generating function of its end points, and for a degenerate scene (a Lagrangian linear in v) where the
+  /// method is not one of the Gauss-Lobatto family, unless `force_degenerate`: one-sided and trapezoidal rules are
+  /// unstable there.
+  std::unique_ptr<StepProblem> step(const Scene& scene, bool dense, std::optional<StepRule> rule = {},
+                                    bool force_degenerate = false) const;
 };
 
 /// Methods by name.  A registry is a value: nothing is global.
@@ -55,8 +59,9 @@ class Registry {
   static Registry with_built_ins();
 
   /// Throws Misuse for a name that is taken, or is not of the form typeN/construction with N the type.
-  /// `make_step`, where given, must solve the step of the generating function; it may do so in other unknowns.
-  void add(MethodInfo info, GeneratingFunctionFactory make, StepFactory make_step = {});
+  /// `make_step`, where given, must solve the step of the generating function; it may do so in other unknowns,
+  /// as GL(`stages`) does.
+  void add(MethodInfo info, GeneratingFunctionFactory make, StepFactory make_step = {}, int stages = 0);
 
   /// Throws Misuse for an unknown name, listing the known ones.
   Method method(const std::string& name) const;

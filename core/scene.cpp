@@ -63,6 +63,11 @@ std::shared_ptr<const Scene> completed(std::shared_ptr<const Scene> scene) {
   if (!scene) throw Misuse("no scene was given");
   require_well_formed(*scene);
   const Start& start = scene->start;
+  if (scene->lagrangian && start.v.size() == 0 && scene->lagrangian->structure().y_hessian_zero) {
+    auto with_velocity = std::make_shared<Scene>(*scene);
+    with_velocity->start.v = Vector::Zero(scene->dimension());  // the motion has but one velocity at each q
+    return with_velocity;
+  }
   const bool from_momentum = start.v.size() == 0 && start.p.size() > 0;
   if (scene->lagrangian && !from_momentum) return scene;
   const std::string prefix = "scene '" + scene->name + "': ";
