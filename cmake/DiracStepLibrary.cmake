@@ -4,6 +4,8 @@ function(diracstep_compile_options target)
   target_compile_options(${target} PRIVATE
     -Wall -Wextra -Wpedantic -Wshadow
     $<$<BOOL:${DIRACSTEP_WARNINGS_AS_ERRORS}>:-Werror>
+    # GCC 12 warns of overlapping copies in std::string concatenation where there are none
+    $<$<AND:$<CXX_COMPILER_ID:GNU>,$<VERSION_LESS:$<CXX_COMPILER_VERSION>,13>>:-Wno-restrict>
     # a*b+c is never fused: machines with and without FMA give the same bits
     -ffp-contract=off)
 endfunction()
@@ -42,5 +44,5 @@ function(diracstep_library folder)
   install(EXPORT diracstep_${folder} NAMESPACE DiracStep:: FILE DiracStep-${folder}.cmake
     DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/DiracStep)
   install(DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR}/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/diracstep/${folder}
-    FILES_MATCHING PATTERN *.hpp)
+    FILES_MATCHING PATTERN *.hpp PATTERN command EXCLUDE)  # the command's own parts are no interface
 endfunction()

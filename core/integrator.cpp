@@ -207,38 +207,38 @@ StepReport Integrator::step() {
   return {total, work_.steps++, start, {}};
 }
 
-/// v, and the forces of the rows into acceleration_unknowns_.
-SolveReport Integrator::solve_velocity(double t) {
+/// v, and the forces of the rows into acceleration_unknowns_.  Reading leaves no trace in the stepping: v_ stays.
+SolveReport Integrator::solve_velocity(double t, Vector& v) {
   const Eigen::Index n = q_.size();
   if (phase_space_velocity_problem_) {
     phase_space_velocity_problem_->begin(t, q_);
-    return velocity_solver_->solve(v_);
+    v = v_;
+    return velocity_solver_->solve(v);
   }
   velocity_problem_.begin(t, q_, p_);
   velocity_unknowns_.head(n) = v_;
   velocity_unknowns_.tail(velocity_unknowns_.size() - n).setZero();
   const SolveReport report = velocity_solver_->solve(velocity_unknowns_);
   if (!report.ok()) return report;
-  v_ = velocity_unknowns_.head(n);
-  acceleration_problem_.begin(t, q_, v_);
+  v = velocity_unknowns_.head(n);
+  acceleration_problem_.begin(t, q_, v);
   return acceleration_solver_->solve(acceleration_unknowns_);
 }
 
 SolveReport Integrator::sample(Momentum momentum, Sample& sample) {
   const Eigen::Index n = q_.size(), m = acceleration_unknowns_.size() - n;
   const double t = time();
-  SolveReport report = solve_velocity(t);
+  SolveReport report = solve_velocity(t, sample.v);
   if (!report.ok()) return report;
 
   sample.time = t;
   sample.q = q_;
-  sample.v = v_;
   sample.lambda = acceleration_unknowns_.tail(m);
-  sample.energy = scene_->energy(t, q_, v_);
+  sample.energy = scene_->energy(t, q_, sample.v);
   sample.p = p_;
   if (momentum == Momentum::projected) {
     q_next_.resize(n);
-    scene_->lagrangian->gradient(t, q_, v_, q_next_, sample.p);
+    scene_->lagrangian->gradient(t, q_, sample.v, q_next_, sample.p);
   } else if (momentum == Momentum::minus && m > 0) {
     if (!first_stage_solved_) {
       report = solve_stage(0, t, q_, p_);

@@ -122,7 +122,7 @@ class Integrator {
 
   Part make_part(const Method& method, bool mirror_rule, const SolverFactory& solvers) const;
   void plan_stages(const Registry& registry, const SolverFactory& solvers);
-  SolveReport solve_velocity(double t);
+  SolveReport solve_velocity(double t, Vector& v);
   SolveReport solve_stage(std::size_t stage, double t, const Vector& q, const Vector& p);
   void count(const SolveReport& report);
   StepReport failed(const SolveReport& report, const StepProblem& problem, double time) const;

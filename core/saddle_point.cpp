@@ -52,6 +52,15 @@ void SaddlePointProblem::set_scales(double momentum, double velocity) {
   blocks_[1].scale = scale > 0.0 && std::isfinite(scale) ? scale : 1.0;
 }
 
+void SaddlePointProblem::raise_scales(double momentum, ConstVectorRef x) {
+  const double a = m_ > 0 ? rows_.coefficients().lpNorm<Eigen::Infinity>() : 0.0;
+  if (m_ > 0) momentum = std::max(momentum, a * x.tail(m_).lpNorm<Eigen::Infinity>());
+  if (std::isfinite(momentum)) blocks_[0].scale = std::max(blocks_[0].scale, momentum);
+  if (m_ == 0) return;
+  const double velocity = a * x.head(n_).lpNorm<Eigen::Infinity>();
+  if (std::isfinite(velocity)) blocks_[1].scale = std::max(blocks_[1].scale, velocity);
+}
+
 void VelocityProblem::begin(double t, ConstVectorRef q, ConstVectorRef p) {
   move_to(t, q);
   p_ = p;
@@ -62,6 +71,7 @@ void VelocityProblem::residual(ConstVectorRef x, VectorRef f) {
   const auto v = x.head(n_);
   scene_.lagrangian->gradient(t_, q_, v, lq_, lv_);
   f.head(n_) = lv_ - p_;
+  raise_scales(lv_.lpNorm<Eigen::Infinity>(), x);
   if (m_ == 0) return;
   rows_.add_annihilator(x.tail(m_), f.head(n_), -1.0);
   rows_.velocity_residual(v, f.tail(m_));
@@ -95,8 +105,10 @@ void AccelerationProblem::begin(double t, ConstVectorRef q, ConstVectorRef v) {
 }
 
 void AccelerationProblem::residual(ConstVectorRef x, VectorRef f) {
-  f.head(n_) = -known_force_;
+  f.head(n_).setZero();
   scene_.lagrangian->pattern().multiply_add(lvv_.data(), x.data(), f.data());
+  raise_scales(f.head(n_).lpNorm<Eigen::Infinity>(), x);
+  f.head(n_) -= known_force_;
   if (m_ == 0) return;
   rows_.add_annihilator(x.tail(m_), f.head(n_), -1.0);
   f.tail(m_) = known_rate_;

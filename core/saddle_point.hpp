@@ -27,6 +27,8 @@ class SaddlePointProblem : public NonlinearProblem {
   /// The saddle-point matrix with ∂²L/∂v² taken at v.
   void assemble(ConstVectorRef v, VectorRef values);
   void set_scales(double momentum, double velocity);
+  /// The scales cover the terms at x as well: ∂²L/∂v² or ∂L/∂v of size `momentum`, and A times both parts of x.
+  void raise_scales(double momentum, ConstVectorRef x);
 
   const Scene& scene_;
   int n_;

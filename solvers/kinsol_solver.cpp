@@ -12,9 +12,14 @@ namespace {
 
 using detail::require;
 
-/// KINSOL around our own direct linear solver.  The Jacobian's values live in `values_`; the SUNMatrix that KINSOL
-/// carries around is an empty shell, and the solver's `setup` factors `values_`.  Unlike the linear solvers that
-/// come with SUNDIALS, this one keeps its symbolic work from one call of KINSol to the next.
+/// KINSOL measures a Newton step in units of the guess, which may be next to zero.
+constexpr double no_limit = 1e100;
+/// A residual of so many tolerances is round-off.
+constexpr double round_off = 16.0;
+
+/// KINSOL around our own direct linear solver.  The Jacobian's values live in `values_`; the SUNMatrix that
+/// KINSOL carries around is an empty shell, and the solver's `setup` factors `values_`.  Unlike the linear
+/// solvers that come with SUNDIALS, this one keeps its symbolic work from one call of KINSol to the next.
 class KinsolSolver final : public NonlinearSolver {
  public:
   KinsolSolver(NonlinearProblem& problem, KinsolOptions options)
@@ -37,20 +42,16 @@ class KinsolSolver final : public NonlinearSolver {
     require(KINSetNumMaxIters(memory(), options.max_iterations), "KINSetNumMaxIters");
     require(KINSetFuncNormTol(memory(), options.tolerance), "KINSetFuncNormTol");
     require(KINSetScaledStepTol(memory(), options.step_tolerance), "KINSetScaledStepTol");
-    require(KINSetMaxNewtonStep(memory(), 1e10 * std::sqrt(static_cast<double>(size))), "KINSetMaxNewtonStep");
+    require(KINSetMaxNewtonStep(memory(), no_limit), "KINSetMaxNewtonStep");
   }
 
   SolveReport solve(VectorRef x) override {
     report_ = {};
     guess_ = x;
-    set_scales(x);
+    set_scales();
     attempt(KIN_NONE);
-    if (!report_.ok()) {
-      N_VGetArrayPointer(x_.get());
-      Vector::Map(N_VGetArrayPointer(x_.get()), x.size()) = guess_;
-      attempt(KIN_LINESEARCH);
-    }
-    x = Vector::Map(N_VGetArrayPointer(x_.get()), x.size());
+    if (!report_.ok()) attempt(KIN_LINESEARCH);
+    x = unknowns();
     return report_;
   }
 
@@ -59,15 +60,18 @@ class KinsolSolver final : public NonlinearSolver {
  private:
   void* memory() const { return kinsol_.get(); }
 
+  Eigen::Map<Vector> unknowns() const { return {N_VGetArrayPointer(x_.get()), last_residual_.size()}; }
+
+  /// From the guess to a status.
   void attempt(int strategy) {
-    singular_ = not_finite_ = false;
-    const int code =
-        KINSol(memory(), x_.get(), strategy, unknown_scale_.get(), residual_scale_.get());
-    if (exception_) std::rethrow_exception(std::exchange(exception_, nullptr));
-    long iterations = 0;
-    KINGetNumNonlinSolvIters(memory(), &iterations);
-    report_.iterations += static_cast<int>(iterations);
-    const double norm = measure_residual();
+    unknowns() = guess_;
+    int code = run(strategy);
+    double norm = measure_residual();
+    // KINSOL ends where its steps are small beside the unknowns, which may be far from the origin or of
+    // different sizes; it goes on for as long as the residual falls.
+    while (code == KIN_STEP_LT_STPTOL && norm > round_off * options_.tolerance &&
+           report_.iterations < options_.max_iterations)
+      if (!improve(strategy, code, norm)) break;
     const bool converged = code == KIN_SUCCESS || code == KIN_INITIAL_GUESS_OK;
     // Other codes, KIN_STEP_LT_STPTOL above all, come at the round-off floor as well as far from a solution.
     if (converged || norm <= options_.accept)
@@ -78,6 +82,32 @@ class KinsolSolver final : public NonlinearSolver {
       report_.status = SolveStatus::not_finite;
     else
       report_.status = SolveStatus::no_convergence;
+  }
+
+  /// Goes on from the last point and keeps the better one; false where the residual does not halve.
+  bool improve(int strategy, int& code, double& norm) {
+    const double before = norm;
+    const auto norms = report_.residual_norms;
+    last_ = unknowns();
+    code = run(strategy);
+    norm = measure_residual();
+    if (norm > before) {
+      unknowns() = last_;
+      report_.residual_norms = norms;
+      norm = before;
+    }
+    return norm < before / 2.0;
+  }
+
+  /// One call of KINSOL from where the unknowns are.
+  int run(int strategy) {
+    singular_ = not_finite_ = false;
+    const int code = KINSol(memory(), x_.get(), strategy, unknown_scale_.get(), residual_scale_.get());
+    if (exception_) std::rethrow_exception(std::exchange(exception_, nullptr));
+    long iterations = 0;
+    KINGetNumNonlinSolvIters(memory(), &iterations);
+    report_.iterations += static_cast<int>(iterations);
+    return code;
   }
 
   /// Norm of each block at the last evaluation into the report; the largest one, scaled, back.
@@ -96,9 +126,8 @@ class KinsolSolver final : public NonlinearSolver {
     return largest;
   }
 
-  void set_scales(ConstVectorRef x) {
-    Vector::Map(N_VGetArrayPointer(x_.get()), x.size()) = x;
-    const double size = x.lpNorm<Eigen::Infinity>();
+  void set_scales() {
+    const double size = guess_.lpNorm<Eigen::Infinity>();
     N_VConst(size > 0.0 && std::isfinite(size) ? 1.0 / size : 1.0, unknown_scale_.get());
     double* scale = N_VGetArrayPointer(residual_scale_.get());
     for (const ResidualBlock& block : problem_.blocks())
@@ -135,7 +164,8 @@ class KinsolSolver final : public NonlinearSolver {
     KinsolSolver& solver = self(data);
     return solver.guarded([&] {
       ++solver.report_.jacobian_evaluations;
-      solver.problem_.jacobian(Vector::Map(N_VGetArrayPointer(x), solver.last_residual_.size()), solver.values_);
+      solver.problem_.jacobian(Vector::Map(N_VGetArrayPointer(x), solver.last_residual_.size()),
+                               solver.values_);
       solver.not_finite_ = !solver.values_.allFinite();
       return solver.not_finite_ ? -1 : 0;
     });
@@ -180,7 +210,7 @@ class KinsolSolver final : public NonlinearSolver {
   detail::MatrixHandle matrix_shell_;
   detail::LinearSolverHandle linear_shell_;
   detail::KinsolHandle kinsol_;
-  Vector guess_, last_residual_, values_;
+  Vector guess_, last_, last_residual_, values_;
   SolveReport report_;
   std::exception_ptr exception_;
   bool singular_ = false;

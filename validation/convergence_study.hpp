@@ -16,10 +16,11 @@ const char* name(Momentum momentum);
 std::vector<int> possible_orders(const MethodInfo& method);
 
 struct StudyOptions {
-  std::vector<std::string> methods = {"type1/midpoint"};
+  std::vector<std::string> methods = {"type1/midpoint", "type1/gl:3", "type1/gl:4", "type1/gl:6"};
   std::vector<int> orders = {};    ///< empty: all possible ones
   std::vector<double> steps = {};  ///< empty: a ladder, see convergence_study
-  std::vector<double> rtols = {1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12};  ///< empty: no IDA
+  /// Empty: no IDA.
+  std::vector<double> rtols = {1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12, 1e-13, 1e-14};
   int repeats = 5;  ///< timed runs of each row; long runs take fewer
   Momentum momentum = Momentum::projected;
   std::optional<double> t_end = {};              ///< instead of the scene's

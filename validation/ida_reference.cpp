@@ -175,18 +175,20 @@ class IdaIntegration {
   }
 
   IdaRun run(double t_end) {
-    const double before = thread_seconds();
+    double before = thread_seconds();
     IdaRun run;
     double t = scene_.start.time;
     run.failure = make_start();
+    run.cpu_seconds = thread_seconds() - before;
     if (run.ok()) {
       set_up(t_end);
+      before = thread_seconds();
       const int code = IDASolve(ida(), t_end, &t, y_.get(), rate_.get(), IDA_NORMAL);
       if (exception_) std::rethrow_exception(std::exchange(exception_, nullptr));
       if (code < 0) run.failure = describe_failure(code, t);
+      run.cpu_seconds += thread_seconds() - before;
       read_counters(run);
     }
-    run.cpu_seconds = thread_seconds() - before;
     read_end(t, run);
     return run;
   }

@@ -25,7 +25,7 @@ struct IdaRun {
   long jacobian_evaluations = 0;
   long newton_iterations = 0;
   long error_test_failures = 0;
-  double cpu_seconds = 0.0;  ///< thread time of the integration, set-up and start included
+  double cpu_seconds = 0.0;  ///< thread time of the start and the integration, without set-up
 
   bool ok() const { return failure.empty(); }
 };

@@ -20,7 +20,7 @@ namespace {
 constexpr std::array<std::string_view, 6> colours{"#0072B2", "#D55E00", "#009E73",
                                                   "#CC79A7", "#E69F00", "#56B4E9"};
 constexpr std::array<int, 6> markers{7, 5, 9, 13, 11, 15};
-constexpr std::array<std::string_view, 4> dashes{"1", "'- '", "'.. '", "'-. '"};
+constexpr std::array<std::string_view, 4> dashes{"solid", "(9,5)", "(2,4)", "(9,4,2,4)"};
 constexpr double largest_drawn = 10.0;  // errors above it show no trend
 
 constexpr std::string_view style = R"(set encoding utf8
@@ -37,13 +37,21 @@ set grid xtics ytics linetype 1 linewidth 0.7 linecolor '#D9D9D9' dashtype solid
 set key outside right center Left reverse samplen 2.4 spacing 1.3 width 1 noenhanced
 )";
 
+/// A terminal for each file, at a width and a height in points.
 struct Terminal {
   const char* ending;
-  const char* settings;
+  std::string (*settings)(std::size_t width, std::size_t height);
 };
 constexpr std::array<Terminal, 2> terminals{
-    {{".svg", "svg size 720,480 font 'Helvetica,Arial,sans-serif,15' background 'white'"},
-     {".png", "pngcairo size 1440,960 font 'Helvetica,15' fontscale 1.9 linewidth 2 pointscale 2"}}};
+    {{".svg",
+      [](std::size_t width, std::size_t height) {
+        return fmt::format("svg size {},{} font 'Helvetica,Arial,sans-serif,17' background 'white'", width,
+                           height);
+      }},
+     {".png", [](std::size_t width, std::size_t height) {
+        return fmt::format("pngcairo size {},{} font 'Helvetica,15' fontscale 1.9 linewidth 2 pointscale 2",
+                           2 * width, 2 * height);
+      }}}};
 
 struct Curve {
   std::string label;
@@ -89,7 +97,7 @@ std::vector<Curve> curves(const Study& study) {
                           dashes[static_cast<std::size_t>(method) % dashes.size()], markers[k], colours[k])));
   }
   all.push_back(curve(study, ida_method, 0, "IDA",
-                      "linewidth 2 dashtype '_ ' pointtype 4 pointsize 0.95 linecolor '#000000'"));
+                      "linewidth 2 dashtype solid pointtype 4 pointsize 0.95 linecolor '#000000'"));
   std::erase_if(all, [](const Curve& drawn) { return drawn.data.empty(); });
   return all;
 }
@@ -152,16 +160,19 @@ std::string work_precision_script(const Study& study) {
 }
 
 std::string draw_work_precision(const Study& study, const std::filesystem::path& directory) {
-  if (curves(study).empty()) return study.scene + ": no run succeeded, so there is nothing to draw";
+  const std::size_t keys = curves(study).size();
+  if (keys == 0) return study.scene + ": no run succeeded, so there is nothing to draw";
   const std::string stem = (directory / file_name(study.scene)).string();
   const std::string picture = work_precision_script(study);
   std::string script;
-  for (const auto& [ending, terminal] : terminals)
-    script += fmt::format("reset\nset terminal {}\nset output {}\n{}unset output\n", terminal,
+  const std::size_t width = methods_of(study).size() > 1 ? 980 : 720;  // the key names the methods then
+  const std::size_t height = std::max<std::size_t>(480, 90 + 28 * keys);
+  for (const auto& [ending, settings] : terminals)
+    script += fmt::format("reset\nset terminal {}\nset output {}\n{}unset output\n", settings(width, height),
                           gnuplot_text(stem + ending), picture);
   const std::string failure = run_gnuplot(script);
   if (!failure.empty()) return failure;
-  for (const auto& [ending, terminal] : terminals)
+  for (const auto& [ending, settings] : terminals)
     if (std::error_code error; !std::filesystem::file_size(stem + ending, error))
       return fmt::format("gnuplot did not write {}{}", stem, ending);
   return {};

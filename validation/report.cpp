@@ -76,13 +76,21 @@ std::string order_table(const Study& study) {
   return aligned(cells);
 }
 
+bool has_run(const Study& study, const std::string& method, int order) {
+  return std::ranges::any_of(study.rows, [&](const StudyRow& row) {
+    return row.ok() && row.method == method && row.order == order;
+  });
+}
+
 std::string comparison_table(const Study& study) {
   const auto cell = [](const std::optional<double>& seconds) { return seconds ? time_cell(*seconds) : "-"; };
   std::vector<Cells> cells{{"error", "method", "order", "CPU", "IDA", "IDA / ours", ""}};
-  for (const AtError& at : study.at_error)
+  for (const AtError& at : study.at_error) {
+    if (!has_run(study, at.method, at.order)) continue;
     cells.push_back({fmt::format("{:.0e}", at.error), at.method, fmt::format("{}", at.order),
                      cell(at.cpu_seconds), cell(at.ida_cpu_seconds),
                      at.ratio ? fmt::format("{:.2f}", *at.ratio) : "-", at.best ? "fastest of ours" : ""});
+  }
   return aligned(cells);
 }
 

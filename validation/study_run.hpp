@@ -41,6 +41,8 @@ struct StudyRow {
 
   bool ok() const { return status == "ok"; }
   bool is_ida() const { return method == ida_method; }
+  /// False for a method or order that the scene does not admit; nothing was run then.
+  bool fits() const { return is_ida() || step == step; }
   double error() const { return error_q > error_p ? error_q : error_p; }
 };
 

@@ -14,37 +14,38 @@ namespace {
 
 class DenseLu final : public LinearSolver {
  public:
-  explicit DenseLu(int size) : matrix_(size, size), lu_(size) {}
+  explicit DenseLu(int size) : lu_(size), permuted_(size) {}
 
   bool factor(const double* values) override {
-    matrix_ = Eigen::Map<const Eigen::MatrixXd>(values, matrix_.rows(), matrix_.cols());
-    lu_.compute(matrix_);
+    const Eigen::Map<const Eigen::MatrixXd> matrix(values, permuted_.size(), permuted_.size());
+    lu_.compute(matrix);
     const auto pivots = lu_.matrixLU().diagonal();
-    const double round_off = std::numeric_limits<double>::epsilon() * static_cast<double>(matrix_.rows());
+    const double round_off = std::numeric_limits<double>::epsilon() * static_cast<double>(pivots.size());
     for (Eigen::Index k = 0; k < pivots.size(); ++k)
-      if (!(std::abs(pivots[k]) > round_off * matrix_.col(k).lpNorm<Eigen::Infinity>())) return false;
+      if (!(std::abs(pivots[k]) > round_off * matrix.col(k).lpNorm<Eigen::Infinity>())) return false;
     return true;
   }
 
   void solve(double* b) override {
-    Eigen::Map<Eigen::VectorXd> column(b, matrix_.rows());
-    lu_.permutationP().applyThisOnTheLeft(column);
-    lu_.matrixLU().triangularView<Eigen::UnitLower>().solveInPlace(column);
-    lu_.matrixLU().triangularView<Eigen::Upper>().solveInPlace(column);
+    Eigen::Map<Eigen::VectorXd> column(b, permuted_.size());
+    permuted_.noalias() = lu_.permutationP() * column;  // in place Eigen would allocate
+    lu_.matrixLU().triangularView<Eigen::UnitLower>().solveInPlace(permuted_);
+    lu_.matrixLU().triangularView<Eigen::Upper>().solveInPlace(permuted_);
+    column = permuted_;
   }
 
   const char* name() const override { return "dense LU"; }
 
  private:
-  Eigen::MatrixXd matrix_;
   Eigen::PartialPivLU<Eigen::MatrixXd> lu_;
+  Eigen::VectorXd permuted_;
 };
 
 #ifdef DIRACSTEP_WITH_KLU
 
-/// KLU with AMD ordering and without block triangular form: on saddle-point matrices the latter pairs rows with
-/// multiplier columns and keeps tiny pivots.  The ordering is made once; a factorisation reuses the pivots of the
-/// one before until its reciprocal condition falls far below that of the last fresh one.
+/// KLU with AMD ordering and without block triangular form: on saddle-point matrices the latter pairs rows
+/// with multiplier columns and keeps tiny pivots.  The ordering is made once; a factorisation reuses the
+/// pivots of the one before until its reciprocal condition falls far below that of the last fresh one.
 class Klu final : public LinearSolver {
  public:
   explicit Klu(const SparsityPattern& pattern)
@@ -68,7 +69,8 @@ class Klu final : public LinearSolver {
   bool factor(const double* values) override {
     // KLU takes its input as mutable but only reads it.
     auto* const input = const_cast<double*>(values);  // NOLINT(cppcoreguidelines-pro-type-const-cast)
-    if (numeric_ != nullptr && klu_refactor(starts_.data(), rows_.data(), input, symbolic_, numeric_, &common_) &&
+    if (numeric_ != nullptr &&
+        klu_refactor(starts_.data(), rows_.data(), input, symbolic_, numeric_, &common_) &&
         klu_rcond(symbolic_, numeric_, &common_) && common_.rcond > 1e-3 * fresh_rcond_)
       return true;
     klu_free_numeric(&numeric_, &common_);

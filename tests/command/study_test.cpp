@@ -80,6 +80,17 @@ TEST_F(StudyCommand, FailedRunIsARowAndAMessage) {
   EXPECT_EQ(rows[1]["status"], "ok");
 }
 
+TEST_F(StudyCommand, OrderThatOneMethodLacksIsNoFailure) {
+  const std::string rest = " --steps 0.1,0.05 --without-ida --repeat 1 --json";
+  const Outcome outcome = run("study knife_edge --methods type1/midpoint,type2/euler --orders 1,2" + rest);
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_NE(outcome.err.find("type1/midpoint order 1: no composition"), std::string::npos) << outcome.err;
+  const Json rows = Json::parse(outcome.out)["studies"][0]["rows"];
+  ASSERT_EQ(rows.size(), 7u);
+  EXPECT_TRUE(rows[0]["step"].is_null());
+  EXPECT_NE(rows[0]["status"], "ok");
+}
+
 TEST_F(StudyCommand, InterruptKeepsFinishedRows) {
   const Outcome outcome =
       run("study kepler_e06 --json --out " + path("out"), "timeout --preserve-status -s INT 1");
