@@ -16,7 +16,7 @@ const char* name(Momentum momentum);
 std::vector<int> possible_orders(const MethodInfo& method);
 
 struct StudyOptions {
-  std::vector<std::string> methods = {"type1/midpoint", "type1/gl:3", "type1/gl:4", "type1/gl:6"};
+  std::vector<std::string> methods = {"type1/midpoint"};
   std::vector<int> orders = {};    ///< empty: all possible ones
   std::vector<double> steps = {};  ///< empty: a ladder, see convergence_study
   /// Empty: no IDA.

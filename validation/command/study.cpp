@@ -21,7 +21,7 @@ namespace {
 
 struct Options {
   std::vector<std::string> scenes;
-  std::string methods = "type1/midpoint,type1/gl:3,type1/gl:4,type1/gl:6";
+  std::optional<std::string> methods;
   std::optional<std::string> orders, steps, rtols;
   bool without_ida = false;
   int repeat = 5;
@@ -75,7 +75,10 @@ class OutputDirectory {
 
 StudyOptions study_options(const Options& options) {
   StudyOptions study;
-  study.methods = names("--methods", options.methods);
+  if (options.methods)
+    study.methods = names("--methods", *options.methods);
+  else if (!options.orders)
+    study.methods = {"type1/midpoint", "type1/gl:3", "type1/gl:4", "type1/gl:6"};
   if (options.orders) study.orders = whole_numbers("--orders", *options.orders);
   if (options.steps) study.steps = numbers("--steps", *options.steps);
   if (options.rtols) study.rtols = numbers("--rtols", *options.rtols);
@@ -161,7 +164,7 @@ void add_study(CLI::App& app, Session& session) {
   CLI::App* verb = app.add_subcommand("study", "Error against run time, with SUNDIALS IDA beside it");
   const auto options = std::make_shared<Options>();
   verb->add_option("SCENE", options->scenes, "Scenes, all without any; see diracstep list scenes");
-  verb->add_option("--methods", options->methods, "Methods, A,B,…")->capture_default_str();
+  verb->add_option("--methods", options->methods, "Methods, A,B,…; without it type1/midpoint,\nand GL(3), GL(4), GL(6) where no orders are given either");
   verb->add_option("--orders", options->orders, "Orders, 2,4,…; without it all that fit");
   verb->add_option("--steps", options->steps, "Step sizes, H1,H2,…; a ladder without it");
   verb->add_option("--rtols", options->rtols, "Tolerances of IDA; 1e-4,1e-5,…,1e-12 without it");
