@@ -50,9 +50,17 @@ class GaussLobattoStep final : public StepProblem {
   int leading_unknowns() const override { return s_ * n_; }
 
   bool extrapolate_stages(ConstVectorRef last, VectorRef x) const override {
-    x.head(n_ * s_).reshaped(n_, s_) = last.head(n_ * s_).reshaped(n_, s_) * next_velocities_.transpose();
-    if (m_ > 0) x.tail(m_ * s_).reshaped(m_, s_) = last.tail(m_ * s_).reshaped(m_, s_) * next_impulses_.transpose();
+    x.setZero();
+    for (int i = 0; i < s_; ++i)
+      for (int k = 0; k < s_; ++k) {
+        x.segment(n_ * i, n_) += next_velocities_(i, k) * last.segment(n_ * k, n_);
+        x.segment(row_of(i), m_) += next_impulses_(i, k) * last.segment(row_of(k), m_);
+      }
     return true;
+  }
+
+  void reset() override {
+    for (Columns* columns : {&lq_, &lqq_}) columns->setZero();
   }
   const SparsityPattern& pattern() const override { return pattern_; }
   std::span<const ResidualBlock> blocks() const override { return blocks_; }

@@ -130,6 +130,10 @@ void Integrator::reset(const Start& start) {
     throw Misuse("scene '" + scene_->name + "': the momentum ∂L/∂v is not finite at the start");
   first_stage_solved_ = false;
   for (Stage& stage : stages_) stage.predictor.reset();
+  for (Part& part : parts_) {
+    part.problem->reset();
+    if (part.solver) part.solver->reset();
+  }
   work_ = {};
 }
 
@@ -159,7 +163,8 @@ SolveReport Integrator::solve_stage(std::size_t number, double t, const Vector& 
   return report;
 }
 
-StepReport Integrator::failed(const SolveReport& report, const StepProblem& problem, double time) const {
+StepReport Integrator::failed(const SolveReport& report, const StepProblem& problem, double time) {
+  first_stage_solved_ = false;  // the problem holds the data of the stage that failed
   std::ostringstream message;
   message << "step " << work_.steps << " from t = " << time << ": " << describe(report.status) << " after "
           << report.iterations << " iterations";
@@ -216,12 +221,15 @@ SolveReport Integrator::solve_velocity(double t, Vector& v) {
     return velocity_solver_->solve(v);
   }
   velocity_problem_.begin(t, q_, p_);
+  velocity_solver_->reset();
   velocity_unknowns_.head(n) = v_;
   velocity_unknowns_.tail(velocity_unknowns_.size() - n).setZero();
   const SolveReport report = velocity_solver_->solve(velocity_unknowns_);
   if (!report.ok()) return report;
   v = velocity_unknowns_.head(n);
   acceleration_problem_.begin(t, q_, v);
+  acceleration_unknowns_.setZero();
+  acceleration_solver_->reset();
   return acceleration_solver_->solve(acceleration_unknowns_);
 }
 
@@ -322,7 +330,11 @@ StepGrid fit_steps(double start, double end, double step) {
   }
   const double nearest = std::max(1.0, std::round(ratio));
   const double count = std::abs(ratio - nearest) <= 1e-9 * nearest ? nearest : std::ceil(ratio);
-  if (count > 1e15) throw Misuse("the step is too small: more than 1e15 steps would be needed");
+  if (count > 1e15) {
+    std::ostringstream message;
+    message << "the step size " << step << " is too small: " << count << " steps would be needed, at most 1e15 are taken";
+    throw Misuse(message.str());
+  }
   return {static_cast<long>(count), (end - start) / count};
 }
 

@@ -125,7 +125,7 @@ class Integrator {
   SolveReport solve_velocity(double t, Vector& v);
   SolveReport solve_stage(std::size_t stage, double t, const Vector& q, const Vector& p);
   void count(const SolveReport& report);
-  StepReport failed(const SolveReport& report, const StepProblem& problem, double time) const;
+  StepReport failed(const SolveReport& report, const StepProblem& problem, double time);
 
   std::shared_ptr<const Scene> scene_;
   std::vector<PlanLine> preparation_;

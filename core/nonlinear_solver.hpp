@@ -56,6 +56,8 @@ class NonlinearSolver {
  public:
   virtual ~NonlinearSolver() = default;
   virtual SolveReport solve(VectorRef x) = 0;
+  /// Forgets what it keeps between solves (pivots), so that a run repeats bit by bit.
+  virtual void reset() {}
   /// What does the work, for plans and reports: "KINSOL, dense".
   virtual std::string description() const = 0;
 };

@@ -72,8 +72,10 @@ class PhaseSpaceStep final : public StepProblem {
   }
 
   bool extrapolate_stages(ConstVectorRef last, VectorRef x) const override {
-    x.head(n_ * s_).reshaped(n_, s_) = last.head(n_ * s_).reshaped(n_, s_) * next_velocities_.transpose();
-    x.tail(n_) = last.tail(n_);
+    x = last;
+    x.head(n_ * s_).setZero();
+    for (int i = 0; i < s_; ++i)
+      for (int k = 0; k < s_; ++k) x.segment(n_ * i, n_) += next_velocities_(i, k) * last.segment(n_ * k, n_);
     return true;
   }
 

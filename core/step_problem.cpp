@@ -73,6 +73,9 @@ class ImplicitStep final : public StepProblem {
 
   int size() const override { return n_ + m_ + inner_; }
   int leading_unknowns() const override { return n_; }
+  void reset() override {
+    for (Columns* columns : {&y_, &hessian_}) columns->setZero();
+  }
   const SparsityPattern& pattern() const override { return pattern_; }
   std::span<const ResidualBlock> blocks() const override { return blocks_; }
 

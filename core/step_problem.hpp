@@ -33,6 +33,9 @@ class StepProblem : public NonlinearProblem {
   /// How many unknowns come before the multipliers, whose guess hardly matters.
   virtual int leading_unknowns() const { return size(); }
 
+  /// Forgets all that earlier steps left behind, so that a run repeats bit by bit.
+  virtual void reset() {}
+
   /// What the unknowns are, for plans: "q1 (3), λ (1)".
   virtual std::string unknowns() const = 0;
 };

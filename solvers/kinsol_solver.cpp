@@ -55,6 +55,8 @@ class KinsolSolver final : public NonlinearSolver {
     return report_;
   }
 
+  void reset() override { linear_solver_->reset(); }
+
   std::string description() const override { return std::string("KINSOL, ") + linear_solver_->name(); }
 
  private:

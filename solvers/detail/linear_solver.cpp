@@ -82,6 +82,8 @@ class Klu final : public LinearSolver {
 
   void solve(double* b) override { klu_solve(symbolic_, numeric_, size_, 1, b, &common_); }
 
+  void reset() override { klu_free_numeric(&numeric_, &common_); }
+
   const char* name() const override { return "KLU"; }
 
  private:

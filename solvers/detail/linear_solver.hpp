@@ -13,6 +13,8 @@ class LinearSolver {
   virtual bool factor(const double* values) = 0;
   /// Replaces b by the solution.
   virtual void solve(double* b) = 0;
+  /// Forgets the pivots of earlier factorisations.
+  virtual void reset() {}
   virtual const char* name() const = 0;
 };
 

@@ -1,0 +1,496 @@
+#include <dlfcn.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <diracstep/core/errors.hpp>
+#include <diracstep/solvers/kinsol_solver.hpp>
+#include <stdexcept>
+
+#include "allocations.hpp"
+#include "differences.hpp"
+#include "problems.hpp"
+
+namespace {
+
+/// Calls of KLU, counted by taking the place of its functions.
+struct KluCalls {
+  int analyze = 0, factor = 0, refactor = 0;
+};
+KluCalls klu_calls;
+
+template <class Function>
+Function next(const char* name) {
+  return reinterpret_cast<Function>(dlsym(RTLD_NEXT, name));
+}
+
+}  // namespace
+
+extern "C" {
+
+void* klu_analyze(int n, int* starts, int* rows, void* common) {
+  ++klu_calls.analyze;
+  return next<decltype(&klu_analyze)>("klu_analyze")(n, starts, rows, common);
+}
+void* klu_factor(int* starts, int* rows, double* values, void* symbolic, void* common) {
+  ++klu_calls.factor;
+  return next<decltype(&klu_factor)>("klu_factor")(starts, rows, values, symbolic, common);
+}
+int klu_refactor(int* starts, int* rows, double* values, void* symbolic, void* numeric, void* common) {
+  ++klu_calls.refactor;
+  return next<decltype(&klu_refactor)>("klu_refactor")(starts, rows, values, symbolic, numeric, common);
+}
+}
+
+namespace diracstep {
+namespace {
+
+using testing::FunctionProblem;
+
+constexpr double epsilon = 2.2e-16;
+
+/// Solves one unknown from a guess.
+struct Solved {
+  SolveReport report;
+  double x;
+};
+Solved solve(NonlinearProblem& problem, double guess, KinsolOptions options = {}) {
+  Vector x = Vector::Constant(1, guess);
+  const SolveReport report = kinsol(options)(problem)->solve(x);
+  return {report, x[0]};
+}
+
+/// M x = b on the pattern of M's entries, or in full; a block for each row.
+FunctionProblem linear(const Eigen::MatrixXd& m, const Vector& b, const std::vector<double>& scales,
+                       bool dense = true) {
+  const int n = static_cast<int>(b.size());
+  std::vector<ResidualBlock> blocks;
+  for (const double scale : scales) blocks.push_back({"row", 1, scale});
+  std::vector<std::pair<int, int>> entries;
+  for (int j = 0; j < n; ++j)
+    for (int i = 0; i < n; ++i)
+      if (dense || m(i, j) != 0.0) entries.emplace_back(i, j);
+  const SparsityPattern pattern(n, n, entries);
+  return {pattern, blocks, [m, b](ConstVectorRef x, VectorRef f) { f = m * x - b; },
+          [m, entries](ConstVectorRef, VectorRef values) {
+            Eigen::Index k = 0;
+            for (const auto& [i, j] : entries) values[k++] = m(i, j);
+          }};
+}
+
+TEST(Kinsol, LinearSystemWithAFarSolutionTakesOneNewtonStep) {
+  const Eigen::MatrixXd m{{2.0, 1.0}, {-1.0, 3.0}};
+  const Vector solution{{1e6, -4.5e6}};
+  for (const double guess : {0.0, 1.0, 1e-14}) {  // KINSOL's own limit of a step is 1000 times the guess
+    FunctionProblem problem = linear(m, m * solution, {1e7, 1e7});
+    Vector x = Vector::Constant(2, guess);
+    const SolveReport report = kinsol()(problem)->solve(x);
+    EXPECT_TRUE(report.ok()) << guess << ": " << describe(report.status);
+    EXPECT_EQ(report.iterations, 1) << guess;
+    EXPECT_LT((x - solution).lpNorm<Eigen::Infinity>(), 1e-8) << guess;
+  }
+}
+
+TEST(Kinsol, StartAtTheSolutionTakesNoIteration) {
+  FunctionProblem problem([](double x) { return x * x - 4.0; }, [](double x) { return 2.0 * x; });
+  const Solved solved = solve(problem, 2.0);
+  EXPECT_TRUE(solved.report.ok());
+  EXPECT_EQ(solved.report.iterations, 0);
+  EXPECT_EQ(solved.report.residual_evaluations, 1);
+  EXPECT_EQ(solved.report.jacobian_evaluations, 0);
+  EXPECT_EQ(solved.x, 2.0);
+}
+
+TEST(Kinsol, CountsAreThoseOfTheProblem) {
+  int residuals = 0, jacobians = 0;
+  FunctionProblem problem(
+      SparsityPattern::dense(1, 1), {{"row", 1}},
+      [&](ConstVectorRef x, VectorRef f) {
+        ++residuals;
+        f[0] = std::exp(x[0]) - 3.0;
+      },
+      [&](ConstVectorRef x, VectorRef values) {
+        ++jacobians;
+        values[0] = std::exp(x[0]);
+      });
+  const auto solver = kinsol()(problem);
+  for (int k = 0; k < 2; ++k) {
+    residuals = jacobians = 0;
+    Vector x = Vector::Constant(1, 1.0);
+    const SolveReport report = solver->solve(x);
+    EXPECT_NEAR(x[0], std::log(3.0), 2.0 * epsilon);
+    EXPECT_EQ(report.residual_evaluations, residuals);
+    EXPECT_EQ(report.jacobian_evaluations, jacobians);
+    EXPECT_EQ(report.iterations, jacobians) << "every iteration takes a fresh Jacobian";
+    EXPECT_LE(residuals, jacobians + 1);
+    EXPECT_LE(report.iterations, 5);
+  }
+}
+
+TEST(Kinsol, ResidualThatStaysAtItsRoundOffIsAccepted) {
+  // The terms are of size 1e3, so the residual cannot fall to 1e-15.
+  FunctionProblem problem([](double x) { return x * x - 1000.1; }, [](double x) { return 2.0 * x; });
+  const Solved solved = solve(problem, 30.0);
+  EXPECT_TRUE(solved.report.ok());
+  EXPECT_GT(solved.report.residual_norms[0], 1e-15) << "the tolerance was reached, so nothing is tested";
+  EXPECT_NEAR(solved.x, std::sqrt(1000.1), 2e-14);
+  EXPECT_LE(solved.report.iterations, 6);
+}
+
+TEST(Kinsol, ResidualThatStaysAboveTheAcceptedSizeIsAFailure) {
+  FunctionProblem problem([](double x) { return x * x - 1000.1; }, [](double x) { return 2.0 * x; }, 1e-6);
+  const Solved solved = solve(problem, 30.0);
+  EXPECT_EQ(solved.report.status, SolveStatus::no_convergence);
+  EXPECT_GT(solved.report.residual_norms[0], 1e-17);
+}
+
+TEST(Kinsol, SolutionFarFromTheOriginIsFoundToRoundOff) {
+  // Steps are small beside the unknown long before they are small beside the distance over which F bends.
+  FunctionProblem problem([](double x) { return (x - 1e6) + (x - 1e6) * (x - 1e6) - 0.02; },
+                          [](double x) { return 1.0 + 2.0 * (x - 1e6); }, 1e6);
+  const Solved solved = solve(problem, 1e6);
+  EXPECT_TRUE(solved.report.ok());
+  EXPECT_NEAR(solved.x - 1e6, std::sqrt(0.27) - 0.5, 2.0 * 1e6 * epsilon);
+}
+
+TEST(Kinsol, UnknownsOfVeryDifferentSizeAreBothFound) {
+  // u and w of size 1, x = (1e-8 u, 1e8 w): u² + w = 3, w³ − u = 7, so u = 1, w = 2.
+  FunctionProblem problem(
+      SparsityPattern::dense(2, 2), {{"first", 1, 3.0}, {"second", 1, 8e6}},
+      [](ConstVectorRef x, VectorRef f) {
+        const double u = 1e8 * x[0], w = 1e-8 * x[1];
+        f[0] = u * u + w - 3.0;
+        f[1] = 1e6 * (w * w * w - u - 7.0);
+      },
+      [](ConstVectorRef x, VectorRef values) {
+        const double u = 1e8 * x[0], w = 1e-8 * x[1];
+        values << 2.0 * u * 1e8, -1e6 * 1e8, 1e-8, 1e6 * 3.0 * w * w * 1e-8;
+      });
+  for (const double start : {0.6, 1.5, 2.0}) {
+    Vector x{{start * 1e-8, 2.0 * start * 1e8}};
+    const SolveReport report = kinsol()(problem)->solve(x);
+    EXPECT_TRUE(report.ok()) << describe(report.status) << " from " << start;
+    EXPECT_NEAR(x[0] * 1e8, 1.0, 4.0 * epsilon) << start;
+    EXPECT_NEAR(x[1] * 1e-8, 2.0, 4.0 * epsilon) << start;
+  }
+}
+
+TEST(Kinsol, SingularJacobianIsReported) {
+  const Eigen::MatrixXd singular{{1.0, 2.0}, {2.0, 4.0}}, zero = Eigen::MatrixXd::Zero(2, 2);
+  for (const Eigen::MatrixXd& m : {singular, zero}) {
+    FunctionProblem problem = linear(m, Vector{{1.0, 1.0}}, {1.0, 1.0});
+    Vector x = Vector::Zero(2);
+    const SolveReport report = kinsol()(problem)->solve(x);
+    EXPECT_EQ(report.status, SolveStatus::singular_jacobian);
+    EXPECT_EQ(report.residual_norms[0], 1.0);
+  }
+}
+
+TEST(Kinsol, RegularJacobianWithSmallRowsOrColumnsIsNotSingular) {
+  const Eigen::MatrixXd m{{1.0, 2.0}, {3.0, 4.0}};
+  const Vector solution{{2.0, -1.0}};
+  for (const double s : {1e-9, 1e9}) {
+    const Eigen::DiagonalMatrix<double, 2> scale(s, 1.0);
+    const Eigen::MatrixXd rows = scale * m, columns = m * scale.inverse();
+    FunctionProblem small_row = linear(rows, rows * solution, {10.0 * s, 10.0});
+    FunctionProblem small_column = linear(columns, m * solution, {10.0, 10.0});
+    Vector x = Vector::Zero(2), y = x;
+    EXPECT_TRUE(kinsol()(small_row)->solve(x).ok()) << s;
+    EXPECT_TRUE(kinsol()(small_column)->solve(y).ok()) << s;
+    EXPECT_LT((x - solution).lpNorm<Eigen::Infinity>(), 1e-14) << s;
+    EXPECT_LT((scale.inverse() * y - solution).lpNorm<Eigen::Infinity>(), 1e-14) << s;
+  }
+}
+
+TEST(Kinsol, ResidualThatIsNotFiniteAtTheStartIsReported) {
+  FunctionProblem problem([](double x) { return std::log(x); }, [](double x) { return 1.0 / x; });
+  for (const double guess : {-1.0, std::nan(""), 0.0}) {
+    const Solved solved = solve(problem, guess);
+    EXPECT_EQ(solved.report.status, SolveStatus::not_finite) << guess;
+    EXPECT_TRUE(std::isnan(solved.report.residual_norms[0])) << guess;
+  }
+}
+
+TEST(Kinsol, JacobianThatIsNotFiniteIsReported) {
+  FunctionProblem problem([](double x) { return std::cbrt(x) - 1.0; },
+                          [](double x) { return 1.0 / (x * x); });
+  EXPECT_EQ(solve(problem, 0.0).report.status, SolveStatus::not_finite);
+}
+
+TEST(Kinsol, ShorterStepsLeadBackIntoTheDomain) {
+  // The full Newton step from 10 goes to −9, where the logarithm is not defined.
+  FunctionProblem problem([](double x) { return std::log(x) - 0.4; }, [](double x) { return 1.0 / x; });
+  const Solved solved = solve(problem, 10.0);
+  EXPECT_TRUE(solved.report.ok()) << describe(solved.report.status);
+  EXPECT_NEAR(solved.x, std::exp(0.4), 4.0 * epsilon);
+}
+
+TEST(Kinsol, NoRootIsReportedWithTheResidualThatIsLeft) {
+  FunctionProblem problem([](double x) { return x * x + 1.0; }, [](double x) { return 2.0 * x; });
+  const Solved solved = solve(problem, 0.7);
+  EXPECT_EQ(solved.report.status, SolveStatus::no_convergence);
+  EXPECT_GE(solved.report.residual_norms[0], 1.0);
+  EXPECT_NEAR(solved.report.residual_norms[0], solved.x * solved.x + 1.0, 1e-6)
+      << "not that of the last iterate";
+}
+
+TEST(Kinsol, FailingNewtonIsRepeatedWithALineSearch) {
+  FunctionProblem problem([](double x) { return std::atan(x); },
+                          [](double x) { return 1.0 / (1.0 + x * x); });
+  const Solved solved = solve(problem, 3.0);
+  EXPECT_TRUE(solved.report.ok()) << describe(solved.report.status);
+  EXPECT_NEAR(solved.x, 0.0, 1e-15);
+  EXPECT_GT(solved.report.residual_evaluations, solved.report.iterations + 2) << "no shorter step was tried";
+}
+
+TEST(Kinsol, NormsOfBlocksAreUnscaledAndInOrder) {
+  const Eigen::MatrixXd m = Eigen::MatrixXd::Zero(3, 3);
+  FunctionProblem problem(
+      SparsityPattern::dense(3, 3), {{"one", 1, 100.0}, {"two", 2, 0.01}},
+      [](ConstVectorRef, VectorRef f) { f << -3.0, 0.5, -0.25; },
+      [&](ConstVectorRef, VectorRef values) { values = m.reshaped(); });
+  Vector x = Vector::Zero(3);
+  const SolveReport report = kinsol()(problem)->solve(x);
+  EXPECT_EQ(report.residual_norms[0], 3.0);
+  EXPECT_EQ(report.residual_norms[1], 0.5);
+}
+
+TEST(Kinsol, ExceptionsOfTheProblemPassThroughAndLeaveTheSolverUsable) {
+  struct Mine : std::runtime_error {
+    using std::runtime_error::runtime_error;
+  };
+  int residuals_left = -1, jacobians_left = -1;
+  FunctionProblem problem(
+      SparsityPattern::dense(1, 1), {{"row", 1}},
+      [&](ConstVectorRef x, VectorRef f) {
+        if (residuals_left-- == 0) throw Mine("residual");
+        f[0] = x[0] * x[0] - 4.0;
+      },
+      [&](ConstVectorRef x, VectorRef values) {
+        if (jacobians_left-- == 0) throw Mine("jacobian");
+        values[0] = 2.0 * x[0];
+      });
+  const auto solver = kinsol()(problem);
+  const auto expect_thrown = [&](const char* message) {
+    Vector x = Vector::Constant(1, 3.0);
+    try {
+      (void)solver->solve(x);
+      ADD_FAILURE() << "nothing was thrown";
+    } catch (const Mine& mine) {
+      EXPECT_STREQ(mine.what(), message);
+    }
+    residuals_left = jacobians_left = -1;
+    x[0] = 3.0;
+    EXPECT_TRUE(solver->solve(x).ok());
+    EXPECT_NEAR(x[0], 2.0, 2.0 * epsilon);
+  };
+  residuals_left = 0;
+  expect_thrown("residual");
+  residuals_left = 2;
+  expect_thrown("residual");
+  jacobians_left = 0;
+  expect_thrown("jacobian");
+  jacobians_left = 1;
+  expect_thrown("jacobian");
+}
+
+/// A chain of 12 unknowns with 4 rows of constraints: M u + u³/30 − Aᵀλ, A u, two rows scaled by 1e6 and two
+/// by 1e-6.
+class Chain {
+ public:
+  static constexpr int n = 12, m = 4;
+
+  Chain() : matrix_(Eigen::MatrixXd::Zero(n + m, n + m)), right_side_(Vector::LinSpaced(n + m, 0.5, 2.0)) {
+    for (int i = 0; i < n; ++i) {
+      matrix_(i, i) = 2.0 + 0.1 * i;
+      if (i > 0) matrix_(i, i - 1) = matrix_(i - 1, i) = -1.0;
+    }
+    for (int r = 0; r < m; ++r) {
+      for (int k = 3 * r; k < 3 * r + 3; ++k) {
+        matrix_(n + r, k) = row_scale(r) * (1.0 + 0.7 * k - 2.0 * r);
+        matrix_(k, n + r) = -matrix_(n + r, k);
+      }
+      right_side_[n + r] *= row_scale(r);
+    }
+  }
+
+  static double row_scale(int r) { return r < 2 ? 1e6 : 1e-6; }
+
+  FunctionProblem problem(bool dense) const {
+    SparsityPattern pattern = SparsityPattern::dense(n + m, n + m);
+    auto entries = pattern.entries();
+    if (!dense) {
+      std::erase_if(entries, [this](auto entry) { return matrix_(entry.first, entry.second) == 0.0; });
+      pattern = SparsityPattern(n + m, n + m, entries);
+    }
+    const auto residual = [this](ConstVectorRef x, VectorRef f) {
+      f = -right_side_;
+      f.noalias() += matrix_ * x;
+      f.head(n).array() += x.head(n).array().cube() / 30.0;
+    };
+    const auto jacobian = [this, entries](ConstVectorRef x, VectorRef values) {
+      Eigen::Index k = 0;
+      for (const auto& [i, j] : entries)
+        values[k++] = matrix_(i, j) + (i == j && i < n ? 0.1 * x[i] * x[i] : 0.0);
+    };
+    const std::vector<ResidualBlock> blocks{{"momentum", n, 10.0},
+                                            {"large rows", 2, 10.0 * row_scale(0)},
+                                            {"small rows", 2, 10.0 * row_scale(2)}};
+    return {pattern, blocks, residual, jacobian};
+  }
+
+  /// The unknowns with multipliers in the units of unscaled rows.
+  static Vector comparable(Vector x) {
+    for (int r = 0; r < m; ++r) x[n + r] *= row_scale(r);
+    return x;
+  }
+
+ private:
+  Eigen::MatrixXd matrix_;
+  Vector right_side_;
+};
+
+class KinsolKlu : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    try {
+      (void)kinsol()(sparse_);
+    } catch (const Misuse&) {
+      GTEST_SKIP() << "built without KLU";
+    }
+    klu_calls = {};
+  }
+
+  Chain chain_;
+  FunctionProblem sparse_ = chain_.problem(false);
+};
+
+TEST_F(KinsolKlu, AgreesWithFullMatricesOnABadlyScaledSaddlePoint) {
+  FunctionProblem full = chain_.problem(true);
+  const auto dense_solver = kinsol()(full), sparse_solver = kinsol()(sparse_);
+  EXPECT_NE(dense_solver->description().find("dense"), std::string::npos);
+  EXPECT_NE(sparse_solver->description().find("KLU"), std::string::npos);
+  Vector a = Vector::Zero(sparse_.size()), b = a, f = a;
+  EXPECT_LT(testing::jacobian_error(sparse_, a), 1e-3);  // of entries up to 3e6
+  const SolveReport dense = dense_solver->solve(a), sparse = sparse_solver->solve(b);
+  EXPECT_TRUE(dense.ok()) << describe(dense.status);
+  EXPECT_TRUE(sparse.ok()) << describe(sparse.status);
+  EXPECT_LT((Chain::comparable(a) - Chain::comparable(b)).lpNorm<Eigen::Infinity>(), 1e-13);
+  sparse_.residual(b, f);
+  EXPECT_LT(f.head(Chain::n).lpNorm<Eigen::Infinity>(), 2e-14);
+}
+
+TEST_F(KinsolKlu, AnalysesOnceAndKeepsItsPivots) {
+  const auto solver = kinsol()(sparse_);
+  long iterations = 0;
+  for (int k = 0; k < 50; ++k) {
+    Vector x = Vector::Constant(sparse_.size(), 0.01 * k);
+    const SolveReport report = solver->solve(x);
+    EXPECT_TRUE(report.ok());
+    iterations += report.iterations;
+  }
+  EXPECT_GT(iterations, 100);
+  EXPECT_EQ(klu_calls.analyze, 1);
+  EXPECT_EQ(klu_calls.factor, 1);
+  EXPECT_EQ(klu_calls.refactor, iterations - 1);
+}
+
+/// Its matrix loses the pivots that were best in the first solve.
+class Turning {
+ public:
+  FunctionProblem problem() {
+    const SparsityPattern pattern(3, 3, {{0, 0}, {1, 0}, {0, 1}, {1, 1}, {2, 1}, {1, 2}, {2, 2}});
+    const auto matrix = [this] {
+      Eigen::MatrixXd m{{diagonal, 1.0, 0.0}, {1.0, diagonal, 1.0}, {0.0, 1.0, 4.0}};
+      return m;
+    };
+    return {pattern,
+            {{"rows", 3, 10.0}},
+            [=](ConstVectorRef x, VectorRef f) {
+              f = matrix() * x - Vector{{1.0, 2.0, 3.0}};
+            },
+            [=](ConstVectorRef, VectorRef values) {
+              const Eigen::MatrixXd m = matrix();
+              values << m(0, 0), m(1, 0), m(0, 1), m(1, 1), m(2, 1), m(1, 2), m(2, 2);
+            }};
+  }
+  double diagonal = 100.0;
+};
+
+TEST_F(KinsolKlu, TakesNewPivotsWhereTheOldOnesFail) {
+  for (const double diagonal : {0.0, 1e-20, 1e-15, 1e-12, 1e-9, 1e-6}) {
+    Turning turning;
+    FunctionProblem problem = turning.problem();
+    const auto solver = kinsol()(problem);
+    Vector x = Vector::Zero(3), f(3);
+    EXPECT_TRUE(solver->solve(x).ok());
+    turning.diagonal = diagonal;
+    const SolveReport report = solver->solve(x);
+    EXPECT_TRUE(report.ok()) << diagonal << ": " << describe(report.status);
+    problem.residual(x, f);
+    EXPECT_LT(f.lpNorm<Eigen::Infinity>(), 1e-14) << diagonal;
+  }
+  EXPECT_GT(klu_calls.factor, 6);
+}
+
+TEST_F(KinsolKlu, SingularJacobianIsReported) {
+  const Eigen::MatrixXd m{{1.0, 2.0, 0.0}, {2.0, 4.0, 0.0}, {0.0, 0.0, 1.0}};
+  FunctionProblem problem = linear(m, Vector::Ones(3), {1.0, 1.0, 1.0}, false);
+  Vector x = Vector::Zero(3);
+  EXPECT_EQ(kinsol()(problem)->solve(x).status, SolveStatus::singular_jacobian);
+}
+
+void expect_no_allocation_after_the_first_solve(NonlinearProblem& problem) {
+  const auto solver = kinsol()(problem);
+  Vector x = Vector::Constant(problem.size(), 0.1);
+  EXPECT_TRUE(solver->solve(x).ok());
+  long iterations = 0;
+  const long before = testing::allocations;
+  for (int k = 0; k < 20; ++k) {
+    x.setConstant(0.02 * k);
+    iterations += solver->solve(x).iterations;
+  }
+  EXPECT_EQ(testing::allocations - before, 0)
+      << "in " << iterations << " iterations, size " << problem.size();
+  EXPECT_GT(iterations, 20);
+}
+
+class KinsolAllocations : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    if (!testing::counts_allocations) GTEST_SKIP() << "allocations cannot be counted here";
+    const long before = testing::allocations;
+    ::operator delete(::operator new(1));
+    EXPECT_GT(testing::allocations, before) << "the count does not work";
+  }
+};
+
+TEST_F(KinsolAllocations, SolvesWithFullMatricesAllocateNothingAfterTheFirst) {
+  for (const int n : {1, 3, 12, 40, 80}) {
+    FunctionProblem problem(
+        SparsityPattern::dense(n, n), {{"rows", n, 10.0}},
+        [](ConstVectorRef x, VectorRef f) {
+          f = 3.0 * x.array() + x.array().cube() + 0.5 * x.reverse().array() - 1.0;
+        },
+        [n](ConstVectorRef x, VectorRef values) {
+          values.setZero();
+          for (int i = 0; i < n; ++i) {
+            values[i + i * n] += 3.0 + 3.0 * x[i] * x[i];
+            values[i + (n - 1 - i) * n] += 0.5;
+          }
+        });
+    expect_no_allocation_after_the_first_solve(problem);
+  }
+}
+
+TEST_F(KinsolAllocations, SolvesWithKluAllocateNothingAfterTheFirst) {
+  const Chain chain;
+  FunctionProblem problem = chain.problem(false);
+  try {
+    expect_no_allocation_after_the_first_solve(problem);
+  } catch (const Misuse&) {
+    GTEST_SKIP() << "built without KLU";
+  }
+}
+
+}  // namespace
+}  // namespace diracstep
