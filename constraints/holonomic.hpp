@@ -41,8 +41,7 @@ class HolonomicRows final : public ConstraintRows {
     for (int r = 0; r < M; ++r) d[r] = along(phi[static_cast<std::size_t>(r)], N, v, 1.0);
   }
 
-  void annihilator_derivative(double t, ConstVectorRef q, ConstVectorRef lambda,
-                              VectorRef d) const override {
+  void annihilator_derivative(double t, ConstVectorRef q, ConstVectorRef lambda, VectorRef d) const override {
     const auto phi = evaluate<Second>(t, q);
     for (int j = 0; j < N; ++j)
       for (int i = 0; i < N; ++i) {
@@ -83,8 +82,8 @@ class HolonomicRows final : public ConstraintRows {
 /// The formula may take the time as a second argument.
 template <int N, int M, class F>
 std::shared_ptr<const ConstraintRows> holonomic(F phi, std::vector<std::string> names = {}) {
-  return std::make_shared<const detail::HolonomicRows<N, M, F>>(
-      std::move(phi), detail::row_names(std::move(names), M));
+  return std::make_shared<const detail::HolonomicRows<N, M, F>>(std::move(phi),
+                                                                detail::row_names(std::move(names), M));
 }
 
 }  // namespace diracstep

@@ -45,8 +45,7 @@ class PfaffianRows final : public ConstraintRows {
     for (int r = 0; r < M; ++r) d[r] = sums[static_cast<std::size_t>(r)].gradient(N);
   }
 
-  void annihilator_derivative(double t, ConstVectorRef q, ConstVectorRef lambda,
-                              VectorRef d) const override {
+  void annihilator_derivative(double t, ConstVectorRef q, ConstVectorRef lambda, VectorRef d) const override {
     const auto rows = evaluate_a<QTime>(t, q);
     for (std::size_t i = 0; i < N; ++i) {
       QTime sum;
@@ -110,8 +109,8 @@ std::shared_ptr<const ConstraintRows> pfaffian(A rows, std::vector<std::string> 
 /// Affine nonholonomic rows A(q) v + b(q) = 0; b returns std::array<T, M>.  Both may take the time.
 template <int N, int M, class A, class B>
 std::shared_ptr<const ConstraintRows> affine(A rows, B offset, std::vector<std::string> names = {}) {
-  return std::make_shared<const detail::PfaffianRows<N, M, A, B>>(
-      std::move(rows), std::move(offset), detail::row_names(std::move(names), M));
+  return std::make_shared<const detail::PfaffianRows<N, M, A, B>>(std::move(rows), std::move(offset),
+                                                                  detail::row_names(std::move(names), M));
 }
 
 }  // namespace diracstep

@@ -18,10 +18,12 @@ constexpr std::array<double, S> palindrome(const std::array<double, (S + 1) / 2>
 constexpr std::array<double, 1> order2{1.0};
 
 // γ = 1/(4 − 4^{1/3}), twice at each end, and 1 − 4γ between.
-constexpr auto order4 = palindrome<5>({0.41449077179437573714, 0.41449077179437573714, -0.65796308717750294857});
+constexpr auto order4 =
+    palindrome<5>({0.41449077179437573714, 0.41449077179437573714, -0.65796308717750294857});
 
-constexpr auto order6 = palindrome<9>({0.39216144400731413928, 0.33259913678935943860, -0.70624617255763935981,
-                                       0.08221359629355080023, 0.79854399093482996340});
+constexpr auto order6 =
+    palindrome<9>({0.39216144400731413928, 0.33259913678935943860, -0.70624617255763935981,
+                   0.08221359629355080023, 0.79854399093482996340});
 
 constexpr auto order8 =
     palindrome<17>({0.13020248308889008088, 0.56116298177510838456, -0.38947496264484728641,
@@ -32,10 +34,14 @@ constexpr auto order8 =
 
 std::span<const double> composition_fractions(int order) {
   switch (order) {
-    case 2: return order2;
-    case 4: return order4;
-    case 6: return order6;
-    case 8: return order8;
+    case 2:
+      return order2;
+    case 4:
+      return order4;
+    case 6:
+      return order6;
+    case 8:
+      return order8;
     default:
       throw Misuse("no composition of order " + std::to_string(order) + "; the orders are 2, 4, 6, 8");
   }

@@ -189,7 +189,8 @@ std::vector<std::string> dependent_rows(const Scene& scene, const Start& start, 
   rows.evaluate(start.time, start.q);
   Eigen::MatrixXd one_forms = Eigen::MatrixXd::Zero(scene.dimension(), m);
   Eigen::Index k = 0;
-  for (const auto& [row, column] : rows.pattern().entries()) one_forms(column, row) = rows.coefficients()[k++];
+  for (const auto& [row, column] : rows.pattern().entries())
+    one_forms(column, row) = rows.coefficients()[k++];
   for (int r = 0; r < m; ++r) {
     const double size = one_forms.col(r).norm();
     if (size > 0.0) one_forms.col(r) /= size;  // rows may come in any units
@@ -211,7 +212,8 @@ std::shared_ptr<const Scene> without_rows(const Scene& scene, const std::vector<
   for (const auto& block : scene.constraints) {
     std::vector<int> kept;
     for (int r = 0; r < block->rows(); ++r)
-      if (std::ranges::find(names, block->names()[static_cast<std::size_t>(r)]) == names.end()) kept.push_back(r);
+      if (std::ranges::find(names, block->names()[static_cast<std::size_t>(r)]) == names.end())
+        kept.push_back(r);
     if (static_cast<int>(kept.size()) == block->rows())
       copy->constraints.push_back(block);
     else if (!kept.empty())

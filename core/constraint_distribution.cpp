@@ -34,9 +34,8 @@ void ConstraintDistribution::coefficients(double t, ConstVectorRef q, VectorRef 
 }
 
 void ConstraintDistribution::derivative(double t, ConstVectorRef q, ConstVectorRef w, double s, VectorRef d) {
-  for_each_block(d, [&](const ConstraintRows& block, int, VectorRef values) {
-    block.derivative(t, q, w, s, values);
-  });
+  for_each_block(
+      d, [&](const ConstraintRows& block, int, VectorRef values) { block.derivative(t, q, w, s, values); });
 }
 
 void ConstraintDistribution::time_derivative(double t, ConstVectorRef q, ConstVectorRef v, VectorRef d) {

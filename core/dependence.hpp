@@ -6,8 +6,8 @@
 
 namespace diracstep {
 
-/// Which second derivatives of a formula in N variables can be other than zero, and which other than constant,
-/// found by running the formula once on this type instead of a number.
+/// Which second derivatives of a formula in N variables can be other than zero, and which other than
+/// constant, found by running the formula once on this type instead of a number.
 ///
 /// A formula that compares or branches on its variables has no single structure: a comparison throws
 /// Dependence::Branches.

@@ -38,14 +38,21 @@ PhasePoint legendre_plus(const DiscreteLagrangianAt& l) { return {l.q1, l.d2}; }
 PhasePoint legendre_minus(const DiscreteLagrangianAt& l) { return {l.q0, -l.d1}; }
 double momentum_function_plus(const PhasePoint&, const PhasePoint& z1) { return z1.p.dot(z1.q); }
 double momentum_function_minus(const PhasePoint& z0, const PhasePoint&) { return -z0.p.dot(z0.q); }
-double generalised_energy_plus(const DiscreteLagrangianAt& l, const Vector& p1) { return p1.dot(l.q1) - l.value; }
-double generalised_energy_minus(const DiscreteLagrangianAt& l, const Vector& p0) { return -p0.dot(l.q0) - l.value; }
+double generalised_energy_plus(const DiscreteLagrangianAt& l, const Vector& p1) {
+  return p1.dot(l.q1) - l.value;
+}
+double generalised_energy_minus(const DiscreteLagrangianAt& l, const Vector& p0) {
+  return -p0.dot(l.q0) - l.value;
+}
 double discrete_hamiltonian_plus(const DiscreteLagrangianAt& l) { return generalised_energy_plus(l, l.d2); }
-double discrete_hamiltonian_minus(const DiscreteLagrangianAt& l) { return generalised_energy_minus(l, -l.d1); }
+double discrete_hamiltonian_minus(const DiscreteLagrangianAt& l) {
+  return generalised_energy_minus(l, -l.d1);
+}
 Covector differential_plus(const DiscreteLagrangianAt& l) { return gamma_plus({l.q0, l.q1, l.d1, l.d2}); }
 Covector differential_minus(const DiscreteLagrangianAt& l) { return gamma_minus({l.q0, l.q1, l.d1, l.d2}); }
 
-DiscreteDiracStructure::DiscreteDiracStructure(const ConstraintBlocks& constraints, int dimension, StepRule rule)
+DiscreteDiracStructure::DiscreteDiracStructure(const ConstraintBlocks& constraints, int dimension,
+                                               StepRule rule)
     : rows_(constraints, dimension), discrete_constraint_(constraints, dimension, rule) {}
 
 double DiscreteDiracStructure::constraint_norm(Interval step, const Vector& q0, const Vector& q1) {
@@ -59,7 +66,8 @@ double DiscreteDiracStructure::outside_annihilator(double t, const Vector& q, co
   rows_.evaluate(t, q);
   Eigen::MatrixXd one_forms = Eigen::MatrixXd::Zero(q.size(), rows_.rows());
   Eigen::Index k = 0;
-  for (const auto& [row, column] : rows_.pattern().entries()) one_forms(column, row) = rows_.coefficients()[k++];
+  for (const auto& [row, column] : rows_.pattern().entries())
+    one_forms(column, row) = rows_.coefficients()[k++];
   const Vector lambda = one_forms.colPivHouseholderQr().solve(covector);
   return max_norm(covector - one_forms * lambda);
 }

@@ -21,7 +21,8 @@ struct PhaseVelocity {
   Vector q, p, q_rate, p_rate;
 };
 
-// --- Continuous limits ------------------------------------------------------------------------------------------
+// --- Continuous limits
+// ------------------------------------------------------------------------------------------
 
 /// Ω♭ : T(T*Q) → T*(T*Q),  (q,p,q̇,ṗ) ↦ (q,p; −ṗ,q̇)                      Leok and Ohsawa (3.5)
 Covector omega_flat(const PhaseVelocity& z);
@@ -30,7 +31,8 @@ Covector kappa(const PhaseVelocity& z);
 /// γ_Q = Ω♭∘κ_Q⁻¹ : T*(TQ) → T*(T*Q),  (q,v; ξ,η) ↦ (q,η; −ξ,v)            (3.16)
 Covector gamma(const Covector& on_tangent_bundle);
 
-// --- Discrete maps ----------------------------------------------------------------------------------------------
+// --- Discrete maps
+// ----------------------------------------------------------------------------------------------
 
 /// κ^d_Q : T*Q×T*Q → T*(Q×Q),  ((q0,p0),(q1,p1)) ↦ (q0,q1; −p0,p1)          (2.13)
 Covector discrete_kappa(const PhasePoint& z0, const PhasePoint& z1);
@@ -43,7 +45,8 @@ Covector gamma_plus(const Covector& on_pairs);
 /// γ^{d−}_Q = Ω♭_{d−}∘(κ^d_Q)⁻¹,  (q0,q1; ξ,η) ↦ (−ξ,q1; −q0,−η)             (4.42)
 Covector gamma_minus(const Covector& on_pairs);
 
-// --- Discrete Legendre transforms and energies of L_d at (q0,q1) ------------------------------------------------
+// --- Discrete Legendre transforms and energies of L_d at (q0,q1)
+// ------------------------------------------------
 
 /// First derivatives of L_d at a pair of points, and its value.
 struct DiscreteLagrangianAt {
@@ -71,12 +74,14 @@ double discrete_hamiltonian_minus(const DiscreteLagrangianAt& l);
 Covector differential_plus(const DiscreteLagrangianAt& l);
 Covector differential_minus(const DiscreteLagrangianAt& l);
 
-// --- Membership -------------------------------------------------------------------------------------------------
+// --- Membership
+// -------------------------------------------------------------------------------------------------
 
 /// How far ((z0,z1),α) is from a discrete Dirac structure; both are zero for a member.
 struct Membership {
-  double constraint;   ///< maximum norm of c(q0,q1): (q0,q1) ∈ Δ^d_Q
-  double annihilator;  ///< maximum norm of what α − Ω♭(z0,z1) has outside the annihilator, base point included
+  double constraint;  ///< maximum norm of c(q0,q1): (q0,q1) ∈ Δ^d_Q
+  double
+      annihilator;  ///< maximum norm of what α − Ω♭(z0,z1) has outside the annihilator, base point included
 };
 
 /// The discrete Dirac structures D_{d+} (4.24) and D_{d−} (4.41) of a discrete constraint.

@@ -28,7 +28,8 @@ void require_type(const GeneratingFunction& s, GeneratingType a, GeneratingType 
 
 }  // namespace
 
-DiscreteCurve curve_of(double start, double step, const std::vector<Vector>& q, const std::vector<Vector>& p) {
+DiscreteCurve curve_of(double start, double step, const std::vector<Vector>& q,
+                       const std::vector<Vector>& p) {
   if (q.size() < 2 || q.size() != p.size())
     throw Misuse("a discrete curve needs two points or more, and as many momenta as configurations");
   return {start, step, {q.begin(), q.end() - 1}, {q.begin() + 1, q.end()}, p};
@@ -70,8 +71,9 @@ double stationarity_residual(GeneratingFunction& s, DiscreteDiracStructure& stru
     s.gradient(step, columns_on(s, curve, k), g);
     const Vector start = graph.start_sign * g.col(0), end = graph.end_sign * g.col(1);
     if (!start.allFinite() || !end.allFinite()) return HUGE_VAL;
-    take(graph.starts_from_position ? structure.outside_annihilator(step.start, curve.q0[k], curve.p[k] - start)
-                                    : (curve.q0[k] - start).lpNorm<Eigen::Infinity>());
+    take(graph.starts_from_position
+             ? structure.outside_annihilator(step.start, curve.q0[k], curve.p[k] - start)
+             : (curve.q0[k] - start).lpNorm<Eigen::Infinity>());
     take(graph.ends_at_position ? structure.outside_annihilator(step.end(), curve.q1[k], curve.p[k + 1] - end)
                                 : (curve.q1[k] - end).lpNorm<Eigen::Infinity>());
     if (k + 1 < curve.steps()) take((curve.q1[k] - curve.q0[k + 1]).lpNorm<Eigen::Infinity>());

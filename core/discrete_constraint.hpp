@@ -11,8 +11,8 @@ namespace diracstep {
 ///   nonholonomic rows   Σ w_i [A(t_i, q_i)(q1−q0) + h b(t_i, q_i)],   q_i = (1−c_i) q0 + c_i q1
 ///   holonomic rows      φ(t1, q1), so that nothing drifts
 ///
-/// with the nodes of `rule` (left, right: order 1; midpoint, trapezoidal: order 2).  It contains the diagonal and
-/// induces Δ_Q back (Leok and Ohsawa (4.17)–(4.19)).
+/// with the nodes of `rule` (left, right: order 1; midpoint, trapezoidal: order 2).  It contains the diagonal
+/// and induces Δ_Q back (Leok and Ohsawa (4.17)–(4.19)).
 class DiscreteConstraint {
  public:
   DiscreteConstraint(const ConstraintBlocks& blocks, int dimension, StepRule rule);

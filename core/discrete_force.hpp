@@ -11,8 +11,9 @@ namespace diracstep {
 ///
 ///   F⁻ = h Σ w_i (1−c_i) f(t_i, q_i, (q1−q0)/h),   F⁺ = h Σ w_i c_i f(t_i, q_i, (q1−q0)/h)
 ///
-/// F⁻ acts before the graph of S and F⁺ after it, whatever the type of S (discrete Lagrange–d'Alembert principle,
-/// Marsden and West, Acta Numerica 2001, 3.2): order 2 with the midpoint and trapezoidal rules, 1 with the others.
+/// F⁻ acts before the graph of S and F⁺ after it, whatever the type of S (discrete Lagrange–d'Alembert
+/// principle, Marsden and West, Acta Numerica 2001, 3.2): order 2 with the midpoint and trapezoidal rules, 1
+/// with the others.
 class DiscreteForce {
  public:
   DiscreteForce(std::shared_ptr<const Force> force, StepRule rule);

@@ -11,8 +11,8 @@
 namespace diracstep {
 
 /// An external or dissipative generalised force f(t, q, v), n components, energy per unit of the coordinate.
-/// Derivatives come as values on one symmetric n×n pattern.  Objects are immutable and may be used from several
-/// threads at once.
+/// Derivatives come as values on one symmetric n×n pattern.  Objects are immutable and may be used from
+/// several threads at once.
 class Force {
  public:
   explicit Force(SparsityPattern pattern) : pattern_(std::move(pattern)) {}
@@ -25,7 +25,8 @@ class Force {
 
   virtual void value(double t, ConstVectorRef q, ConstVectorRef v, VectorRef f) const = 0;
   /// fq(i,j) = ∂f_i/∂q_j,  fv(i,j) = ∂f_i/∂v_j.
-  virtual void derivatives(double t, ConstVectorRef q, ConstVectorRef v, VectorRef fq, VectorRef fv) const = 0;
+  virtual void derivatives(double t, ConstVectorRef q, ConstVectorRef v, VectorRef fq,
+                           VectorRef fv) const = 0;
 
  private:
   SparsityPattern pattern_;

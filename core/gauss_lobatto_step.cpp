@@ -110,7 +110,8 @@ class GaussLobattoStep final : public StepProblem {
   void jacobian(ConstVectorRef x, VectorRef values) override {
     evaluate(x);
     for (int i = 0; i < s_; ++i) {
-      lagrangian_->hessian(gauss_time(i), q_.col(i), x.segment(n_ * i, n_), lqq_.col(i), lqv_.col(i), lvv_.col(i));
+      lagrangian_->hessian(gauss_time(i), q_.col(i), x.segment(n_ * i, n_), lqq_.col(i), lqv_.col(i),
+                           lvv_.col(i));
       if (force_)
         force_->derivatives(gauss_time(i), q_.col(i), x.segment(n_ * i, n_), fq_.col(i), fv_.col(i));
     }
@@ -156,10 +157,10 @@ class GaussLobattoStep final : public StepProblem {
     }
 
     std::shared_ptr<const ConstraintRows> block;
-    int first;            ///< its first row among the scene's
-    Columns at_lobatto;   ///< A at the Lobatto nodes
-    Columns at_gauss;     ///< A at the Gauss nodes, nonholonomic rows only
-    Columns curvature;    ///< ∂(Aᵀλ_j)/∂q at the Lobatto nodes
+    int first;           ///< its first row among the scene's
+    Columns at_lobatto;  ///< A at the Lobatto nodes
+    Columns at_gauss;    ///< A at the Gauss nodes, nonholonomic rows only
+    Columns curvature;   ///< ∂(Aᵀλ_j)/∂q at the Lobatto nodes
     Vector derivative, offset;
     std::vector<int> impulse_places, row_places;  ///< layout numbers, one for each (stage, node)
     std::vector<int> curvature_places;
@@ -196,8 +197,8 @@ class GaussLobattoStep final : public StepProblem {
     for (Rows& rows : rows_)
       for (int j = 0; j < s_; ++j) {
         if (j > 0) rows.evaluate_impulse_rows(lobatto_time(j), lobatto_q_.col(j), j);
-        rows.block->pattern().transposed_multiply_add(rows.at_lobatto.col(j).data(), x.data() + row_of(j) + rows.first,
-                                                      impulses_.col(j).data());
+        rows.block->pattern().transposed_multiply_add(
+            rows.at_lobatto.col(j).data(), x.data() + row_of(j) + rows.first, impulses_.col(j).data());
       }
   }
 
@@ -246,7 +247,8 @@ class GaussLobattoStep final : public StepProblem {
     const auto at = [this](int i, int k) { return static_cast<std::size_t>(i * s_ + k); };
     for (int j = 1; j < s_; ++j)
       rows.block->annihilator_derivative(lobatto_time(j), lobatto_q_.col(j),
-                                         x.segment(row_of(j) + rows.first, rows.block->rows()), rows.curvature.col(j));
+                                         x.segment(row_of(j) + rows.first, rows.block->rows()),
+                                         rows.curvature.col(j));
     for (int i = 0; i < s_; ++i)
       for (int k = 0; k < s_; ++k) {
         add(values, rows.impulse_places[at(i, k)], -table_.e(i, k), rows.at_lobatto.col(k).data());
@@ -262,7 +264,8 @@ class GaussLobattoStep final : public StepProblem {
     const auto place = [&](int k) { return rows.row_places[static_cast<std::size_t>(j * s_ + k)]; };
     if (rows.block->holonomic()) {
       rows.evaluate_impulse_rows(lobatto_time(j + 1), lobatto_q_.col(j + 1), j + 1);
-      for (int k = 0; k < s_; ++k) add(values, place(k), table_.lobatto_a(j + 1, k), rows.at_lobatto.col(j + 1).data());
+      for (int k = 0; k < s_; ++k)
+        add(values, place(k), table_.lobatto_a(j + 1, k), rows.at_lobatto.col(j + 1).data());
       return;
     }
     rows.block->coefficients(gauss_time(j), q_.col(j), rows.at_gauss.col(j), rows.offset);
@@ -302,9 +305,9 @@ class GaussLobattoStep final : public StepProblem {
   Interval step_{0.0, 1.0};
   Vector q0_, p0_;
   Vector last_x_, f_;
-  Columns q_, lobatto_q_;    ///< configurations at the Gauss and the Lobatto nodes
-  Columns lq_, lv_;          ///< ∂L/∂q + f and ∂L/∂v at the Gauss nodes
-  Columns impulses_;         ///< A(Q~_j)ᵀ λ_j
+  Columns q_, lobatto_q_;  ///< configurations at the Gauss and the Lobatto nodes
+  Columns lq_, lv_;        ///< ∂L/∂q + f and ∂L/∂v at the Gauss nodes
+  Columns impulses_;       ///< A(Q~_j)ᵀ λ_j
   Columns lqq_, lqv_, lvv_, fq_, fv_;
 };
 

@@ -104,7 +104,8 @@ Extended integral(const Row& nodes, const Row& weights, std::size_t j, Extended 
 
 Vector rounded(const Row& row) {
   Vector column(static_cast<Eigen::Index>(row.size()));
-  for (std::size_t i = 0; i < row.size(); ++i) column[static_cast<Eigen::Index>(i)] = static_cast<double>(row[i]);
+  for (std::size_t i = 0; i < row.size(); ++i)
+    column[static_cast<Eigen::Index>(i)] = static_cast<double>(row[i]);
   return column;
 }
 
@@ -113,8 +114,8 @@ Vector rounded(const Row& row) {
 GaussLobattoTableau gauss_lobatto_tableau(int s) {
   if (s < 1 || s > 20) throw Misuse("GL(" + std::to_string(s) + "): the number of stages must be 1 to 20");
   const Row c = gauss_nodes(s), b = gauss_weights(c), lc = lobatto_nodes(s), lb = lobatto_weights(lc);
-  GaussLobattoTableau t{rounded(c), rounded(b), rounded(lc), rounded(lb), Columns(s, s), Columns(s, s),
-                        Columns(s + 1, s), Columns(s, s + 1)};
+  GaussLobattoTableau t{rounded(c),    rounded(b),    rounded(lc),       rounded(lb),
+                        Columns(s, s), Columns(s, s), Columns(s + 1, s), Columns(s, s + 1)};
   const auto at = [](int i) { return static_cast<std::size_t>(i); };
   for (int i = 0; i < s; ++i)
     for (int j = 0; j < s; ++j) {

@@ -17,8 +17,8 @@ namespace diracstep {
 ///   four   S(p0,p1)   q0 =  D1S   q1 = −D2S
 enum class GeneratingType { one = 1, two = 2, three = 3, four = 4 };
 
-/// What a type's arguments are, and the signs of its graph: start data = start_sign · D1S, end data = end_sign · D2S,
-/// where start and end data are whatever the arguments are not.
+/// What a type's arguments are, and the signs of its graph: start data = start_sign · D1S, end data =
+/// end_sign · D2S, where start and end data are whatever the arguments are not.
 struct GraphOf {
   bool starts_from_position;
   bool ends_at_position;
@@ -27,10 +27,14 @@ struct GraphOf {
 };
 constexpr GraphOf graph_of(GeneratingType type) {
   switch (type) {
-    case GeneratingType::one: return {true, true, -1.0, 1.0};
-    case GeneratingType::two: return {true, false, 1.0, 1.0};
-    case GeneratingType::three: return {false, true, -1.0, -1.0};
-    case GeneratingType::four: break;
+    case GeneratingType::one:
+      return {true, true, -1.0, 1.0};
+    case GeneratingType::two:
+      return {true, false, 1.0, 1.0};
+    case GeneratingType::three:
+      return {false, true, -1.0, -1.0};
+    case GeneratingType::four:
+      break;
   }
   return {false, false, 1.0, -1.0};
 }
@@ -54,13 +58,13 @@ class ExplicitGraph {
   virtual void mobility(Interval step, VectorRef values) = 0;
 };
 
-/// S over one step, action (energy·time), with first and second derivatives: what a construction of a discrete
-/// Lagrangian or Hamiltonian, or a plugin, supplies.
+/// S over one step, action (energy·time), with first and second derivatives: what a construction of a
+/// discrete Lagrangian or Hamiltonian, or a plugin, supplies.
 ///
-/// S is a function of 2 + r columns of n numbers: its arguments a and b, whose meaning the type fixes, and r inner
-/// columns (stages, or the end points of a Legendre transform) at which S is stationary.  Second derivatives come
-/// as values on one symmetric n×n pattern, block by block: column pair(i,j), i ≤ j, of the output holds
-/// ∂²S/∂y_i∂y_j, rows for y_i.  An object belongs to one integrator and may keep workspaces.
+/// S is a function of 2 + r columns of n numbers: its arguments a and b, whose meaning the type fixes, and r
+/// inner columns (stages, or the end points of a Legendre transform) at which S is stationary.  Second
+/// derivatives come as values on one symmetric n×n pattern, block by block: column pair(i,j), i ≤ j, of the
+/// output holds ∂²S/∂y_i∂y_j, rows for y_i.  An object belongs to one integrator and may keep workspaces.
 class GeneratingFunction {
  public:
   GeneratingFunction(GeneratingType type, SparsityPattern pattern, int inner_columns = 0)
@@ -97,8 +101,8 @@ class GeneratingFunction {
   int inner_columns_;
 };
 
-/// Moves the inner columns of y to where S is stationary in them, by Newton's method from where they are; false where
-/// that fails.  For looking at S alone: a step solves for its inner columns along with the rest.
+/// Moves the inner columns of y to where S is stationary in them, by Newton's method from where they are;
+/// false where that fails.  For looking at S alone: a step solves for its inner columns along with the rest.
 bool make_stationary(GeneratingFunction& s, Interval step, ColumnsRef y);
 
 }  // namespace diracstep

@@ -28,16 +28,16 @@ void require_step(double step) {
 
 }  // namespace
 
-Integrator::Preparation Integrator::prepare(std::shared_ptr<const Scene> given, const IntegratorOptions& options,
-                                           const SolverFactory& solvers) {
+Integrator::Preparation Integrator::prepare(std::shared_ptr<const Scene> given,
+                                            const IntegratorOptions& options, const SolverFactory& solvers) {
   Preparation result{completed(std::move(given)), {}};
   auto& scene = result.scene;
   require_size("scene '" + scene->name + "': the start q", scene->start.q.size(), scene->dimension());
   if (scene->rows() > 0 && scene->rows() <= most_rows_to_test && scene->start.q.allFinite()) {
     const std::vector<std::string> dependent = dependent_rows(*scene, scene->start);
     if (!dependent.empty() && !options.drop_dependent_rows)
-      throw Misuse("scene '" + scene->name + "': rows that depend on others at the start: " + joined(dependent) +
-                   "; remove them, or ask for dependent rows to be dropped");
+      throw Misuse("scene '" + scene->name + "': rows that depend on others at the start: " +
+                   joined(dependent) + "; remove them, or ask for dependent rows to be dropped");
     if (!dependent.empty()) {
       scene = without_rows(*scene, dependent);
       result.lines.push_back({"dropped rows", joined(dependent), "they depend on others at the start"});
@@ -83,7 +83,8 @@ Integrator::Integrator(Preparation preparation, const Registry& registry, const 
   reset(scene_->start);
 }
 
-Integrator::Part Integrator::make_part(const Method& method, bool mirror_rule, const SolverFactory& solvers) const {
+Integrator::Part Integrator::make_part(const Method& method, bool mirror_rule,
+                                       const SolverFactory& solvers) const {
   std::optional<StepRule> rule = options_.constraint_rule;
   if (rule && mirror_rule) rule = mirrored(*rule);
   Part part{method.step(*scene_, dense_, rule, options_.force_degenerate), nullptr};
@@ -212,7 +213,8 @@ StepReport Integrator::step() {
   return {total, work_.steps++, start, {}};
 }
 
-/// v, and the forces of the rows into acceleration_unknowns_.  Reading leaves no trace in the stepping: v_ stays.
+/// v, and the forces of the rows into acceleration_unknowns_.  Reading leaves no trace in the stepping: v_
+/// stays.
 SolveReport Integrator::solve_velocity(double t, Vector& v) {
   const Eigen::Index n = q_.size();
   if (phase_space_velocity_problem_) {
@@ -285,15 +287,18 @@ std::vector<PlanLine> Integrator::plan() const {
     lines.push_back({"multipliers", std::to_string(m) + (method_.make ? "" : " a node"),
                      !method_.make ? "nonholonomic rows at the Gauss, holonomic rows at the Lobatto nodes"
                                    : std::string("nonholonomic rows by the ") + name(rule) +
-                                             " rule, holonomic rows at the end of the step"});
-    lines.push_back({"projection", "where the state is read", "p is defined up to the annihilator between steps"});
+                                         " rule, holonomic rows at the end of the step"});
+    lines.push_back(
+        {"projection", "where the state is read", "p is defined up to the annihilator between steps"});
   }
-  lines.push_back({"composition", stages_.size() == 1 ? "left out" : std::to_string(stages_.size()) + " stages",
+  lines.push_back({"composition",
+                   stages_.size() == 1 ? "left out" : std::to_string(stages_.size()) + " stages",
                    "order " + std::to_string(options_.order) + ", the method's own is " +
                        std::to_string(method_.info.order)});
   lines.push_back({"forces", scene_->force ? "two impulses a step" : "left out",
                    scene_->force ? "by the rule of the rows" : "the scene has none"});
-  lines.push_back({"Hamiltonian", scene_->hamiltonian ? "given" : "derived only by methods that need it", ""});
+  lines.push_back(
+      {"Hamiltonian", scene_->hamiltonian ? "given" : "derived only by methods that need it", ""});
   return lines;
 }
 
@@ -305,7 +310,8 @@ RunReport run(Integrator& integrator, long steps, Momentum momentum, long every,
     report.last.solve = integrator.sample(momentum, sample);
     if (!report.last.ok()) {
       std::ostringstream message;
-      message << "reading the state at t = " << integrator.time() << ": " << describe(report.last.solve.status);
+      message << "reading the state at t = " << integrator.time() << ": "
+              << describe(report.last.solve.status);
       report.last.failure = message.str();
       return false;
     }
@@ -332,7 +338,8 @@ StepGrid fit_steps(double start, double end, double step) {
   const double count = std::abs(ratio - nearest) <= 1e-9 * nearest ? nearest : std::ceil(ratio);
   if (count > 1e15) {
     std::ostringstream message;
-    message << "the step size " << step << " is too small: " << count << " steps would be needed, at most 1e15 are taken";
+    message << "the step size " << step << " is too small: " << count
+            << " steps would be needed, at most 1e15 are taken";
     throw Misuse(message.str());
   }
   return {static_cast<long>(count), (end - start) / count};

@@ -24,21 +24,22 @@ enum class Momentum {
 
 struct IntegratorOptions {
   std::string method = "type1/midpoint";
-  int order = 0;      ///< composed to this order, methods that are not self-adjoint with their adjoint; 0 keeps
-                      ///< the method's own
-  double step = 0.0;  ///< step size, may be negative; must be given
+  int order = 0;  ///< composed to this order, methods that are not self-adjoint with their adjoint; 0 keeps
+                  ///< the method's own
+  double step = 0.0;                                       ///< step size, may be negative; must be given
   std::optional<StepRule> constraint_rule = std::nullopt;  ///< instead of the method's own
-  int dense_limit = 40;  ///< systems of up to this many unknowns use full matrices
-  bool force_degenerate = false;      ///< use a method on a degenerate scene that is known to be unstable there
-  bool project_start = false;         ///< move an inconsistent start onto the constraints instead of refusing it
-  bool drop_dependent_rows = false;   ///< leave out rows that depend on others at the start instead of refusing
+  int dense_limit = 40;           ///< systems of up to this many unknowns use full matrices
+  bool force_degenerate = false;  ///< use a method on a degenerate scene that is known to be unstable there
+  bool project_start = false;     ///< move an inconsistent start onto the constraints instead of refusing it
+  bool drop_dependent_rows =
+      false;  ///< leave out rows that depend on others at the start instead of refusing
 };
 
 /// What one step did.  A failed step leaves the state as it was.
 struct [[nodiscard]] StepReport {
   SolveReport solve;
-  long step = 0;      ///< number of the step, from 0
-  double time = 0.0;  ///< where it started
+  long step = 0;        ///< number of the step, from 0
+  double time = 0.0;    ///< where it started
   std::string failure;  ///< empty, or what went wrong and where, with the residual of each block
 
   bool ok() const { return solve.ok(); }
@@ -71,11 +72,13 @@ struct PlanLine {
 };
 
 /// Steps a scene with one method.  Owns every workspace and its solvers, and shares nothing: integrators on
-/// different threads do not meet.  The scene's data are planned once, here; a step allocates nothing of its own.
+/// different threads do not meet.  The scene's data are planned once, here; a step allocates nothing of its
+/// own.
 class Integrator {
  public:
-  /// Throws Misuse for a bad scene, start, method, order or step; for an inconsistent start, and for rows that depend on
-  /// others there, unless the options say otherwise.  What was moved or dropped stands in plan().
+  /// Throws Misuse for a bad scene, start, method, order or step; for an inconsistent start, and for rows
+  /// that depend on others there, unless the options say otherwise.  What was moved or dropped stands in
+  /// plan().
   Integrator(std::shared_ptr<const Scene> scene, const Registry& registry, SolverFactory solvers,
              IntegratorOptions options);
 
@@ -136,7 +139,8 @@ class Integrator {
   std::vector<Stage> stages_;
   VelocityProblem velocity_problem_;
   AccelerationProblem acceleration_problem_;
-  std::optional<PhaseSpaceVelocityProblem> phase_space_velocity_problem_;  ///< instead of both, where L is linear in v
+  std::optional<PhaseSpaceVelocityProblem>
+      phase_space_velocity_problem_;  ///< instead of both, where L is linear in v
   std::unique_ptr<NonlinearSolver> velocity_solver_;
   std::unique_ptr<NonlinearSolver> acceleration_solver_;
 

@@ -30,9 +30,7 @@ class Jet {
 
   double value() const { return value_; }
   double gradient(int i) const { return gradient_[static_cast<std::size_t>(i)]; }
-  double hessian(int i, int j) const
-    requires(Order == 2)
-  {
+  double hessian(int i, int j) const requires(Order == 2) {
     return hessian_[static_cast<std::size_t>(i >= j ? i * (i + 1) / 2 + j : j * (j + 1) / 2 + i)];
   }
 
@@ -44,8 +42,7 @@ class Jet {
       std::size_t k = 0;
       for (std::size_t i = 0; i < N; ++i) {
         const double s = d2f * x.gradient_[i];
-        for (std::size_t j = 0; j <= i; ++j, ++k)
-          y.hessian_[k] = df * x.hessian_[k] + s * x.gradient_[j];
+        for (std::size_t j = 0; j <= i; ++j, ++k) y.hessian_[k] = df * x.hessian_[k] + s * x.gradient_[j];
       }
     }
     return y;

@@ -59,7 +59,8 @@ class Transform final : public Base {
 
   static PhaseStructure structure_of(const PhaseStructure& f) {
     const bool constant_and_separable = f.separable && f.y_hessian_constant;
-    return {f.separable, f.y_hessian_constant, f.y_hessian_diagonal, constant_and_separable && f.quadratic, false};
+    return {f.separable, f.y_hessian_constant, f.y_hessian_diagonal, constant_and_separable && f.quadratic,
+            false};
   }
 
   Blocks blocks(double t, ConstVectorRef x, ConstVectorRef y) const {
@@ -85,7 +86,8 @@ class Transform final : public Base {
   std::shared_ptr<const From> f_;
 };
 
-void require_regular(const PhaseFunction& f, double t, ConstVectorRef x, ConstVectorRef y, const char* message) {
+void require_regular(const PhaseFunction& f, double t, ConstVectorRef x, ConstVectorRef y,
+                     const char* message) {
   const SparsityPattern& pattern = f.pattern();
   Vector fxx(pattern.nonzeros()), fxy(pattern.nonzeros()), fyy(pattern.nonzeros());
   f.hessian(t, x, y, fxx, fxy, fyy);

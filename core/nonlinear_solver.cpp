@@ -4,10 +4,14 @@ namespace diracstep {
 
 const char* describe(SolveStatus status) {
   switch (status) {
-    case SolveStatus::ok: return "ok";
-    case SolveStatus::no_convergence: return "no convergence";
-    case SolveStatus::singular_jacobian: return "singular Jacobian";
-    case SolveStatus::not_finite: return "a value was not finite";
+    case SolveStatus::ok:
+      return "ok";
+    case SolveStatus::no_convergence:
+      return "no convergence";
+    case SolveStatus::singular_jacobian:
+      return "singular Jacobian";
+    case SolveStatus::not_finite:
+      return "a value was not finite";
   }
   return "unknown status";
 }

@@ -12,7 +12,7 @@ namespace diracstep {
 
 /// Consecutive rows of a residual that share a meaning and a unit.
 struct ResidualBlock {
-  const char* name;    ///< "momentum", "constraint", …
+  const char* name;  ///< "momentum", "constraint", …
   int rows;
   double scale = 1.0;  ///< size of the terms that cancel in these rows at a solution; round-off is ε·scale
 };

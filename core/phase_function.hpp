@@ -16,8 +16,8 @@ struct PhaseStructure {
   bool separable = false;           ///< ∂²f/∂x∂y = 0
   bool y_hessian_constant = false;  ///< ∂²f/∂y² depends on nothing
   bool y_hessian_diagonal = false;
-  bool quadratic = false;           ///< every second derivative is constant
-  bool y_hessian_zero = false;      ///< f is linear in y: a phase-space Lagrangian
+  bool quadratic = false;       ///< every second derivative is constant
+  bool y_hessian_zero = false;  ///< f is linear in y: a phase-space Lagrangian
 };
 
 /// A smooth function f(t, x, y) of two columns of n numbers, with its first and second derivatives.

@@ -8,7 +8,9 @@ namespace diracstep {
 
 namespace {
 
-double max_norm(const Eigen::Ref<const Columns>& x) { return x.size() == 0 ? 0.0 : x.lpNorm<Eigen::Infinity>(); }
+double max_norm(const Eigen::Ref<const Columns>& x) {
+  return x.size() == 0 ? 0.0 : x.lpNorm<Eigen::Infinity>();
+}
 double usable_scale(double scale) { return scale > 0.0 && std::isfinite(scale) ? scale : 1.0; }
 
 /// First and second derivatives of L at one point; L_vv vanishes.
@@ -100,10 +102,12 @@ class PhaseSpaceStep final : public StepProblem {
     lagrangian_->hessian(step_.end(), q1_, nu, end_along_.qq, end_along_.qv, end_along_.vv);
     values.setZero();
     for (int row = 0; row < s_; ++row) {
-      for (int k = 0; k < s_; ++k) set_block(values, row, k, [&](Eigen::Index e) { return stage_by_velocity(row, k, e); });
+      for (int k = 0; k < s_; ++k)
+        set_block(values, row, k, [&](Eigen::Index e) { return stage_by_velocity(row, k, e); });
       set_block(values, row, s_, [&](Eigen::Index e) { return stage_by_projection(row, e); });
     }
-    for (int k = 0; k < s_; ++k) set_block(values, s_, k, [&](Eigen::Index e) { return end_by_velocity(k, e); });
+    for (int k = 0; k < s_; ++k)
+      set_block(values, s_, k, [&](Eigen::Index e) { return end_by_velocity(k, e); });
     set_block(values, s_, s_, [&](Eigen::Index e) { return end_by_projection(e); });
   }
 
@@ -147,7 +151,9 @@ class PhaseSpaceStep final : public StepProblem {
   }
 
   // Value e of the blocks; `theta` is Dθ = L_vq, the transpose of L_qv.
-  double theta(const Derivatives& d, Eigen::Index e) const { return d.qv[mirror_[static_cast<std::size_t>(e)]]; }
+  double theta(const Derivatives& d, Eigen::Index e) const {
+    return d.qv[mirror_[static_cast<std::size_t>(e)]];
+  }
   double stage_by_velocity(int i, int k, Eigen::Index e) const {
     const double h = step_.size;
     double sum = h * table_.a(i, k) * theta(stage(i), e) - h * table_.a_hat(i, k) * stage(k).qv[e];
@@ -198,7 +204,8 @@ class PhaseSpaceStep final : public StepProblem {
 
 std::unique_ptr<StepProblem> phase_space_step(int s, const Scene& scene, bool dense) {
   const std::string prefix = "scene '" + scene.name + "': ";
-  if (!scene.lagrangian->structure().y_hessian_zero) throw Misuse(prefix + "its Lagrangian is not linear in v");
+  if (!scene.lagrangian->structure().y_hessian_zero)
+    throw Misuse(prefix + "its Lagrangian is not linear in v");
   if (scene.rows() > 0 || scene.force)
     throw Misuse(prefix + "rows and forces on a Lagrangian that is linear in v are not supported");
   return std::make_unique<PhaseSpaceStep>(s, scene, dense);

@@ -13,15 +13,15 @@ namespace diracstep {
 ///   q1 = q̃0 + h Σ b_k V_k + σν,   p̃1 = p̃0 + h Σ b_j ∂L/∂q(Q_j,V_j)
 ///   0  = θ(q1) − p̃1 − σ Dθ(q1)ᵀν,   p1 = θ(q1),   σ = (−1)^s
 ///
-/// with unknowns V_1 … V_s and ν.  The sign σ is the stability function of the Gauss method at infinity; with the other
-/// one the order is lost or the system is singular.  Without the projection p leaves the constraint and the order in a
-/// general gauge drops to s.
+/// with unknowns V_1 … V_s and ν.  The sign σ is the stability function of the Gauss method at infinity; with
+/// the other one the order is lost or the system is singular.  Without the projection p leaves the constraint
+/// and the order in a general gauge drops to s.
 ///
 /// Throws Misuse unless L is known to be linear in v, has no rows and no force, and 1 ≤ s ≤ 20.
 std::unique_ptr<StepProblem> phase_space_step(int s, const Scene& scene, bool dense);
 
-/// Unknown v, linear:   ∂L/∂q(q,v) = Dθ(q) v,  that is (Dθᵀ − Dθ) v = ∂H/∂q: the velocity of a phase-space Lagrangian.
-/// Regular where the two-form dθ is.
+/// Unknown v, linear:   ∂L/∂q(q,v) = Dθ(q) v,  that is (Dθᵀ − Dθ) v = ∂H/∂q: the velocity of a phase-space
+/// Lagrangian. Regular where the two-form dθ is.
 class PhaseSpaceVelocityProblem final : public NonlinearProblem {
  public:
   PhaseSpaceVelocityProblem(const Scene& scene, bool dense);

@@ -1,6 +1,6 @@
 #include <algorithm>
-#include <cmath>
 #include <array>
+#include <cmath>
 #include <diracstep/core/predictor.hpp>
 
 namespace diracstep {
@@ -10,12 +10,8 @@ namespace {
 constexpr std::size_t longest = 5;
 
 /// Weights, newest first, of the polynomial through k equally spaced values, taken one spacing further.
-constexpr std::array<std::array<double, longest>, longest + 1> extrapolation{{{},
-                                                                              {1.0},
-                                                                              {2.0, -1.0},
-                                                                              {3.0, -3.0, 1.0},
-                                                                              {4.0, -6.0, 4.0, -1.0},
-                                                                              {5.0, -10.0, 10.0, -5.0, 1.0}}};
+constexpr std::array<std::array<double, longest>, longest + 1> extrapolation{
+    {{}, {1.0}, {2.0, -1.0}, {3.0, -3.0, 1.0}, {4.0, -6.0, 4.0, -1.0}, {5.0, -10.0, 10.0, -5.0, 1.0}}};
 
 /// The rules are compared at every step of the first ones, then now and then.
 constexpr long always_until = 12, later_every = 16;

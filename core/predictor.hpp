@@ -7,9 +7,10 @@ namespace diracstep {
 
 /// Guesses the unknowns of the next step from those of the last ones.
 ///
-/// Two families of rules: polynomials through the same unknown over the last steps, and, for steps with stages, the
-/// polynomial through the stages of the last step plus what that missed in the steps before.  Which rule is best depends
-/// on the scene and the step; the predictor compares them with the solutions as they come and uses the best.
+/// Two families of rules: polynomials through the same unknown over the last steps, and, for steps with
+/// stages, the polynomial through the stages of the last step plus what that missed in the steps before.
+/// Which rule is best depends on the scene and the step; the predictor compares them with the solutions as
+/// they come and uses the best.
 class Predictor {
  public:
   explicit Predictor(StepProblem& problem);

@@ -1,10 +1,10 @@
 #include <diracstep/core/errors.hpp>
+#include <diracstep/core/gauss_lobatto_step.hpp>
+#include <diracstep/core/gauss_lobatto_tableau.hpp>
 #include <diracstep/core/generating_functions/adjoint.hpp>
 #include <diracstep/core/generating_functions/euler.hpp>
 #include <diracstep/core/generating_functions/legendre.hpp>
 #include <diracstep/core/generating_functions/quadrature.hpp>
-#include <diracstep/core/gauss_lobatto_step.hpp>
-#include <diracstep/core/gauss_lobatto_tableau.hpp>
 #include <diracstep/core/phase_space_step.hpp>
 #include <diracstep/core/registry.hpp>
 #include <regex>
@@ -15,14 +15,17 @@ namespace {
 
 std::string prefix_of(GeneratingType type) { return "type" + std::to_string(static_cast<int>(type)) + "/"; }
 
-void add_quadrature(Registry& registry, StepRule rule, int order, std::string summary, std::string adjoint = {}) {
+void add_quadrature(Registry& registry, StepRule rule, int order, std::string summary,
+                    std::string adjoint = {}) {
   // GL(1) is the midpoint step with the velocity as its unknown, which loses a factor h less to round-off.
   StepFactory step;
-  if (rule == StepRule::midpoint) step = [](const Scene& scene, bool dense) { return gauss_lobatto_step(1, scene, dense); };
-  registry.add({std::string("type1/") + name(rule), GeneratingType::one, order, order == 2, rule,
-                std::move(summary), std::move(adjoint)},
-               [rule](const Scene& scene) { return quadrature_lagrangian(scene.lagrangian, rule); }, std::move(step),
-               rule == StepRule::midpoint ? 1 : 0);
+  if (rule == StepRule::midpoint)
+    step = [](const Scene& scene, bool dense) { return gauss_lobatto_step(1, scene, dense); };
+  registry.add(
+      {std::string("type1/") + name(rule), GeneratingType::one, order, order == 2, rule, std::move(summary),
+       std::move(adjoint)},
+      [rule](const Scene& scene) { return quadrature_lagrangian(scene.lagrangian, rule); }, std::move(step),
+      rule == StepRule::midpoint ? 1 : 0);
 }
 
 /// "typeN/word(inner)" taken apart.
@@ -45,9 +48,14 @@ std::optional<Method> gauss_lobatto_method(const std::string& name) {
   if (!std::regex_match(name, match, std::regex("type([1-3])/gl:([0-9]{1,4})"))) return std::nullopt;
   const int s = std::stoi(match[2]);
   gauss_lobatto_tableau(s);  // throws for a number of stages that is not allowed
-  const MethodInfo info{name, static_cast<GeneratingType>(std::stoi(match[1])), 2 * s, true, StepRule::midpoint,
+  const MethodInfo info{name,
+                        static_cast<GeneratingType>(std::stoi(match[1])),
+                        2 * s,
+                        true,
+                        StepRule::midpoint,
                         "Gauss-Lobatto Dirac step, " + std::to_string(s) + (s == 1 ? " stage" : " stages")};
-  return Method{info, nullptr, [s](const Scene& scene, bool dense) { return gauss_lobatto_step(s, scene, dense); }, s};
+  return Method{info, nullptr,
+                [s](const Scene& scene, bool dense) { return gauss_lobatto_step(s, scene, dense); }, s};
 }
 
 }  // namespace
@@ -74,8 +82,8 @@ Registry Registry::with_built_ins() {
   registry.add({"type2/euler", GeneratingType::two, 1, false, StepRule::left, "H_d+ = p1 q0 + h H(q0, p1)",
                 "type3/euler"},
                [](const Scene& scene) { return euler_type2(hamiltonian_of(scene)); });
-  registry.add({"type3/euler", GeneratingType::three, 1, false, StepRule::right, "H_d- = -p0 q1 + h H(q1, p0)",
-                "type2/euler"},
+  registry.add({"type3/euler", GeneratingType::three, 1, false, StepRule::right,
+                "H_d- = -p0 q1 + h H(q1, p0)", "type2/euler"},
                [](const Scene& scene) { return euler_type3(hamiltonian_of(scene)); });
   return registry;
 }
@@ -105,7 +113,8 @@ Method Registry::transformed(const std::string& name) const {
     throw Misuse(message + " typeN/gl:S typeN/adjoint(...)");
   }
   const Method inner = method(transform.inner);
-  if (!inner.make) throw Misuse("'" + name + "': " + transform.inner + " is no generating function of its end points");
+  if (!inner.make)
+    throw Misuse("'" + name + "': " + transform.inner + " is no generating function of its end points");
   MethodInfo info = inner.info;
   info.name = name;
   info.type = transform.type;
@@ -114,7 +123,8 @@ Method Registry::transformed(const std::string& name) const {
     if (inner.info.type != GeneratingType::one || transform.type == GeneratingType::one)
       throw Misuse("'" + name + "': the discrete Legendre transform leads from type 1 to types 2, 3 and 4");
     info.summary = "discrete Legendre transform of " + transform.inner;
-    return {info, [inner, type = transform.type](const Scene& scene) { return legendre(type, inner.make(scene)); }};
+    return {info,
+            [inner, type = transform.type](const Scene& scene) { return legendre(type, inner.make(scene)); }};
   }
   if (transform.type != adjoint_type(inner.info.type))
     throw Misuse("'" + name + "': the adjoint is of another type; use " +

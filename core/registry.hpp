@@ -24,8 +24,8 @@ struct MethodInfo {
   std::string adjoint = {};  ///< the method that is its adjoint, if there is one by name; else one is made
 };
 
-/// Makes the generating function of a method for a scene that has a Lagrangian; throws Misuse where the scene lacks
-/// what the method needs.
+/// Makes the generating function of a method for a scene that has a Lagrangian; throws Misuse where the scene
+/// lacks what the method needs.
 using GeneratingFunctionFactory = std::function<std::unique_ptr<GeneratingFunction>(const Scene&)>;
 
 /// Makes the step of a method that has one of its own.
@@ -38,10 +38,10 @@ struct Method {
   StepFactory make_step = {};      ///< a step of its own; empty where it is that of the generating function
   int stages = 0;                  ///< S for a step GL(S); 0 for others
 
-  /// The step on a scene, with the method's own rule for Δ^d_Q or another.  Throws Misuse for another rule where the
-  /// method is no generating function of its end points, and for a degenerate scene (a Lagrangian linear in v) where the
-  /// method is not one of the Gauss-Lobatto family, unless `force_degenerate`: one-sided and trapezoidal rules are
-  /// unstable there.
+  /// The step on a scene, with the method's own rule for Δ^d_Q or another.  Throws Misuse for another rule
+  /// where the method is no generating function of its end points, and for a degenerate scene (a Lagrangian
+  /// linear in v) where the method is not one of the Gauss-Lobatto family, unless `force_degenerate`:
+  /// one-sided and trapezoidal rules are unstable there.
   std::unique_ptr<StepProblem> step(const Scene& scene, bool dense, std::optional<StepRule> rule = {},
                                     bool force_degenerate = false) const;
 };
@@ -49,7 +49,8 @@ struct Method {
 /// Methods by name.  A registry is a value: nothing is global.
 ///
 /// Beside the registered names it knows three families:
-///   typeN/gl:S                N = 1, 2, 3: the Gauss–Lobatto Dirac step with S stages, order 2S (gauss_lobatto_step.hpp);
+///   typeN/gl:S                N = 1, 2, 3: the Gauss–Lobatto Dirac step with S stages, order 2S
+///   (gauss_lobatto_step.hpp);
 ///                             the three types are one system, written with other data given
 ///   typeN/legendre(type1/…)   N = 2, 3, 4: the discrete Legendre transform of a method of type 1
 ///   typeN/adjoint(…)          the adjoint of a method; N is its type
@@ -59,8 +60,8 @@ class Registry {
   static Registry with_built_ins();
 
   /// Throws Misuse for a name that is taken, or is not of the form typeN/construction with N the type.
-  /// `make_step`, where given, must solve the step of the generating function; it may do so in other unknowns,
-  /// as GL(`stages`) does.
+  /// `make_step`, where given, must solve the step of the generating function; it may do so in other
+  /// unknowns, as GL(`stages`) does.
   void add(MethodInfo info, GeneratingFunctionFactory make, StepFactory make_step = {}, int stages = 0);
 
   /// Throws Misuse for an unknown name, listing the known ones.

@@ -12,8 +12,8 @@ namespace diracstep {
 ///     [ ∂²L/∂v²  −Aᵀ ]
 ///     [    A       0  ]
 ///
-/// They turn a momentum into a velocity of the distribution, and a velocity into an acceleration and the forces of
-/// the constraint.  Both are regular where ∂²L/∂v² is so on Δ_Q and the rows are independent.
+/// They turn a momentum into a velocity of the distribution, and a velocity into an acceleration and the
+/// forces of the constraint.  Both are regular where ∂²L/∂v² is so on Δ_Q and the rows are independent.
 class SaddlePointProblem : public NonlinearProblem {
  public:
   SaddlePointProblem(const Scene& scene, bool dense);
@@ -27,7 +27,8 @@ class SaddlePointProblem : public NonlinearProblem {
   /// The saddle-point matrix with ∂²L/∂v² taken at v.
   void assemble(ConstVectorRef v, VectorRef values);
   void set_scales(double momentum, double velocity);
-  /// The scales cover the terms at x as well: ∂²L/∂v² or ∂L/∂v of size `momentum`, and A times both parts of x.
+  /// The scales cover the terms at x as well: ∂²L/∂v² or ∂L/∂v of size `momentum`, and A times both parts of
+  /// x.
   void raise_scales(double momentum, ConstVectorRef x);
 
   const Scene& scene_;

@@ -117,11 +117,11 @@ void require_consistent(const Scene& scene, const Start& start) {
     residual = b;
     block->pattern().multiply_add(a.data(), start.v.data(), residual.data());
     terms = b.cwiseAbs() + Vector::Ones(m);
-    block->pattern().multiply_add(a.cwiseAbs().eval().data(), start.v.cwiseAbs().eval().data(),
-                                  terms.data());
+    block->pattern().multiply_add(a.cwiseAbs().eval().data(), start.v.cwiseAbs().eval().data(), terms.data());
     for (int r = 0; r < m; ++r)
       if (!(std::abs(residual[r]) <= start_tolerance * terms[r]))
-        throw_off_row(scene, *block, r, "the velocity is off the distribution, A v + b", residual[r], terms[r]);
+        throw_off_row(scene, *block, r, "the velocity is off the distribution, A v + b", residual[r],
+                      terms[r]);
   }
 }
 

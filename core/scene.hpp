@@ -9,8 +9,8 @@
 
 namespace diracstep {
 
-/// Where a motion starts: a configuration, and a velocity in the distribution or (for a scene with a Hamiltonian)
-/// a momentum whose velocity ∂H/∂p lies in it.
+/// Where a motion starts: a configuration, and a velocity in the distribution or (for a scene with a
+/// Hamiltonian) a momentum whose velocity ∂H/∂p lies in it.
 struct Start {
   double time = 0.0;
   Vector q;
@@ -51,8 +51,8 @@ std::shared_ptr<const Scene> completed(std::shared_ptr<const Scene> scene);
 /// The scene's Hamiltonian, or the one derived from its Lagrangian.  Throws Misuse where that is degenerate.
 std::shared_ptr<const Hamiltonian> hamiltonian_of(const Scene& scene);
 
-/// Throws Misuse where the start is of the wrong size, is not finite, violates φ(q) = 0, or has a velocity off
-/// the distribution; names the coordinate or the row, and the amount.  A row counts as violated when its
+/// Throws Misuse where the start is of the wrong size, is not finite, violates φ(q) = 0, or has a velocity
+/// off the distribution; names the coordinate or the row, and the amount.  A row counts as violated when its
 /// residual exceeds 1e-10 of the terms that cancel in it.
 void require_consistent(const Scene& scene, const Start& start);
 

@@ -26,8 +26,7 @@ SparsityPattern::SparsityPattern(int rows, int columns, std::vector<std::pair<in
   for (const auto& [row, column] : entries) {
     if (row < 0 || row >= rows || column < 0 || column >= columns)
       throw Misuse("sparsity pattern: entry (" + std::to_string(row) + ", " + std::to_string(column) +
-                   ") lies outside a " + std::to_string(rows) + " by " + std::to_string(columns) +
-                   " matrix");
+                   ") lies outside a " + std::to_string(rows) + " by " + std::to_string(columns) + " matrix");
     ++column_starts_[static_cast<std::size_t>(column) + 1];
     row_indices_.push_back(row);
   }
@@ -67,8 +66,7 @@ std::vector<int> SparsityPattern::transposed_positions() const {
   return mirror;
 }
 
-void SparsityPattern::multiply_add(const double* values, const double* x, double* y,
-                                   double factor) const {
+void SparsityPattern::multiply_add(const double* values, const double* x, double* y, double factor) const {
   for (int j = 0; j < columns(); ++j) {
     const double scaled = factor * x[j];
     for (int k = column_starts_[static_cast<std::size_t>(j)];
@@ -133,8 +131,8 @@ int BlockPattern::add(const SparsityPattern& block, int row, int column, bool tr
 SparsityPattern BlockPattern::assemble(bool dense) {
   std::vector<std::pair<int, int>> all;
   for (const auto& entries : entries_) all.insert(all.end(), entries.begin(), entries.end());
-  const SparsityPattern whole = dense ? SparsityPattern::dense(rows_, columns_)
-                                      : SparsityPattern(rows_, columns_, std::move(all));
+  const SparsityPattern whole =
+      dense ? SparsityPattern::dense(rows_, columns_) : SparsityPattern(rows_, columns_, std::move(all));
   for (const auto& entries : entries_) {
     auto& positions = positions_.emplace_back();
     positions.reserve(entries.size());

@@ -30,7 +30,8 @@ class SparsityPattern {
   /// Index into the values of entry (row, column), or -1 where the pattern has none.
   int position(int row, int column) const;
 
-  /// The same entries with rows and columns exchanged; value k of this pattern is value order[k] of the other.
+  /// The same entries with rows and columns exchanged; value k of this pattern is value order[k] of the
+  /// other.
   SparsityPattern transposed(std::vector<int>& order) const;
 
   /// For each value of this square pattern the position of its mirror entry, which must exist.
@@ -38,8 +39,7 @@ class SparsityPattern {
 
   /// y += factor · M x   and   y += factor · Mᵀ x.
   void multiply_add(const double* values, const double* x, double* y, double factor = 1.0) const;
-  void transposed_multiply_add(const double* values, const double* x, double* y,
-                               double factor = 1.0) const;
+  void transposed_multiply_add(const double* values, const double* x, double* y, double factor = 1.0) const;
 
   bool operator==(const SparsityPattern&) const = default;
 
@@ -49,8 +49,8 @@ class SparsityPattern {
   std::vector<int> row_indices_;
 };
 
-/// A product of two matrices on fixed patterns, either of them transposed: the pattern of the product, and for each
-/// value of it which products of values add up to it.
+/// A product of two matrices on fixed patterns, either of them transposed: the pattern of the product, and
+/// for each value of it which products of values add up to it.
 class PatternProduct {
  public:
   PatternProduct() = default;
@@ -80,9 +80,7 @@ class BlockPattern {
   SparsityPattern assemble(bool dense);
 
   /// positions(b)[k] is the place in the whole of value k of block b.
-  const std::vector<int>& positions(int block) const {
-    return positions_[static_cast<std::size_t>(block)];
-  }
+  const std::vector<int>& positions(int block) const { return positions_[static_cast<std::size_t>(block)]; }
 
  private:
   int rows_;

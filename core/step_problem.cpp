@@ -100,7 +100,9 @@ class ImplicitStep final : public StepProblem {
     else
       x.head(n_) = h * data_.p0;
     x.segment(n_, m_).setZero();
-    if (inner_ > 0) s_->guess_inner(data_.step, data_.q0, data_.p0, v0, Eigen::Map<Columns>(x.data() + n_ + m_, n_, s_->inner_columns()));
+    if (inner_ > 0)
+      s_->guess_inner(data_.step, data_.q0, data_.p0, v0,
+                      Eigen::Map<Columns>(x.data() + n_ + m_, n_, s_->inner_columns()));
   }
 
   void residual(ConstVectorRef x, VectorRef f) override {
@@ -147,8 +149,8 @@ class ImplicitStep final : public StepProblem {
  private:
   /// A block of the Jacobian that is a block of the Hessian of S times factors of h.
   struct HessianBlock {
-    int row_column;     ///< the column of S whose derivative is the row: 0 graph, 2… stationarity
-    int unknown;        ///< the column of S that is the unknown: 1 end, 2… inner
+    int row_column;  ///< the column of S whose derivative is the row: 0 graph, 2… stationarity
+    int unknown;     ///< the column of S that is the unknown: 1 end, 2… inner
     int pair;
     int layout;
     double row_factor(const ImplicitStep& step) const {
@@ -157,8 +159,8 @@ class ImplicitStep final : public StepProblem {
     double column_factor(const ImplicitStep& step) const { return unknown == 1 ? step.end_factor() : 1.0; }
   };
 
-  /// A product of the constraint's rows or columns with a block of the Hessian of S, for what enters through p̂0 or
-  /// leaves through q1 = ±D2S.
+  /// A product of the constraint's rows or columns with a block of the Hessian of S, for what enters through
+  /// p̂0 or leaves through q1 = ±D2S.
   struct ProductBlock {
     int column;  ///< the column of S that the row belongs to, or that the unknown is
     int pair;
@@ -260,7 +262,8 @@ class ImplicitStep final : public StepProblem {
           plan(row, s_->pair(0, row), row_of(row), 0, PatternProduct(s_->pattern(), row > 0, f1, false));
     } else {
       for (int unknown = 1; unknown < s_->columns(); ++unknown)
-        plan(unknown, s_->pair(1, unknown), 0, place_of(unknown), PatternProduct(f1, false, s_->pattern(), false));
+        plan(unknown, s_->pair(1, unknown), 0, place_of(unknown),
+             PatternProduct(f1, false, s_->pattern(), false));
     }
   }
 
@@ -301,7 +304,8 @@ class ImplicitStep final : public StepProblem {
       add(values, block.layout, graph_.end_sign * factor, block.values.data());
     }
     if (graph_.starts_from_position) return;
-    impulse_through_end_.multiply(c1.data(), columns_of_impulse_[1].values.data(), through_end_values_.data());
+    impulse_through_end_.multiply(c1.data(), columns_of_impulse_[1].values.data(),
+                                  through_end_values_.data());
     add(values, impulse_through_end_layout_, graph_.end_sign / data_.step.size, through_end_values_.data());
   }
 
@@ -320,7 +324,8 @@ class ImplicitStep final : public StepProblem {
   }
 
   void update_scales() {
-    const double own = graph_.starts_from_position ? std::abs(data_.step.size) * max_norm(data_.p0) : max_norm(data_.q0);
+    const double own =
+        graph_.starts_from_position ? std::abs(data_.step.size) * max_norm(data_.p0) : max_norm(data_.q0);
     blocks_[0].scale = usable_scale(std::max(own, std::abs(row_factor()) * cancelling_terms(0)));
     if (m_ > 0) blocks_[1].scale = data_.constraint_scale();
     if (inner_ == 0) return;
@@ -404,7 +409,8 @@ class MultiplierStep final : public StepProblem {
     evaluate(x);
     data_.discrete_constraint.end_derivative(data_.step, data_.q0, q1_, data_.end_derivative);
     graph_.mobility(data_.step, mobility_);
-    displacement_.multiply(mobility_.data(), data_.start_rows.coefficients().data(), displacement_values_.data());
+    displacement_.multiply(mobility_.data(), data_.start_rows.coefficients().data(),
+                           displacement_values_.data());
     response_.multiply(data_.end_derivative.data(), displacement_values_.data(), response_values_.data());
     values.setZero();
     const auto& places = layout_.positions(0);
@@ -441,8 +447,8 @@ class MultiplierStep final : public StepProblem {
 
 }  // namespace
 
-std::unique_ptr<StepProblem> dirac_step(std::unique_ptr<GeneratingFunction> generating_function, const Scene& scene,
-                                        StepRule rule, bool dense) {
+std::unique_ptr<StepProblem> dirac_step(std::unique_ptr<GeneratingFunction> generating_function,
+                                        const Scene& scene, StepRule rule, bool dense) {
   if (generating_function->explicit_graph() != nullptr && !scene.force)
     return std::make_unique<MultiplierStep>(std::move(generating_function), scene, rule, dense);
   return std::make_unique<ImplicitStep>(std::move(generating_function), scene, rule, dense);

@@ -12,8 +12,8 @@ namespace diracstep {
 
 /// One discrete Dirac step as a nonlinear problem: the only thing a solver sees.
 ///
-/// A step from (q0,p0) is  begin → solve for the unknowns x → finish.  Its size may be zero: then there is nothing
-/// to solve, and finish does all.
+/// A step from (q0,p0) is  begin → solve for the unknowns x → finish.  Its size may be zero: then there is
+/// nothing to solve, and finish does all.
 class StepProblem : public NonlinearProblem {
  public:
   /// Freezes the data of the step.
@@ -22,12 +22,12 @@ class StepProblem : public NonlinearProblem {
   /// A guess for the unknowns from a velocity at q0.
   virtual void guess(const Vector& v0, VectorRef x) = 0;
 
-  /// Once x solves the problem: the end point, and the impulse λ (momentum over the unit of a row) that entered at
-  /// q0 as A(q0)ᵀλ.
+  /// Once x solves the problem: the end point, and the impulse λ (momentum over the unit of a row) that
+  /// entered at q0 as A(q0)ᵀλ.
   virtual void finish(ConstVectorRef x, Vector& q1, Vector& p1, Vector& impulse) = 0;
 
-  /// For steps with stages: x from the polynomials through the stages of the last step, taken into this one.  False
-  /// where the step has none.
+  /// For steps with stages: x from the polynomials through the stages of the last step, taken into this one.
+  /// False where the step has none.
   virtual bool extrapolate_stages(ConstVectorRef /*last*/, VectorRef /*x*/) const { return false; }
 
   /// How many unknowns come before the multipliers, whose guess hardly matters.
@@ -53,11 +53,11 @@ class StepProblem : public NonlinearProblem {
 ///   four   h p1, hλ     q0 − D1S(p̂0,p1),         c(q0, −D2S)
 ///
 /// followed by the inner columns of S with their rows ∂S/∂(inner) = 0.  The factors h make rows and unknowns
-/// comparable to positions, so that the Jacobian stays of order 1 as h → 0.  Without rows of the constraint there is
-/// no λ.  Where S solves its graph for the end, the unknowns are hλ alone with c(q0, q1(p̂0)) = 0, or none.
-/// With `dense` the Jacobian is a full matrix.  Throws Misuse for a force with type four, whose end point is not known
-/// before its momentum.
-std::unique_ptr<StepProblem> dirac_step(std::unique_ptr<GeneratingFunction> generating_function, const Scene& scene,
-                                        StepRule rule, bool dense);
+/// comparable to positions, so that the Jacobian stays of order 1 as h → 0.  Without rows of the constraint
+/// there is no λ.  Where S solves its graph for the end, the unknowns are hλ alone with c(q0, q1(p̂0)) = 0, or
+/// none. With `dense` the Jacobian is a full matrix.  Throws Misuse for a force with type four, whose end
+/// point is not known before its momentum.
+std::unique_ptr<StepProblem> dirac_step(std::unique_ptr<GeneratingFunction> generating_function,
+                                        const Scene& scene, StepRule rule, bool dense);
 
 }  // namespace diracstep

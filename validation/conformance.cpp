@@ -57,11 +57,13 @@ std::shared_ptr<const Scene> starting_at(const Scene& scene, const Sample& point
   return copy;
 }
 
-/// Whether the slopes of the last points and of those before them agree closely: finer steps would tell nothing new.
+/// Whether the slopes of the last points and of those before them agree closely: finer steps would tell
+/// nothing new.
 bool settled(const std::vector<Point>& points) {
   if (std::ssize(points) < 6 * fitted_points) return false;
   const auto end = points.end();
-  return std::abs(slope_of({end - fitted_points, end}) - slope_of({end - 2 * fitted_points, end - fitted_points})) < 0.01;
+  return std::abs(slope_of({end - fitted_points, end}) -
+                  slope_of({end - 2 * fitted_points, end - fitted_points})) < 0.01;
 }
 
 }  // namespace
@@ -77,8 +79,8 @@ std::vector<OrderScene> order_scenes() {
   const Registry registry = Registry::with_built_ins();
   for (OrderScene& scene : scenes) {
     const StepGrid grid = fit_steps(0.0, scene.t_end, scene.t_end / 240.0);
-    end_of(registry, scene.scene, {.method = "type1/gl:6", .step = grid.step}, grid.steps, Momentum::projected,
-           scene.reference);
+    end_of(registry, scene.scene, {.method = "type1/gl:6", .step = grid.step}, grid.steps,
+           Momentum::projected, scene.reference);
   }
   return scenes;
 }
@@ -195,11 +197,14 @@ double membership_residual(const Registry& registry, const std::shared_ptr<const
     s->gradient(step, y, g);
     const Covector d{y.col(0), y.col(1), g.col(0), g.col(1)};
     const bool lagrangian = s->type() == GeneratingType::one;
-    const auto take = [&](const Membership& m) { largest = std::max({largest, m.constraint, m.annihilator}); };
+    const auto take = [&](const Membership& m) {
+      largest = std::max({largest, m.constraint, m.annihilator});
+    };
     if (s->type() != GeneratingType::three)
       take(structure.plus(step, {q[k], plus[k]}, {q[k + 1], plus[k + 1]}, lagrangian ? gamma_plus(d) : d));
     if (s->type() != GeneratingType::two)
-      take(structure.minus(step, {q[k], minus[k]}, {q[k + 1], minus[k + 1]}, lagrangian ? gamma_minus(d) : d));
+      take(
+          structure.minus(step, {q[k], minus[k]}, {q[k + 1], minus[k + 1]}, lagrangian ? gamma_minus(d) : d));
   }
   return largest;
 }

@@ -5,8 +5,9 @@
 #include <string>
 #include <vector>
 
-/// Measurements that hold a method to what is stated of it: orders, reversibility, symplecticity, and membership in the
-/// discrete Dirac structures.  They run on the scenes of law_scenes.hpp and need nothing but a registry.
+/// Measurements that hold a method to what is stated of it: orders, reversibility, symplecticity, and
+/// membership in the discrete Dirac structures.  They run on the scenes of law_scenes.hpp and need nothing
+/// but a registry.
 namespace diracstep {
 
 /// A scene of one constraint class on which orders are measured, and the finest solution known on it.
@@ -22,29 +23,31 @@ std::vector<OrderScene> order_scenes();
 
 /// An order found by halving the step until the errors are asymptotic.
 struct MeasuredOrder {
-  double order = 0.0;     ///< NaN where it could not be measured
-  double error = 0.0;     ///< at the finer step of the last pair
+  double order = 0.0;  ///< NaN where it could not be measured
+  double error = 0.0;  ///< at the finer step of the last pair
   double step = 0.0;
-  std::string failure;    ///< empty, or why there is no order
+  std::string failure;  ///< empty, or why there is no order
 };
 
-/// Order of q and of the momentum representative in the maximum norm at the end: the slope of log(error) over log(h)
-/// through the four finest of a ladder of steps, four to an octave, that lie above round-off: above 1e-12 and 1e-13 times the
-/// square root of the solves (it grows like a random walk), and, where the slope
+/// Order of q and of the momentum representative in the maximum norm at the end: the slope of log(error) over
+/// log(h) through the four finest of a ladder of steps, four to an octave, that lie above round-off: above
+/// 1e-12 and 1e-13 times the square root of the solves (it grows like a random walk), and, where the slope
 /// falls below half the claimed order before, above 30 times the error there.
 MeasuredOrder measure_order(const Registry& registry, const OrderScene& scene, IntegratorOptions options,
                             Momentum momentum = Momentum::projected);
 
-/// |Φ_{−h}(Φ_h(y)) − y| in q and projected p, with the method's own step both ways: round-off for a self-adjoint method.
+/// |Φ_{−h}(Φ_h(y)) − y| in q and projected p, with the method's own step both ways: round-off for a
+/// self-adjoint method.
 double reversal_defect(const Registry& registry, const std::shared_ptr<const Scene>& scene,
                        const IntegratorOptions& options);
 
-/// Largest entry of MᵀΩM − Ω for the Jacobian M of one step on an unconstrained scene, by central differences of sixth
-/// order: about 1e-11 for a symplectic step.
+/// Largest entry of MᵀΩM − Ω for the Jacobian M of one step on an unconstrained scene, by central differences
+/// of sixth order: about 1e-11 for a symplectic step.
 double symplecticity_defect(const Registry& registry, const std::shared_ptr<const Scene>& scene,
                             const IntegratorOptions& options);
 
-/// Largest residual of membership in D_{d+} and D_{d−} over `steps` steps; NaN for a method for which none is stated.
+/// Largest residual of membership in D_{d+} and D_{d−} over `steps` steps; NaN for a method for which none is
+/// stated.
 double membership_residual(const Registry& registry, const std::shared_ptr<const Scene>& scene,
                            const IntegratorOptions& options, long steps);
 

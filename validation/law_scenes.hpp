@@ -7,8 +7,8 @@
 #include <diracstep/core/scene.hpp>
 #include <memory>
 
-/// Small non-linear scenes of each constraint class, on which the laws of a step are checked and orders measured; none
-/// has a special symmetry.
+/// Small non-linear scenes of each constraint class, on which the laws of a step are checked and orders
+/// measured; none has a special symmetry.
 namespace diracstep::laws {
 
 /// A particle in space with a non-quadratic potential and a position-dependent mass.
@@ -80,7 +80,8 @@ inline std::shared_ptr<const Scene> mixed() {
   scene.constraints = {holonomic<3, 1>(Sphere{}, {"sphere"}), pfaffian<3, 1>(ShiftedContact{}, {"contact"})};
   const double x = 1.0, y = 0.5, z = std::sqrt(0.5);
   scene.start.q << x, y, z;
-  scene.start.v << 2.0 * y * (2.0 + y), z - 2.0 * x * (2.0 + y), -2.0 * y;  // (2x, 2y, z) × (1, 0, 2+y), turned
+  scene.start.v << 2.0 * y * (2.0 + y), z - 2.0 * x * (2.0 + y),
+      -2.0 * y;  // (2x, 2y, z) × (1, 0, 2+y), turned
   scene.start.v *= 0.15;
   return std::make_shared<const Scene>(scene);
 }
@@ -90,8 +91,8 @@ inline std::shared_ptr<const Scene> driven() {
   Scene scene = particle("driven");
   scene.lagrangian = lagrangian<3>([](const auto& q, const auto& v, const auto& t) {
     using std::cos, std::sin;
-    return 0.5 * (1.0 + 0.2 * sin(t)) * (v[0] * v[0] + v[1] * v[1]) + 0.5 * v[2] * v[2] * (1.0 + 0.1 * q[0] * q[0]) -
-           0.5 * q[1] * q[1] * (1.0 + q[2] * q[2]) * cos(t);
+    return 0.5 * (1.0 + 0.2 * sin(t)) * (v[0] * v[0] + v[1] * v[1]) +
+           0.5 * v[2] * v[2] * (1.0 + 0.1 * q[0] * q[0]) - 0.5 * q[1] * q[1] * (1.0 + q[2] * q[2]) * cos(t);
   });
   scene.constraints = {affine<3, 1>(
                            []<class T>(const std::array<T, 3>& q, const T& t) {

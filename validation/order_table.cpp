@@ -65,7 +65,8 @@ bool holds(const OrderTableRow& row) {
   });
 }
 
-std::string order_table_markdown(const std::vector<OrderTableRow>& rows, const std::vector<OrderScene>& scenes) {
+std::string order_table_markdown(const std::vector<OrderTableRow>& rows,
+                                 const std::vector<OrderScene>& scenes) {
   std::string text = "| method | claimed |";
   std::string rule = "|---|---|";
   for (const OrderScene& scene : scenes) {

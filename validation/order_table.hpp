@@ -13,9 +13,10 @@ struct OrderTableRow {
   std::string method;
   int order = 0;                        ///< claimed
   std::vector<MeasuredOrder> measured;  ///< one for each of order_scenes()
-  double reversal_defect = 0.0;         ///< on the mixed scene, h = 0.05; NaN where the method is not self-adjoint
-  double symplecticity_defect = 0.0;    ///< on the unconstrained scene, h = 0.05; NaN for a composition
-  double membership_residual = 0.0;     ///< largest over the constraint classes, 20 steps of h = 0.05; NaN where none is stated
+  double reversal_defect = 0.0;  ///< on the mixed scene, h = 0.05; NaN where the method is not self-adjoint
+  double symplecticity_defect = 0.0;  ///< on the unconstrained scene, h = 0.05; NaN for a composition
+  double membership_residual =
+      0.0;  ///< largest over the constraint classes, 20 steps of h = 0.05; NaN where none is stated
 };
 
 /// One line of the table is one of these.
@@ -24,18 +25,20 @@ struct TableMethod {
   int order;
 };
 
-/// Every method of the registry with its own order, the symmetric compositions of those of order 1, and type1/midpoint
-/// composed to 4, 6 and 8.
+/// Every method of the registry with its own order, the symmetric compositions of those of order 1, and
+/// type1/midpoint composed to 4, 6 and 8.
 std::vector<TableMethod> table_methods(const Registry& registry);
 
 /// Measures a row.
-OrderTableRow measure_row(const Registry& registry, const TableMethod& method, const std::vector<OrderScene>& scenes);
+OrderTableRow measure_row(const Registry& registry, const TableMethod& method,
+                          const std::vector<OrderScene>& scenes);
 
-/// Whether claim and measurement agree within 0.2 on every class the method takes.  A method measured above its claim
-/// fails too: the claim is then wrong.
+/// Whether claim and measurement agree within 0.2 on every class the method takes.  A method measured above
+/// its claim fails too: the claim is then wrong.
 bool holds(const OrderTableRow& row);
 
 /// The table as Markdown, for the documentation.
-std::string order_table_markdown(const std::vector<OrderTableRow>& rows, const std::vector<OrderScene>& scenes);
+std::string order_table_markdown(const std::vector<OrderTableRow>& rows,
+                                 const std::vector<OrderScene>& scenes);
 
 }  // namespace diracstep

@@ -22,10 +22,14 @@ struct Shape {
 
 Shape shape_of(GeneratingType type) {
   switch (type) {
-    case GeneratingType::two: return {0, 2, 1, -1.0, {{1, 2, 1.0}}};
-    case GeneratingType::three: return {2, 1, 1, -1.0, {{0, 2, -1.0}}};
-    case GeneratingType::four: return {2, 3, 2, 1.0, {{0, 2, 1.0}, {1, 3, -1.0}}};
-    case GeneratingType::one: break;
+    case GeneratingType::two:
+      return {0, 2, 1, -1.0, {{1, 2, 1.0}}};
+    case GeneratingType::three:
+      return {2, 1, 1, -1.0, {{0, 2, -1.0}}};
+    case GeneratingType::four:
+      return {2, 3, 2, 1.0, {{0, 2, 1.0}, {1, 3, -1.0}}};
+    case GeneratingType::one:
+      break;
   }
   throw Misuse("the discrete Legendre transform leads to types 2, 3 and 4");
 }

@@ -6,8 +6,8 @@ namespace diracstep {
 
 namespace {
 
-/// For L = ½ vᵀMv + b(q)... with constant diagonal M and no term that mixes q and v, and nodes at the ends only:
-/// D1S holds q1 linearly, so  q1 = q0 + h M⁻¹ (p0 − ∂(the rest)/∂v + h w_0 ∂L/∂q(q0)).
+/// For L = ½ vᵀMv + b(q)... with constant diagonal M and no term that mixes q and v, and nodes at the ends
+/// only: D1S holds q1 linearly, so  q1 = q0 + h M⁻¹ (p0 − ∂(the rest)/∂v + h w_0 ∂L/∂q(q0)).
 class SeparableEnds final : public ExplicitGraph {
  public:
   SeparableEnds(const Lagrangian& lagrangian, std::span<const StepNode> nodes)

@@ -27,8 +27,8 @@ int main() {
   Integrator integrator(std::make_shared<const Scene>(disk), Registry::with_built_ins(), kinsol(),
                         {.method = "type1/midpoint", .order = 4, .step = 0.05});
   const RunReport report = run(integrator, 200, Momentum::projected, 40, [](const Sample& s) {
-    std::printf("t = %4.1f   x = %+.6f   y = %+.6f   contact force = (%+.4f, %+.4f)\n", s.time, s.q[0], s.q[1],
-                s.lambda[0], s.lambda[1]);
+    std::printf("t = %4.1f   x = %+.6f   y = %+.6f   contact force = (%+.4f, %+.4f)\n", s.time, s.q[0],
+                s.q[1], s.lambda[0], s.lambda[1]);
     return true;
   });
   if (!report.ok()) {

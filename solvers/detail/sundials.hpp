@@ -17,7 +17,8 @@ namespace diracstep::detail {
 
 /// Throws where a SUNDIALS set-up call fails; every return code is checked in every build type.
 inline void require(int code, const char* call) {
-  if (code < 0) throw std::runtime_error(std::string("SUNDIALS: ") + call + " returned " + std::to_string(code));
+  if (code < 0)
+    throw std::runtime_error(std::string("SUNDIALS: ") + call + " returned " + std::to_string(code));
 }
 
 template <class T>
@@ -47,8 +48,8 @@ class Context {
 };
 
 #if SUNDIALS_VERSION_MAJOR < 7
-/// Where KINSOL and IDA 6 write their messages: nowhere.  A file of its own keeps them from flushing the program's
-/// streams.
+/// Where KINSOL and IDA 6 write their messages: nowhere.  A file of its own keeps them from flushing the
+/// program's streams.
 class MessageSink {
  public:
   MessageSink() : file_(std::fopen("/dev/null", "w")) {}

@@ -1,6 +1,7 @@
+#include <gtest/gtest.h>
+
 #include <diracstep/core/consistent_start.hpp>
 #include <diracstep/core/errors.hpp>
-#include <gtest/gtest.h>
 
 #include "scenes.hpp"
 #include "stepping.hpp"
@@ -39,7 +40,8 @@ TEST(ConsistentStart, AConsistentStartStays) {
 
 TEST(ConsistentStart, TheIntegratorRefusesOrProjectsAsAsked) {
   EXPECT_THROW(Integrator(inconsistent(), Registry::with_built_ins(), kinsol(), {.step = 0.1}), Misuse);
-  Integrator integrator(inconsistent(), Registry::with_built_ins(), kinsol(), {.step = 0.1, .project_start = true});
+  Integrator integrator(inconsistent(), Registry::with_built_ins(), kinsol(),
+                        {.step = 0.1, .project_start = true});
   EXPECT_TRUE(integrator.step().ok());
   EXPECT_EQ(integrator.plan().front().item, "start");
 }
@@ -90,7 +92,8 @@ TEST(DependentRows, AreRefusedOrDroppedAsAsked) {
     return std::array<std::array<T, 3>, 2>{{{T(1.0), T(0.0), q[1]}, {T(0.0), T(1.0), T(0.0)}}};
   })};
   const auto expected = testing::samples_of(clean, {.step = 0.1}, 10).back();
-  const auto dropped = testing::samples_of(redundant(), {.step = 0.1, .drop_dependent_rows = true}, 10).back();
+  const auto dropped =
+      testing::samples_of(redundant(), {.step = 0.1, .drop_dependent_rows = true}, 10).back();
   EXPECT_LT((dropped.q - expected.q).norm(), 1e-13);
 }
 

@@ -1,6 +1,8 @@
-/// What must hold for every registered method on every constraint class; a new method is covered by being registered.
-#include <diracstep/core/discrete_action.hpp>
+/// What must hold for every registered method on every constraint class; a new method is covered by being
+/// registered.
 #include <gtest/gtest.h>
+
+#include <diracstep/core/discrete_action.hpp>
 
 #include "differences.hpp"
 #include "methods.hpp"
@@ -57,8 +59,10 @@ TEST_P(DiracLaws, LegendreTransformsGiveTheTrajectoryOfTheirDiscreteLagrangian) 
     const auto transformed = samples_of(scene, options(), steps);
     const auto expected = samples_of(scene, {.method = original, .step = h}, steps);
     for (std::size_t k = 0; k < expected.size(); ++k) {
-      EXPECT_LT((transformed[k].q - expected[k].q).lpNorm<Eigen::Infinity>(), 2e-13) << scene->name << " " << k;
-      EXPECT_LT((transformed[k].p - expected[k].p).lpNorm<Eigen::Infinity>(), 5e-12) << scene->name << " " << k;
+      EXPECT_LT((transformed[k].q - expected[k].q).lpNorm<Eigen::Infinity>(), 2e-13)
+          << scene->name << " " << k;
+      EXPECT_LT((transformed[k].p - expected[k].p).lpNorm<Eigen::Infinity>(), 5e-12)
+          << scene->name << " " << k;
     }
   }
 }
@@ -161,7 +165,8 @@ TEST_P(DiracLaws, TrajectoriesAreStationaryForTheirPrinciple) {
 }
 
 /// Error against a run with a far finer step, maximum norm over q and projected p at t = 1.
-double error_at(const std::shared_ptr<const Scene>& scene, const IntegratorOptions& options, const Sample& reference) {
+double error_at(const std::shared_ptr<const Scene>& scene, const IntegratorOptions& options,
+                const Sample& reference) {
   const StepGrid grid = fit_steps(0.0, 1.0, options.step);
   Integrator integrator(scene, Registry::with_built_ins(), kinsol(), options);
   EXPECT_TRUE(run(integrator, grid.steps, Momentum::projected, 1, nullptr).ok());
@@ -232,7 +237,9 @@ TEST(DiracStructure, MomentumFunctionsAreThePotentialsOfTheSumOfTheOneForms) {
   std::srand(3);
   const auto random_point = [] { return PhasePoint{Vector::Random(4), Vector::Random(4)}; };
   const PhasePoint z0 = random_point(), z1 = random_point(), w0 = random_point(), w1 = random_point();
-  const auto pairing = [](const Covector& a, const Vector& x, const Vector& y) { return a.xi.dot(x) + a.eta.dot(y); };
+  const auto pairing = [](const Covector& a, const Vector& x, const Vector& y) {
+    return a.xi.dot(x) + a.eta.dot(y);
+  };
   const auto moved = [](const PhasePoint& z, const PhasePoint& w, double e) {
     return PhasePoint{z.q + e * w.q, z.p + e * w.p};
   };
@@ -240,8 +247,10 @@ TEST(DiracStructure, MomentumFunctionsAreThePotentialsOfTheSumOfTheOneForms) {
     return (g(moved(z0, w0, 1.0), moved(z1, w1, 1.0)) - g(moved(z0, w0, -1.0), moved(z1, w1, -1.0))) / 2.0;
   };
   const double lambda = pairing(discrete_kappa(z0, z1), w0.q, w1.q);
-  EXPECT_NEAR(lambda + pairing(omega_flat_plus(z0, z1), w0.q, w1.p), derivative(momentum_function_plus), 1e-14);
-  EXPECT_NEAR(lambda + pairing(omega_flat_minus(z0, z1), w0.p, w1.q), derivative(momentum_function_minus), 1e-14);
+  EXPECT_NEAR(lambda + pairing(omega_flat_plus(z0, z1), w0.q, w1.p), derivative(momentum_function_plus),
+              1e-14);
+  EXPECT_NEAR(lambda + pairing(omega_flat_minus(z0, z1), w0.p, w1.q), derivative(momentum_function_minus),
+              1e-14);
 }
 
 TEST(DiracStructure, MapsComposeAsStated) {
@@ -274,7 +283,8 @@ TEST(DiracStructure, LegendreTransformsAndEnergiesOfADiscreteLagrangian) {
     z.col(1) = plus ? legendre_plus(l).p : l.q1;
     z.col(2) = (plus ? l.q1 : l.q0) + Vector::Constant(3, 0.01);
     ASSERT_TRUE(make_stationary(*h_d, step, z));
-    EXPECT_NEAR(h_d->value(step, z), plus ? discrete_hamiltonian_plus(l) : discrete_hamiltonian_minus(l), 1e-13);
+    EXPECT_NEAR(h_d->value(step, z), plus ? discrete_hamiltonian_plus(l) : discrete_hamiltonian_minus(l),
+                1e-13);
     EXPECT_LT((z.col(2) - (plus ? l.q1 : l.q0)).norm(), 1e-13);
   }
 }

@@ -1,6 +1,7 @@
+#include <gtest/gtest.h>
+
 #include <diracstep/core/errors.hpp>
 #include <diracstep/core/gauss_lobatto_tableau.hpp>
-#include <gtest/gtest.h>
 
 #include "differences.hpp"
 #include "scenes.hpp"
@@ -61,7 +62,8 @@ TEST(GaussLobattoStep, JacobianAgreesWithDifferences) {
         }
 }
 
-/// The midpoint step as the graph of its generating function, without the velocity form that the registry gives it.
+/// The midpoint step as the graph of its generating function, without the velocity form that the registry
+/// gives it.
 Registry with_plain_midpoint() {
   Registry registry = Registry::with_built_ins();
   MethodInfo info = registry.method("type1/midpoint").info;
@@ -72,8 +74,8 @@ Registry with_plain_midpoint() {
 
 TEST(GaussLobattoStep, OneStageIsTheMidpointStep) {
   for (const auto& scene : testing::every_constraint_class()) {
-    const auto midpoint = samples_of(scene, {.method = "type1/plain_midpoint", .step = 0.05}, 20, Momentum::projected,
-                                     with_plain_midpoint())
+    const auto midpoint = samples_of(scene, {.method = "type1/plain_midpoint", .step = 0.05}, 20,
+                                     Momentum::projected, with_plain_midpoint())
                               .back();
     const auto gauss = samples_of(scene, {.method = gl(1), .step = 0.05}, 20).back();
     EXPECT_LT((gauss.q - midpoint.q).lpNorm<Eigen::Infinity>(), 1e-13) << scene->name;
@@ -84,8 +86,9 @@ TEST(GaussLobattoStep, OneStageIsTheMidpointStep) {
 TEST(GaussLobattoStep, PlusAndMinusMomentaAreThoseOfTheMidpointStepForOneStage) {
   const auto scene = testing::nonholonomic();
   for (const Momentum momentum : {Momentum::plus, Momentum::minus}) {
-    const auto midpoint =
-        samples_of(scene, {.method = "type1/plain_midpoint", .step = 0.05}, 3, momentum, with_plain_midpoint()).back();
+    const auto midpoint = samples_of(scene, {.method = "type1/plain_midpoint", .step = 0.05}, 3, momentum,
+                                     with_plain_midpoint())
+                              .back();
     const auto gauss = samples_of(scene, {.method = gl(1), .step = 0.05}, 3, momentum).back();
     EXPECT_LT((gauss.p - midpoint.p).lpNorm<Eigen::Infinity>(), 1e-13);
   }
@@ -96,7 +99,8 @@ double error_with(const std::shared_ptr<const Scene>& scene, const std::string& 
                   const Sample& reference) {
   const auto end =
       samples_of(scene, {.method = method, .step = 3.6 / static_cast<double>(steps)}, steps).back();
-  const Vector difference = join(join(end.q - reference.q, end.v - reference.v), end.lambda - reference.lambda);
+  const Vector difference =
+      join(join(end.q - reference.q, end.v - reference.v), end.lambda - reference.lambda);
   return difference.lpNorm<Eigen::Infinity>();
 }
 
@@ -106,7 +110,8 @@ void expect_order(const std::shared_ptr<const Scene>& scene, int s, long refinem
   const double first = error_with(scene, gl(s), coarse, reference);
   const double second = error_with(scene, gl(s), 2 * coarse, reference);
   EXPECT_GT(second, 1e-13) << scene->name << ": at round-off, nothing is measured";
-  EXPECT_NEAR(std::log2(first / second), 2.0 * s, 0.35) << scene->name << " s = " << s << " errors " << first << " " << second;
+  EXPECT_NEAR(std::log2(first / second), 2.0 * s, 0.35)
+      << scene->name << " s = " << s << " errors " << first << " " << second;
 }
 
 TEST(GaussLobattoStep, OrderIsTwiceTheStagesInConfigurationVelocityAndMultipliers) {

@@ -1,6 +1,7 @@
+#include <gtest/gtest.h>
+
 #include <diracstep/core/generating_functions/adjoint.hpp>
 #include <diracstep/core/registry.hpp>
-#include <gtest/gtest.h>
 
 #include "differences.hpp"
 #include "methods.hpp"

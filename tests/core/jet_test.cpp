@@ -1,8 +1,8 @@
-#include <diracstep/core/dependence.hpp>
-#include <diracstep/core/jet.hpp>
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <diracstep/core/dependence.hpp>
+#include <diracstep/core/jet.hpp>
 #include <limits>
 
 namespace diracstep {
@@ -11,8 +11,8 @@ namespace {
 /// A formula that goes through every operation and function a user may write.
 template <class T>
 T everything(const T& x, const T& y) {
-  using std::abs, std::acos, std::asin, std::atan, std::atan2, std::cos, std::cosh, std::exp, std::hypot, std::log,
-      std::pow, std::sin, std::sinh, std::sqrt, std::tan, std::tanh;
+  using std::abs, std::acos, std::asin, std::atan, std::atan2, std::cos, std::cosh, std::exp, std::hypot,
+      std::log, std::pow, std::sin, std::sinh, std::sqrt, std::tan, std::tanh;
   T z = sin(x) * cos(y) + exp(x * y) / (1.0 + x * x) - log(2.0 + x) * sqrt(1.0 + y * y);
   z += tan(0.3 * x) - atan(y) + asin(0.4 * x) * acos(0.3 * y) + sinh(0.5 * x) + cosh(y) - tanh(x * y);
   z -= pow(1.0 + x * x, 1.5) * pow(2.0 + y, x);
@@ -33,7 +33,8 @@ TEST(Jet, AgreesWithDifferencesInEveryOperation) {
   close(z.gradient(1), (f(x, y + d) - f(x, y - d)) / (2 * d));
   close(z.hessian(0, 0), (f(x + d, y) - 2 * f(x, y) + f(x - d, y)) / (d * d));
   close(z.hessian(1, 1), (f(x, y + d) - 2 * f(x, y) + f(x, y - d)) / (d * d));
-  close(z.hessian(0, 1), (f(x + d, y + d) - f(x + d, y - d) - f(x - d, y + d) + f(x - d, y - d)) / (4 * d * d));
+  close(z.hessian(0, 1),
+        (f(x + d, y + d) - f(x + d, y - d) - f(x - d, y + d) + f(x - d, y - d)) / (4 * d * d));
   EXPECT_EQ(z.hessian(0, 1), z.hessian(1, 0));
 }
 

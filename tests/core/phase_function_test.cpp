@@ -1,7 +1,8 @@
+#include <gtest/gtest.h>
+
 #include <diracstep/core/errors.hpp>
 #include <diracstep/core/legendre_transform.hpp>
 #include <diracstep/core/phase_function.hpp>
-#include <gtest/gtest.h>
 
 #include "differences.hpp"
 #include "scenes.hpp"
@@ -16,7 +17,8 @@ struct Driven {
   template <class T>
   T operator()(const std::array<T, 2>& q, const std::array<T, 2>& v, const T& t) const {
     using std::cos, std::sin;
-    return 0.5 * (1.0 + 0.3 * sin(t)) * v[0] * v[0] + v[1] * v[1] * (1.0 + q[0] * q[0]) - cos(q[0] * q[1]) * t;
+    return 0.5 * (1.0 + 0.3 * sin(t)) * v[0] * v[0] + v[1] * v[1] * (1.0 + q[0] * q[0]) -
+           cos(q[0] * q[1]) * t;
   }
 };
 
@@ -70,7 +72,8 @@ TEST(PhaseFunction, LegendreTransformHasExactDerivativesAndIsAnInvolution) {
 }
 
 TEST(PhaseFunction, DegenerateFunctionsHaveNoTransform) {
-  const auto degenerate = lagrangian<2>([](const auto& q, const auto& v) { return q[0] * v[1] - q[1] * q[1]; });
+  const auto degenerate =
+      lagrangian<2>([](const auto& q, const auto& v) { return q[0] * v[1] - q[1] * q[1]; });
   EXPECT_THROW((void)hamiltonian_from(degenerate, 0.0, column({1.0, 1.0}), column({0.0, 0.0})), Misuse);
 }
 
@@ -88,9 +91,8 @@ TEST(PhaseFunction, StructureIsFoundFromTheFormula) {
   EXPECT_TRUE(coupled->structure().quadratic);
   EXPECT_FALSE(lagrangian<3>(testing::Particle{})->structure().y_hessian_constant);
   EXPECT_FALSE(lagrangian<2>(Driven{})->structure().y_hessian_constant);
-  const auto branching = lagrangian<1>([](const auto& q, const auto& v) {
-    return q[0] > 0.0 ? v[0] * v[0] - q[0] * q[0] : v[0] * v[0];
-  });
+  const auto branching = lagrangian<1>(
+      [](const auto& q, const auto& v) { return q[0] > 0.0 ? v[0] * v[0] - q[0] * q[0] : v[0] * v[0]; });
   EXPECT_FALSE(branching->structure().separable);
 }
 

@@ -1,7 +1,7 @@
-#include <diracstep/core/errors.hpp>
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <diracstep/core/errors.hpp>
 
 #include "differences.hpp"
 #include "stepping.hpp"
@@ -39,7 +39,8 @@ std::shared_ptr<const Scene> lotka_volterra() {
 std::string gl(int s) { return "type1/gl:" + std::to_string(s); }
 
 double error_at_ten(const std::shared_ptr<const Scene>& scene, const std::string& method, long steps) {
-  const auto end = samples_of(scene, {.method = method, .step = 10.0 / static_cast<double>(steps)}, steps).back();
+  const auto end =
+      samples_of(scene, {.method = method, .step = 10.0 / static_cast<double>(steps)}, steps).back();
   Vector reference(2);
   reference << 2.576489958858638, 1.538811224376197;
   return (end.q - reference).lpNorm<Eigen::Infinity>();
@@ -62,7 +63,8 @@ TEST(PhaseSpaceStep, OrderIsTwiceTheStagesInEveryGauge) {
       const double first = error_at_ten(scene, gl(s), steps), second = error_at_ten(scene, gl(s), 2 * steps);
       EXPECT_GT(second, 2e-14) << "round-off: nothing is measured";
       const double tolerance = s == 4 ? 0.6 : 0.2;  // round-off comes before GL(4) is quite asymptotic
-      EXPECT_NEAR(std::log2(first / second), 2.0 * s, tolerance) << s << " stages, " << first << ", " << second;
+      EXPECT_NEAR(std::log2(first / second), 2.0 * s, tolerance)
+          << s << " stages, " << first << ", " << second;
     }
 }
 
@@ -123,7 +125,8 @@ TEST(PhaseSpaceStep, TwoPointVorticesTurnAsTheClosedFormSays) {
   });
   scene.start.q = Vector(4);
   scene.start.q << 1.0 / 3.0, 0.0, -2.0 / 3.0, 0.0;
-  const auto end = samples_of(std::make_shared<const Scene>(scene), {.method = gl(4), .step = 0.1}, 1000).back();
+  const auto end =
+      samples_of(std::make_shared<const Scene>(scene), {.method = gl(4), .step = 0.1}, 1000).back();
   Vector reference(4);
   reference << 0.1066289561796316, 0.3158185821245376, -0.2132579123592632, -0.6316371642490752;
   EXPECT_LT((end.q - reference).lpNorm<Eigen::Infinity>(), 1e-10);

@@ -1,8 +1,9 @@
-#include <diracstep/core/errors.hpp>
-#include <diracstep/core/sparsity_pattern.hpp>
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
+#include <diracstep/core/errors.hpp>
+#include <diracstep/core/sparsity_pattern.hpp>
+
 #include "differences.hpp"
 
 namespace diracstep {

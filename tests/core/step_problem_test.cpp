@@ -1,6 +1,7 @@
+#include <gtest/gtest.h>
+
 #include <diracstep/core/registry.hpp>
 #include <diracstep/core/step_problem.hpp>
-#include <gtest/gtest.h>
 
 #include "differences.hpp"
 #include "methods.hpp"

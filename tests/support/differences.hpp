@@ -1,7 +1,7 @@
 #pragma once
 
-#include <diracstep/core/nonlinear_solver.hpp>
 #include <Eigen/Dense>
+#include <diracstep/core/nonlinear_solver.hpp>
 
 namespace diracstep::testing {
 

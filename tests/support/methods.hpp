@@ -6,8 +6,8 @@
 
 namespace diracstep::testing {
 
-/// Every method that comes with the library and is the graph of a generating function, Legendre transforms included:
-/// what the law suites run over, so that a new method is covered by being registered.
+/// Every method that comes with the library and is the graph of a generating function, Legendre transforms
+/// included: what the law suites run over, so that a new method is covered by being registered.
 inline const std::vector<std::string>& every_method() {
   static const std::vector<std::string> names = [] {
     const Registry registry = Registry::with_built_ins();

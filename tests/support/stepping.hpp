@@ -1,17 +1,17 @@
 #pragma once
 
-#include <diracstep/core/integrator.hpp>
-#include <diracstep/solvers/kinsol_solver.hpp>
 #include <gtest/gtest.h>
 
+#include <diracstep/core/integrator.hpp>
+#include <diracstep/solvers/kinsol_solver.hpp>
 #include <string>
 #include <vector>
 
 namespace diracstep::testing {
 
 /// Kept points of a run; fails the test where the run fails.
-inline std::vector<Sample> samples_of(const std::shared_ptr<const Scene>& scene, IntegratorOptions options, long steps,
-                                      Momentum momentum = Momentum::projected,
+inline std::vector<Sample> samples_of(const std::shared_ptr<const Scene>& scene, IntegratorOptions options,
+                                      long steps, Momentum momentum = Momentum::projected,
                                       const Registry& registry = Registry::with_built_ins()) {
   Integrator integrator(scene, registry, kinsol(), std::move(options));
   std::vector<Sample> samples;
@@ -32,8 +32,7 @@ inline Vector join(const Vector& a, const Vector& b) {
 /// A single step of a method, from any (q0,p0), with the impulse; NaN where it fails.
 class SingleStep {
  public:
-  SingleStep(const Method& method, const Scene& scene)
-      : problem_(method.step(scene, true)) {
+  SingleStep(const Method& method, const Scene& scene) : problem_(method.step(scene, true)) {
     if (problem_->size() > 0) solver_ = kinsol()(*problem_);
   }
 

@@ -1,7 +1,7 @@
-#include <diracstep/validation/order_table.hpp>
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <diracstep/validation/order_table.hpp>
 
 namespace diracstep {
 namespace {
@@ -38,7 +38,8 @@ TEST_P(OrderTable, ClaimAndMeasurementAgreeOnEveryConstraintClass) {
 }
 
 INSTANTIATE_TEST_SUITE_P(EveryMethod, OrderTable,
-                         ::testing::ValuesIn(table_methods(Registry::with_built_ins())), [](const auto& test) {
+                         ::testing::ValuesIn(table_methods(Registry::with_built_ins())),
+                         [](const auto& test) {
                            return label(test.param.name) + "_order_" + std::to_string(test.param.order);
                          });
 

@@ -164,7 +164,9 @@ void add_study(CLI::App& app, Session& session) {
   CLI::App* verb = app.add_subcommand("study", "Error against run time, with SUNDIALS IDA beside it");
   const auto options = std::make_shared<Options>();
   verb->add_option("SCENE", options->scenes, "Scenes, all without any; see diracstep list scenes");
-  verb->add_option("--methods", options->methods, "Methods, A,B,…; without it type1/midpoint,\nand GL(3), GL(4), GL(6) where no orders are given either");
+  verb->add_option(
+      "--methods", options->methods,
+      "Methods, A,B,…; without it type1/midpoint,\nand GL(3), GL(4), GL(6) where no orders are given either");
   verb->add_option("--orders", options->orders, "Orders, 2,4,…; without it all that fit");
   verb->add_option("--steps", options->steps, "Step sizes, H1,H2,…; a ladder without it");
   verb->add_option("--rtols", options->rtols, "Tolerances of IDA; 1e-4,1e-5,…,1e-12 without it");
