@@ -63,7 +63,9 @@ int main(int count, char** arguments) {
       "  diracstep study knife_edge --orders 2,4,8 --out results\n"
       "Exit status: 0 done, 1 numerical failure or interrupt, 2 misuse.");
   Session session;
+  add_check(app, session);
   add_list(app, session);
+  add_new(app, session);
   add_orders(app, session);
   add_plan(app, session);
   add_run(app, session);
