@@ -59,6 +59,12 @@ SparsityPattern SparsityPattern::transposed(std::vector<int>& order) const {
   return result;
 }
 
+SparsityPattern SparsityPattern::with_diagonal() const {
+  auto all = entries();
+  for (int i = 0; i < rows_; ++i) all.emplace_back(i, i);
+  return {rows_, columns(), all};
+}
+
 std::vector<int> SparsityPattern::transposed_positions() const {
   std::vector<int> mirror;
   if (transposed(mirror) != *this)

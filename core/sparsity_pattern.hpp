@@ -27,6 +27,9 @@ class SparsityPattern {
   /// (row, column) of every value, in order.
   std::vector<std::pair<int, int>> entries() const;
 
+  /// This square pattern with every diagonal entry added.
+  SparsityPattern with_diagonal() const;
+
   /// Index into the values of entry (row, column), or -1 where the pattern has none.
   int position(int row, int column) const;
 

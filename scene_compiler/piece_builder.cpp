@@ -68,6 +68,7 @@ void PieceBuilder::add_phase(SceneFunction& function, Piece piece) {
       if (!zero(fxy[k][l])) function.separable = false;
       if (varies(fyy[k][l])) function.y_hessian_constant = false;
       if (k != l && !zero(fyy[k][l])) function.y_hessian_diagonal = false;
+      if (!zero(fyy[k][l])) function.y_hessian_zero = false;
       if (varies(fxx[k][l]) || varies(fxy[k][l]) || varies(fyy[k][l])) function.quadratic = false;
     }
 

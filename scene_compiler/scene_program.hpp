@@ -56,7 +56,8 @@ struct SceneFunction {
   bool holonomic = false;
   std::vector<Piece> pieces = {};
   std::vector<RowGroup> groups = {};
-  bool separable = true, y_hessian_constant = true, y_hessian_diagonal = true, quadratic = true;
+  bool separable = true, y_hessian_constant = true, y_hessian_diagonal = true, quadratic = true,
+       y_hessian_zero = true;
 };
 
 /// A value by coordinate: the start, or a reference.

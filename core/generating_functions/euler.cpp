@@ -52,16 +52,18 @@ class SeparableEuler final : public ExplicitGraph {
 class EulerHamiltonian final : public GeneratingFunction {
  public:
   EulerHamiltonian(GeneratingType type, std::shared_ptr<const Hamiltonian> hamiltonian)
-      : GeneratingFunction(type, hamiltonian->pattern()),
+      : GeneratingFunction(type, hamiltonian->pattern().with_diagonal()),
         hamiltonian_(std::move(hamiltonian)),
         sign_(type == GeneratingType::two ? 1.0 : -1.0),
         q_(type == GeneratingType::two ? 0 : 1),
         p_(1 - q_),
-        mirror_(pattern().transposed_positions()) {
-    const int n = dimension(), nonzeros = pattern().nonzeros();
+        mirror_(hamiltonian_->pattern().transposed_positions()) {
+    const int n = dimension(), nonzeros = hamiltonian_->pattern().nonzeros();
     for (Vector* column : {&hq_, &hp_}) column->resize(n);
     for (Vector* values : {&hqq_, &hqp_, &hpp_}) values->resize(nonzeros);
     for (int i = 0; i < n; ++i) diagonal_.push_back(pattern().position(i, i));
+    for (const auto& [row, column] : hamiltonian_->pattern().entries())
+      places_.push_back(pattern().position(row, column));
     if (hamiltonian_->structure().separable)
       explicit_ = std::make_unique<SeparableEuler>(*hamiltonian_, type == GeneratingType::two);
   }
@@ -78,10 +80,13 @@ class EulerHamiltonian final : public GeneratingFunction {
 
   void hessian(Interval step, ConstColumnsRef y, ColumnsRef blocks) override {
     hamiltonian_->hessian(time(step), y.col(q_), y.col(p_), hqq_, hqp_, hpp_);
-    blocks.col(pair(q_, q_)) = step.size * hqq_;
-    blocks.col(pair(p_, p_)) = step.size * hpp_;
-    for (Eigen::Index k = 0; k < hqp_.size(); ++k)
-      blocks(k, 1) = step.size * (q_ == 0 ? hqp_[k] : hqp_[mirror_[static_cast<std::size_t>(k)]]);
+    blocks.setZero();
+    for (std::size_t k = 0; k < places_.size(); ++k) {
+      const auto e = static_cast<Eigen::Index>(k);
+      blocks(places_[k], pair(q_, q_)) = step.size * hqq_[e];
+      blocks(places_[k], pair(p_, p_)) = step.size * hpp_[e];
+      blocks(places_[k], 1) = step.size * (q_ == 0 ? hqp_[e] : hqp_[mirror_[k]]);
+    }
     for (const int k : diagonal_) blocks(k, 1) += sign_;
   }
 
@@ -92,8 +97,9 @@ class EulerHamiltonian final : public GeneratingFunction {
 
   std::shared_ptr<const Hamiltonian> hamiltonian_;
   double sign_;
-  int q_, p_;  ///< the columns that hold them
-  std::vector<int> mirror_, diagonal_;
+  int q_, p_;                           ///< the columns that hold them
+  std::vector<int> mirror_;             ///< of the Hamiltonian's own pattern
+  std::vector<int> places_, diagonal_;  ///< of its values, and of the diagonal, in this pattern
   std::unique_ptr<SeparableEuler> explicit_;
   Vector hq_, hp_, hqq_, hqp_, hpp_;
 };

@@ -34,16 +34,10 @@ Shape shape_of(GeneratingType type) {
   throw Misuse("the discrete Legendre transform leads to types 2, 3 and 4");
 }
 
-SparsityPattern with_diagonal(const SparsityPattern& pattern) {
-  auto entries = pattern.entries();
-  for (int i = 0; i < pattern.rows(); ++i) entries.emplace_back(i, i);
-  return {pattern.rows(), pattern.columns(), entries};
-}
-
 class LegendreTransform final : public GeneratingFunction {
  public:
   LegendreTransform(GeneratingType type, std::unique_ptr<GeneratingFunction> lagrangian)
-      : GeneratingFunction(type, with_diagonal(lagrangian->pattern()),
+      : GeneratingFunction(type, lagrangian->pattern().with_diagonal(),
                            lagrangian->inner_columns() + shape_of(type).added_columns),
         lagrangian_(std::move(lagrangian)),
         shape_(shape_of(type)) {

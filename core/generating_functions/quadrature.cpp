@@ -10,18 +10,30 @@ namespace {
 /// only: D1S holds q1 linearly, so  q1 = q0 + h M⁻¹ (p0 − ∂(the rest)/∂v + h w_0 ∂L/∂q(q0)).
 class SeparableEnds final : public ExplicitGraph {
  public:
-  SeparableEnds(const Lagrangian& lagrangian, std::span<const StepNode> nodes)
-      : lagrangian_(lagrangian), pattern_(diagonal(lagrangian.dimension())) {
+  SeparableEnds(const Lagrangian& lagrangian, std::span<const StepNode> nodes, const Vector& mass)
+      : lagrangian_(lagrangian),
+        pattern_(diagonal(lagrangian.dimension())),
+        inverse_mass_(mass.cwiseInverse()) {
     for (const StepNode& node : nodes) (node.c == 0.0 ? start_weight_ : end_weight_) += node.weight;
     const int n = lagrangian.dimension();
-    for (Vector* column : {&zero_, &rest_momentum_, &force_, &ignored_, &inverse_mass_}) column->setZero(n);
+    for (Vector* column : {&zero_, &rest_momentum_, &force_, &ignored_}) column->setZero(n);
+  }
+
+  /// The constant diagonal of M; zero where the pattern has no entry.
+  static Vector mass_of(const Lagrangian& lagrangian) {
+    const SparsityPattern& pattern = lagrangian.pattern();
+    const Vector zero = Vector::Zero(lagrangian.dimension());
+    Vector lqq(pattern.nonzeros()), lqv(pattern.nonzeros()), lvv(pattern.nonzeros()), mass = zero;
+    lagrangian.hessian(0.0, zero, zero, lqq, lqv, lvv);
+    for (int i = 0; i < mass.size(); ++i)
+      if (const int place = pattern.position(i, i); place >= 0) mass[i] = lvv[place];
+    return mass;
   }
 
   const SparsityPattern& mobility_pattern() const override { return pattern_; }
 
   void map(Interval step, ConstVectorRef q0, ConstVectorRef p0, VectorRef q1, VectorRef p1) override {
     const double h = step.size;
-    take_mass(step.start, q0);
     lagrangian_.gradient(step.start, q0, zero_, force_, rest_momentum_);
     q1 = p0 - rest_momentum_ + h * start_weight_ * force_;
     p1 = q1;
@@ -39,20 +51,10 @@ class SeparableEnds final : public ExplicitGraph {
     return {n, n, entries};
   }
 
-  void take_mass(double t, ConstVectorRef q) {
-    if (mass_known_) return;
-    const SparsityPattern& pattern = lagrangian_.pattern();
-    Vector lqq(pattern.nonzeros()), lqv(pattern.nonzeros()), lvv(pattern.nonzeros());
-    lagrangian_.hessian(t, q, zero_, lqq, lqv, lvv);
-    for (int i = 0; i < inverse_mass_.size(); ++i) inverse_mass_[i] = 1.0 / lvv[pattern.position(i, i)];
-    mass_known_ = true;
-  }
-
   const Lagrangian& lagrangian_;
   SparsityPattern pattern_;
   double start_weight_ = 0.0, end_weight_ = 0.0;
-  bool mass_known_ = false;
-  Vector zero_, rest_momentum_, force_, ignored_, inverse_mass_;
+  Vector inverse_mass_, zero_, rest_momentum_, force_, ignored_;
 };
 
 class QuadratureLagrangian final : public GeneratingFunction {
@@ -67,8 +69,11 @@ class QuadratureLagrangian final : public GeneratingFunction {
     for (Vector* values : {&lqq_, &lqv_, &lvv_}) values->resize(pattern().nonzeros());
     const PhaseStructure& structure = lagrangian_->structure();
     const bool at_ends = std::ranges::all_of(nodes_, [](StepNode node) { return node.c != 0.5; });
-    if (at_ends && structure.separable && structure.y_hessian_constant && structure.y_hessian_diagonal)
-      explicit_ = std::make_unique<SeparableEnds>(*lagrangian_, nodes_);
+    if (!at_ends || !structure.separable || !structure.y_hessian_constant || !structure.y_hessian_diagonal)
+      return;
+    const Vector mass = SeparableEnds::mass_of(*lagrangian_);
+    if ((mass.array() != 0.0).all() && mass.allFinite())
+      explicit_ = std::make_unique<SeparableEnds>(*lagrangian_, nodes_, mass);
   }
 
   double value(Interval step, ConstColumnsRef y) override {

@@ -12,7 +12,7 @@ namespace diracstep {
 namespace {
 
 /// Rounding of up to 17 fractions below 1, each to double.
-constexpr long double rounding = 17.0L * 1.2e-16L;
+constexpr long double rounding = 17.0L * 0x1p-54L;
 
 long double power_sum(int order, int exponent) {
   long double sum = 0.0L;

@@ -160,9 +160,13 @@ TEST(BadFiles, IndicesStayInRange) {
   expect_told(changed("m*g*y", "sum(i = 1..x, y)"), {"bad.toml:2:", "numbers, sizes and loop variables"});
 }
 
-TEST(BadFiles, StartsOffTheRowsCannotBeProjectedYet) {
-  expect_told(changed("x = 1\n", "x = 1.5\nproject = true\n"), {"project", "rod"});
+TEST(BadFiles, StartsOffTheRowsAreMovedThereWhereTheFileAsks) {
+  const CatalogueScene moved =
+      scene_from_text("bad.toml", changed("x = 1\n", "x = 1.5\nproject = true\n"), {});
+  EXPECT_NO_THROW(require_consistent(*moved.scene, moved.scene->start));
   EXPECT_EQ(message_of(changed("x = 1\n", "x = 1\nproject = true\n")), "");
+  const CatalogueScene given = scene_from_text("bad.toml", changed("x = 1\n", "x = 1.5\n"), {});
+  EXPECT_THROW(require_consistent(*given.scene, given.scene->start), Misuse);
 }
 
 TEST(BadFiles, ReferencesAndForcesNameCoordinates) {

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <diracstep/core/consistent_start.hpp>
 #include <diracstep/core/errors.hpp>
+#include <diracstep/solvers/kinsol_solver.hpp>
 #include <diracstep/validation/scene_file/scene_file.hpp>
 #include <diracstep/validation/scene_file/scene_functions.hpp>
 #include <fstream>
@@ -222,16 +224,10 @@ void require_defined_start(const LoadedScene& loaded, const Scene& scene) {
   require_defined(loaded, scene, scene.start.time, scene.start.q, v, p);
 }
 
-void require_projectable(const SceneDocument& document, const Scene& scene) {
-  if (!document.project || scene.start.v.size() == 0) return;
-  try {
-    require_consistent(scene, scene.start);
-  } catch (const Misuse& misuse) {
-    throw Misuse(
-        fmt::format("{}: [start] project = true: a start off the rows cannot be projected onto them yet; "
-                    "give a consistent one ({})",
-                    document.file, misuse.what()));
-  }
+/// Moves the start onto the rows where the file asks for it.
+void project(const SceneDocument& document, Scene& scene) {
+  if (document.project && scene.start.v.size() > 0)
+    scene.start = project_start(scene, scene.start, kinsol()).start;
 }
 
 Recommendation recommendation(const SceneDocument& document) {
@@ -260,7 +256,7 @@ CatalogueScene scene_from_text(const std::string& file, const std::string& text,
   const SceneDocument& document = loaded->program->document;
   Scene scene = scene_of(loaded);
   require_defined_start(*loaded, scene);
-  require_projectable(document, scene);
+  project(document, scene);
 
   CatalogueScene entry;
   entry.kind = document.kind;

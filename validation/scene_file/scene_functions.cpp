@@ -271,7 +271,7 @@ class FilePhaseFunction final : public Base {
 
  private:
   static PhaseStructure structure_of(const SceneFunction& f) {
-    return {f.separable, f.y_hessian_constant, f.y_hessian_diagonal, f.quadratic};
+    return {f.separable, f.y_hessian_constant, f.y_hessian_diagonal, f.quadratic, f.y_hessian_zero};
   }
   static KernelCall at(double t, ConstVectorRef x, ConstVectorRef y) {
     KernelCall call{};
