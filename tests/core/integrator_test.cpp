@@ -275,20 +275,20 @@ TEST(Integrator, ResetToAnotherStartRunsLikeANewIntegratorFromThere) {
 }
 
 TEST(Integrator, ResetForgetsTheSizeOfEarlierResiduals) {
-  // Round-off of a residual is judged by the size of its terms, here 1e8 times larger before the reset.
+  // Round-off of a residual is judged by the size of its terms, which here is 1e12 before the reset.
   Scene scene;
-  scene.name = "quartic";
+  scene.name = "oscillator";
   scene.coordinates = {"x"};
   scene.lagrangian = lagrangian<1>([](const auto& q, const auto& v) {
-    return 0.5 * v[0] * v[0] - 0.25 * q[0] * q[0] * q[0] * q[0] + 0.1 * q[0] * q[0] * v[0];
+    return 0.5 * v[0] * v[0] - 0.5 * q[0] * q[0] + 0.1 * q[0] * q[0] * v[0];
   });
   scene.start = {0.0, Vector::Constant(1, 0.5), Vector::Constant(1, 0.2)};
   const auto shared = std::make_shared<const Scene>(scene);
   for (const char* method : {"type1/midpoint", "type1/trapezoidal", "type3/legendre(type1/midpoint)"}) {
-    const IntegratorOptions options{.method = method, .step = 1e-3};
+    const IntegratorOptions options{.method = method, .step = 0.01};
     Integrator used = integrator_for(shared, options), fresh = integrator_for(shared, options);
-    used.reset({0.0, Vector::Constant(1, 200.0), Vector::Zero(1)});
-    for (int k = 0; k < 5; ++k) ASSERT_TRUE(used.step().ok()) << method;
+    used.reset({0.0, Vector::Constant(1, 1e12), Vector::Zero(1)});
+    ASSERT_TRUE(used.step().ok()) << method;
     used.reset();
     EXPECT_TRUE(same_bits(run_of(used), run_of(fresh))) << method;
     EXPECT_EQ(used.work().iterations, fresh.work().iterations) << method;
