@@ -187,10 +187,7 @@ std::vector<std::string> dependent_rows(const Scene& scene, const Start& start, 
   if (m == 0) return {};
   ConstraintsAtPoint rows(scene.constraints, scene.dimension());
   rows.evaluate(start.time, start.q);
-  Eigen::MatrixXd one_forms = Eigen::MatrixXd::Zero(scene.dimension(), m);
-  Eigen::Index k = 0;
-  for (const auto& [row, column] : rows.pattern().entries())
-    one_forms(column, row) = rows.coefficients()[k++];
+  Columns one_forms = rows.pattern().full(rows.coefficients()).transpose();
   for (int r = 0; r < m; ++r) {
     const double size = one_forms.col(r).norm();
     if (size > 0.0) one_forms.col(r) /= size;  // rows may come in any units

@@ -39,6 +39,7 @@ class ConstraintsAtPoint {
 
   void evaluate(double t, ConstVectorRef q) { distribution_.coefficients(t, q, a_, b_); }
   int rows() const { return distribution_.rows(); }
+  ConstraintDistribution& distribution() { return distribution_; }
   const SparsityPattern& pattern() const { return distribution_.pattern(); }
   const Vector& coefficients() const { return a_; }
 

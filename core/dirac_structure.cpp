@@ -2,12 +2,11 @@
 #include <algorithm>
 #include <diracstep/core/dirac_structure.hpp>
 #include <diracstep/core/errors.hpp>
+#include <diracstep/core/scales.hpp>
 
 namespace diracstep {
 
 namespace {
-
-double max_norm(const Vector& x) { return x.size() == 0 ? 0.0 : x.lpNorm<Eigen::Infinity>(); }
 
 double base_distance(const Covector& a, const Covector& b) {
   return std::max(max_norm(a.x - b.x), max_norm(a.y - b.y));
@@ -64,10 +63,7 @@ double DiscreteDiracStructure::constraint_norm(Interval step, const Vector& q0, 
 double DiscreteDiracStructure::outside_annihilator(double t, const Vector& q, const Vector& covector) {
   if (rows_.rows() == 0) return max_norm(covector);
   rows_.evaluate(t, q);
-  Eigen::MatrixXd one_forms = Eigen::MatrixXd::Zero(q.size(), rows_.rows());
-  Eigen::Index k = 0;
-  for (const auto& [row, column] : rows_.pattern().entries())
-    one_forms(column, row) = rows_.coefficients()[k++];
+  const Columns one_forms = rows_.pattern().full(rows_.coefficients()).transpose();
   const Vector lambda = one_forms.colPivHouseholderQr().solve(covector);
   return max_norm(covector - one_forms * lambda);
 }

@@ -7,13 +7,6 @@ namespace diracstep {
 
 namespace {
 
-Eigen::MatrixXd full(const SparsityPattern& pattern, const Vector& values) {
-  Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(pattern.rows(), pattern.columns());
-  int k = 0;
-  for (const auto& [row, column] : pattern.entries()) matrix(row, column) = values[k++];
-  return matrix;
-}
-
 /// g(x, z) = y·z − f(x, y) at z = ∂f/∂y.  With F the second derivatives of f at (x, y):
 ///   g_x = −F_x,   g_z = y,   g_zz = F_yy⁻¹,   g_xz = −F_xy F_yy⁻¹,   g_xx = −F_xx + F_xy F_yy⁻¹ F_yx
 template <class Base, class From>
@@ -67,7 +60,7 @@ class Transform final : public Base {
     const SparsityPattern& pattern = f_->pattern();
     Vector fxx(pattern.nonzeros()), fxy(pattern.nonzeros()), fyy(pattern.nonzeros());
     f_->hessian(t, x, y, fxx, fxy, fyy);
-    return {full(pattern, fxx), full(pattern, fxy), full(pattern, fyy)};
+    return {pattern.full(fxx), pattern.full(fxy), pattern.full(fyy)};
   }
 
   /// y with f_y(t, x, y) = z, from y = 0 on: exact after one iteration where f is quadratic in y.
@@ -91,7 +84,7 @@ void require_regular(const PhaseFunction& f, double t, ConstVectorRef x, ConstVe
   const SparsityPattern& pattern = f.pattern();
   Vector fxx(pattern.nonzeros()), fxy(pattern.nonzeros()), fyy(pattern.nonzeros());
   f.hessian(t, x, y, fxx, fxy, fyy);
-  const Eigen::FullPivLU<Eigen::MatrixXd> lu(full(pattern, fyy));
+  const Eigen::FullPivLU<Eigen::MatrixXd> lu(pattern.full(fyy));
   if (!lu.isInvertible()) throw Misuse(message);
 }
 

@@ -3,15 +3,11 @@
 #include <diracstep/core/errors.hpp>
 #include <diracstep/core/gauss_lobatto_tableau.hpp>
 #include <diracstep/core/phase_space_step.hpp>
+#include <diracstep/core/scales.hpp>
 
 namespace diracstep {
 
 namespace {
-
-double max_norm(const Eigen::Ref<const Columns>& x) {
-  return x.size() == 0 ? 0.0 : x.lpNorm<Eigen::Infinity>();
-}
-double usable_scale(double scale) { return scale > 0.0 && std::isfinite(scale) ? scale : 1.0; }
 
 /// First and second derivatives of L at one point; L_vv vanishes.
 struct Derivatives {

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <diracstep/core/saddle_point.hpp>
+#include <diracstep/core/scales.hpp>
 
 namespace diracstep {
 
@@ -10,7 +11,6 @@ SaddlePointProblem::SaddlePointProblem(const Scene& scene, bool dense)
       m_(scene.rows()),
       q_(Vector::Zero(n_)),
       rows_(scene.constraints, n_),
-      constraints_(scene.constraints, n_),
       lq_(Vector::Zero(n_)),
       lv_(Vector::Zero(n_)),
       layout_(n_ + m_, n_ + m_) {
@@ -46,10 +46,9 @@ void SaddlePointProblem::assemble(ConstVectorRef v, VectorRef values) {
 }
 
 void SaddlePointProblem::set_scales(double momentum, double velocity) {
-  blocks_[0].scale = momentum > 0.0 && std::isfinite(momentum) ? momentum : 1.0;
+  blocks_[0].scale = usable_scale(momentum);
   if (m_ == 0) return;
-  const double scale = rows_.coefficients().lpNorm<Eigen::Infinity>() * velocity;
-  blocks_[1].scale = scale > 0.0 && std::isfinite(scale) ? scale : 1.0;
+  blocks_[1].scale = usable_scale(max_norm(rows_.coefficients()) * velocity);
 }
 
 void SaddlePointProblem::raise_scales(double momentum, ConstVectorRef x) {
@@ -95,11 +94,11 @@ void AccelerationProblem::begin(double t, ConstVectorRef q, ConstVectorRef v) {
   // d/dt(∂L/∂v) holds (∂²L/∂v∂q) v, and lqv is its transpose.
   lagrangian.pattern().transposed_multiply_add(lqv_.data(), v_.data(), known_force_.data(), -1.0);
   if (m_ > 0) {
-    row_derivative_.resize(constraints_.pattern().nonzeros());
+    row_derivative_.resize(rows_.pattern().nonzeros());
     known_rate_.resize(m_);
-    constraints_.time_derivative(t, q, v, known_rate_);
-    constraints_.derivative(t, q, v, 1.0, row_derivative_);
-    constraints_.pattern().multiply_add(row_derivative_.data(), v_.data(), known_rate_.data());
+    rows_.distribution().time_derivative(t, q, v, known_rate_);
+    rows_.distribution().derivative(t, q, v, 1.0, row_derivative_);
+    rows_.pattern().multiply_add(row_derivative_.data(), v_.data(), known_rate_.data());
   }
   set_scales(known_force_.lpNorm<Eigen::Infinity>(), 1.0);
 }

@@ -37,7 +37,6 @@ class SaddlePointProblem : public NonlinearProblem {
   double t_ = 0.0;
   Vector q_;
   ConstraintsAtPoint rows_;
-  ConstraintDistribution constraints_;
   Vector lq_, lv_, lqq_, lqv_, lvv_;
 
  private:

@@ -72,6 +72,13 @@ std::vector<int> SparsityPattern::transposed_positions() const {
   return mirror;
 }
 
+Columns SparsityPattern::full(ConstVectorRef values) const {
+  Columns matrix = Columns::Zero(rows_, columns());
+  Eigen::Index k = 0;
+  for (const auto& [row, column] : entries()) matrix(row, column) = values[k++];
+  return matrix;
+}
+
 void SparsityPattern::multiply_add(const double* values, const double* x, double* y, double factor) const {
   for (int j = 0; j < columns(); ++j) {
     const double scaled = factor * x[j];

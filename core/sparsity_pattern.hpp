@@ -1,5 +1,6 @@
 #pragma once
 
+#include <diracstep/core/types.hpp>
 #include <span>
 #include <utility>
 #include <vector>
@@ -39,6 +40,9 @@ class SparsityPattern {
 
   /// For each value of this square pattern the position of its mirror entry, which must exist.
   std::vector<int> transposed_positions() const;
+
+  /// The full matrix of these values.
+  Columns full(ConstVectorRef values) const;
 
   /// y += factor · M x   and   y += factor · Mᵀ x.
   void multiply_add(const double* values, const double* x, double* y, double factor = 1.0) const;

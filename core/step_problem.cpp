@@ -2,19 +2,13 @@
 #include <cmath>
 #include <diracstep/core/discrete_force.hpp>
 #include <diracstep/core/errors.hpp>
+#include <diracstep/core/scales.hpp>
 #include <diracstep/core/step_problem.hpp>
 #include <optional>
 
 namespace diracstep {
 
 namespace {
-
-double max_norm(const Eigen::Ref<const Columns>& x) {
-  return x.size() == 0 ? 0.0 : x.lpNorm<Eigen::Infinity>();
-}
-
-/// A positive finite size of terms, 1 where none is known.
-double usable_scale(double scale) { return scale > 0.0 && std::isfinite(scale) ? scale : 1.0; }
 
 /// What both forms of the step share: the frozen data and the two constraints of Δ_Q and Δ^d_Q.
 struct StepData {
