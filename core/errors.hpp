@@ -15,4 +15,7 @@ class Misuse : public std::invalid_argument {
 /// Throws Misuse unless `size` is `expected`.
 void require_size(const std::string& what, long size, long expected);
 
+/// Throws Misuse unless the step size is finite and not zero.
+void require_step(double step);
+
 }  // namespace diracstep

@@ -19,13 +19,6 @@ std::string joined(const std::vector<std::string>& names) {
   return list;
 }
 
-void require_step(double step) {
-  if (std::isfinite(step) && step != 0.0) return;
-  std::ostringstream message;
-  message << "the step size is " << step << "; a finite number other than zero is needed";
-  throw Misuse(message.str());
-}
-
 }  // namespace
 
 Integrator::Preparation Integrator::prepare(std::shared_ptr<const Scene> given,
@@ -261,88 +254,6 @@ SolveReport Integrator::sample(Momentum momentum, Sample& sample) {
     rows.add_annihilator(impulse_, sample.p);
   }
   return report;
-}
-
-std::vector<PlanLine> Integrator::plan() const {
-  const Part& part = parts_.front();
-  const int m = scene_->rows(), size = part.problem->size();
-  std::vector<PlanLine> lines = preparation_;
-  lines.push_back({"step", method_.info.name, method_.info.summary});
-  lines.push_back({"unknowns", part.problem->unknowns(),
-                   part.solver ? "one nonlinear system in each solve" : "the graph is solved for its end"});
-  if (part.solver)
-    lines.push_back({"nonlinear solver", part.solver->description(), "Newton's method, exact Jacobian"});
-  else
-    lines.push_back({"nonlinear solver", "left out", "the step is explicit and no rows bind"});
-  if (part.solver) {
-    const int nonzeros = part.problem->pattern().nonzeros();
-    lines.push_back({"Jacobian", dense_ ? "full" : "sparse",
-                     std::to_string(size) + " unknowns, " + std::to_string(nonzeros) + " entries"});
-  }
-  if (m == 0) {
-    lines.push_back({"multipliers", "left out", "the scene has no rows"});
-    lines.push_back({"projection", "left out", "every momentum is that of a velocity"});
-  } else {
-    const StepRule rule = options_.constraint_rule.value_or(method_.info.constraint_rule);
-    lines.push_back({"multipliers", std::to_string(m) + (method_.make ? "" : " a node"),
-                     !method_.make ? "nonholonomic rows at the Gauss, holonomic rows at the Lobatto nodes"
-                                   : std::string("nonholonomic rows by the ") + name(rule) +
-                                         " rule, holonomic rows at the end of the step"});
-    lines.push_back(
-        {"projection", "where the state is read", "p is defined up to the annihilator between steps"});
-  }
-  lines.push_back({"composition",
-                   stages_.size() == 1 ? "left out" : std::to_string(stages_.size()) + " stages",
-                   "order " + std::to_string(options_.order) + ", the method's own is " +
-                       std::to_string(method_.info.order)});
-  lines.push_back({"forces", scene_->force ? "two impulses a step" : "left out",
-                   scene_->force ? "by the rule of the rows" : "the scene has none"});
-  lines.push_back(
-      {"Hamiltonian", scene_->hamiltonian ? "given" : "derived only by methods that need it", ""});
-  return lines;
-}
-
-RunReport run(Integrator& integrator, long steps, Momentum momentum, long every, const Observer& observer) {
-  Sample sample;
-  RunReport report;
-  const auto observed = [&](long k) {
-    if (!observer || (k % every != 0 && k != steps)) return true;
-    report.last.solve = integrator.sample(momentum, sample);
-    if (!report.last.ok()) {
-      std::ostringstream message;
-      message << "reading the state at t = " << integrator.time() << ": "
-              << describe(report.last.solve.status);
-      report.last.failure = message.str();
-      return false;
-    }
-    return observer(sample);
-  };
-  if (every < 1) throw Misuse("every = " + std::to_string(every) + "; 1 or more is needed");
-  if (!observed(0)) return report;
-  for (long k = 1; k <= steps; ++k) {
-    report.last = integrator.step();
-    if (!report.last.ok() || !observed(k)) break;
-  }
-  return report;
-}
-
-StepGrid fit_steps(double start, double end, double step) {
-  require_step(step);
-  const double ratio = (end - start) / step;
-  if (!(ratio > 0.0) || !std::isfinite(ratio)) {
-    std::ostringstream message;
-    message << "no steps of size " << step << " lead from t = " << start << " to t = " << end;
-    throw Misuse(message.str());
-  }
-  const double nearest = std::max(1.0, std::round(ratio));
-  const double count = std::abs(ratio - nearest) <= 1e-9 * nearest ? nearest : std::ceil(ratio);
-  if (count > 1e15) {
-    std::ostringstream message;
-    message << "the step size " << step << " is too small: " << count
-            << " steps would be needed, at most 1e15 are taken";
-    throw Misuse(message.str());
-  }
-  return {static_cast<long>(count), (end - start) / count};
 }
 
 }  // namespace diracstep

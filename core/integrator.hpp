@@ -153,24 +153,4 @@ class Integrator {
   Work work_;
 };
 
-/// Called at kept points; returning false ends the run there.
-using Observer = std::function<bool(const Sample&)>;
-
-/// What a run did; `failure` is empty or says why it stopped early.  What was observed before stays valid.
-struct [[nodiscard]] RunReport {
-  StepReport last;
-  bool ok() const { return last.ok(); }
-};
-
-/// Takes `steps` steps and shows the start, every `every`-th point and the last one to the observer.
-RunReport run(Integrator& integrator, long steps, Momentum momentum, long every, const Observer& observer);
-
-/// Number of steps of about size `step` from `start` to `end` and the size that makes them fit exactly.
-/// Throws Misuse for a step that is zero, not finite, or of the wrong sign.
-struct StepGrid {
-  long steps;
-  double step;
-};
-StepGrid fit_steps(double start, double end, double step);
-
 }  // namespace diracstep

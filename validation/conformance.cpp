@@ -2,6 +2,7 @@
 #include <array>
 #include <cmath>
 #include <diracstep/core/discrete_action.hpp>
+#include <diracstep/core/run.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
 #include <diracstep/validation/conformance.hpp>
 #include <diracstep/validation/law_scenes.hpp>

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <diracstep/core/errors.hpp>
+#include <diracstep/core/run.hpp>
 #include <diracstep/validation/convergence_study.hpp>
 #include <diracstep/validation/work_precision.hpp>
 #include <utility>

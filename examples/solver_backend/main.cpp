@@ -3,7 +3,7 @@
 #include <cmath>
 #include <cstdio>
 #include <diracstep/constraints/pfaffian.hpp>
-#include <diracstep/core/integrator.hpp>
+#include <diracstep/core/run.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
 
 using namespace diracstep;

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <diracstep/core/discrete_action.hpp>
+#include <diracstep/core/run.hpp>
 
 #include "differences.hpp"
 #include "methods.hpp"

@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <diracstep/core/integrator.hpp>
+#include <diracstep/core/run.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
 #include <limits>
 #include <map>

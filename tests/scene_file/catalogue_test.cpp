@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <diracstep/core/integrator.hpp>
+#include <diracstep/core/run.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
 #include <diracstep/validation/scene_catalogue.hpp>
 #include <stdexcept>

@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include <diracstep/core/integrator.hpp>
+#include <diracstep/core/run.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
 #include <diracstep/validation/scene_catalogue.hpp>
 #include <filesystem>

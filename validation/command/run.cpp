@@ -3,6 +3,7 @@
 #include <CLI/App.hpp>
 #include <cmath>
 #include <diracstep/core/errors.hpp>
+#include <diracstep/core/run.hpp>
 #include <diracstep/validation/command/arguments.hpp>
 #include <diracstep/validation/command/interrupt.hpp>
 #include <diracstep/validation/command/run_report.hpp>
