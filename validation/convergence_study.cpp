@@ -50,7 +50,9 @@ class StudyInProgress {
       study_.reference_how = truth_.how;
       study_.reference_error = truth_.self_error;
       for (; series_done_ < series_.size(); ++series_done_) run_series(series_[series_done_]);
-      run_ida_ladder();
+      for (std::size_t i = 0; i < options_.yardsticks.size(); ++i)
+        run_yardstick_ladder(options_.yardsticks[i],
+                             static_cast<double>(i) / static_cast<double>(options_.yardsticks.size()));
     } catch (const Interrupted&) {
       study_.interrupted = true;
     }
@@ -164,25 +166,26 @@ class StudyInProgress {
     }
   }
 
-  void run_ida_ladder() {
+  void run_yardstick_ladder(const std::string& yardstick, double part) {
     std::vector<double> rtols = options_.rtols;
     std::ranges::sort(rtols, std::greater{});
     const std::size_t first = study_.rows.size();
     std::vector<Sample> ends(rtols.size());
+    const auto run = [&](double rtol, int repeats, Sample& end) {
+      return run_yardstick(yardstick, *entry_.scene, study_.t_end, rtol, repeats, truth_, end);
+    };
     for (std::size_t i = 0; i < rtols.size(); ++i) {
-      look(static_cast<double>(i) / static_cast<double>(rtols.size()),
-           fmt::format("IDA, rtol {:g}", rtols[i]));
-      study_.rows.push_back(
-          run_ida(*entry_.scene, study_.t_end, rtols[i], options_.repeats, truth_, ends[i]));
-      if (i > 0) compare_ida(study_.rows[first + i - 1], ends[i - 1], study_.rows[first + i].ok(), ends[i]);
+      look(part, fmt::format("{}, rtol {:g}", yardstick, rtols[i]));
+      study_.rows.push_back(run(rtols[i], options_.repeats, ends[i]));
+      if (i > 0) compare(study_.rows[first + i - 1], ends[i - 1], study_.rows[first + i].ok(), ends[i]);
     }
     if (rtols.empty() || rtols.back() < 1e-13) return;
     Sample tighter;  // for the last row's own estimate only
-    const StudyRow row = run_ida(*entry_.scene, study_.t_end, 0.1 * rtols.back(), 1, truth_, tighter);
-    compare_ida(study_.rows.back(), ends.back(), row.ok(), tighter);
+    const StudyRow row = run(0.1 * rtols.back(), 1, tighter);
+    compare(study_.rows.back(), ends.back(), row.ok(), tighter);
   }
 
-  static void compare_ida(StudyRow& row, const Sample& end, bool tighter_ok, const Sample& tighter) {
+  static void compare(StudyRow& row, const Sample& end, bool tighter_ok, const Sample& tighter) {
     if (!row.ok() || !tighter_ok) return;
     row.self_error = std::max(relative_error(end.q, tighter.q), relative_error(end.p, tighter.p));
   }
@@ -239,15 +242,20 @@ void conclude(Study& study) {
     measured.points = fit ? fit->points : 0;
   }
   study.at_error.clear();
-  const std::vector<WorkPoint> ida = points(study, ida_method, 0);
+  const std::vector<WorkPoint> ida = points(study, ida_method, 0), erk = points(study, erk_method, 0);
   for (const double error : compared_errors) {
     const std::size_t first = study.at_error.size();
-    const auto ida_seconds = cpu_seconds_at(ida, error);
+    const auto ida_seconds = cpu_seconds_at(ida, error), erk_seconds = cpu_seconds_at(erk, error);
     std::optional<std::size_t> best;
     for (const MeasuredOrder& ours : study.measured_orders) {
-      AtError at{error, ours.method, ours.order, false, {}, ida_seconds, {}};
+      AtError at{.error = error,
+                 .method = ours.method,
+                 .order = ours.order,
+                 .ida_cpu_seconds = ida_seconds,
+                 .erk_cpu_seconds = erk_seconds};
       at.cpu_seconds = cpu_seconds_at(points(study, ours.method, ours.order), error);
       if (at.cpu_seconds && ida_seconds) at.ratio = *ida_seconds / *at.cpu_seconds;
+      if (at.cpu_seconds && erk_seconds) at.erk_ratio = *erk_seconds / *at.cpu_seconds;
       study.at_error.push_back(at);
       if (at.cpu_seconds && (!best || *at.cpu_seconds < *study.at_error[*best].cpu_seconds))
         best = study.at_error.size() - 1;

@@ -15,8 +15,8 @@ namespace diracstep {
 
 namespace {
 
-/// Okabe and Ito's colours, told apart with any colour vision, without black, which is IDA's, and without
-/// yellow.
+/// Okabe and Ito's colours, told apart with any colour vision, without black and grey, which are the
+/// yardsticks', and without yellow.
 constexpr std::array<std::string_view, 6> colours{"#0072B2", "#D55E00", "#009E73",
                                                   "#CC79A7", "#E69F00", "#56B4E9"};
 constexpr std::array<int, 6> markers{7, 5, 9, 13, 11, 15};
@@ -98,6 +98,8 @@ std::vector<Curve> curves(const Study& study) {
   }
   all.push_back(curve(study, ida_method, 0, "IDA",
                       "linewidth 2 dashtype solid pointtype 4 pointsize 0.95 linecolor '#000000'"));
+  all.push_back(curve(study, erk_method, 0, "explicit RK 8",
+                      "linewidth 2 dashtype (6,4) pointtype 8 pointsize 0.95 linecolor '#707070'"));
   std::erase_if(all, [](const Curve& drawn) { return drawn.data.empty(); });
   return all;
 }

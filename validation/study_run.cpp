@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <ctime>
+#include <diracstep/validation/explicit_reference.hpp>
 #include <diracstep/validation/ida_reference.hpp>
 #include <diracstep/validation/study_run.hpp>
 #include <diracstep/validation/work_precision.hpp>
@@ -15,12 +15,6 @@ constexpr double long_run = 0.3;          // CPU seconds above which a run is re
 constexpr double own_warm_up = 1.0;       // … above which it is not run once more to warm up
 constexpr double reference_rtol = 1e-13;  // of IDA, where a scene has no reference
 constexpr long steps_between_looks = 4096;
-
-double thread_seconds() {
-  std::timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
 
 CpuSeconds summary(std::vector<double> seconds) {
   std::ranges::sort(seconds);
@@ -50,8 +44,8 @@ double largest_violation(const ConstraintRows& rows, const Sample& end) {
 }
 
 Truth true_end_by_ida(const Scene& scene, double t_end) {
-  const IdaRun fine = integrate_with_ida(scene, t_end, {.rtol = reference_rtol});
-  const IdaRun coarse = integrate_with_ida(scene, t_end, {.rtol = 10.0 * reference_rtol});
+  const ReferenceRun fine = integrate_with_ida(scene, t_end, {.rtol = reference_rtol});
+  const ReferenceRun coarse = integrate_with_ida(scene, t_end, {.rtol = 10.0 * reference_rtol});
   Truth truth{.kind = ida_method,
               .how = fmt::format("IDA at rtol {:g}, beside {:g}", reference_rtol, 10.0 * reference_rtol),
               .missing = fine.ok() ? "" : "no reference: IDA stopped: " + fine.failure,
@@ -141,14 +135,15 @@ StudyRow run_ours(Integrator& integrator, long steps, Momentum momentum, int rep
   return row;
 }
 
-StudyRow run_ida(const Scene& scene, double t_end, double rtol, int repeats, const Truth& truth,
-                 Sample& end) {
-  IdaRun run;
+StudyRow run_yardstick(const std::string& method, const Scene& scene, double t_end, double rtol, int repeats,
+                       const Truth& truth, Sample& end) {
+  const auto integrate = method == erk_method ? integrate_explicitly : integrate_with_ida;
+  ReferenceRun run;
   const auto once = [&] {
-    run = integrate_with_ida(scene, t_end, {.rtol = rtol});
+    run = integrate(scene, t_end, {.rtol = rtol});
     return run.ok() ? run.cpu_seconds : -1.0;
   };
-  StudyRow row{.method = ida_method, .rtol = rtol};
+  StudyRow row{.method = method, .rtol = rtol};
   row.cpu_seconds = repeat(once, repeats);
   row.steps = run.steps;
   row.newton_iterations = run.newton_iterations;

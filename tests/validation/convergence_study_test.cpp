@@ -147,7 +147,7 @@ TEST(ConvergenceStudy, IdaRowsCarryTheirOwnErrorEstimate) {
   const Study study = study_of("knife_edge", options);
   std::vector<StudyRow> ida;
   for (const StudyRow& row : study.rows)
-    if (row.is_ida()) ida.push_back(row);
+    if (row.is_yardstick()) ida.push_back(row);
   ASSERT_EQ(ida.size(), 2u);
   EXPECT_EQ(ida[0].rtol, 1e-5);
   for (const StudyRow& row : ida) {

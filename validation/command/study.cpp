@@ -27,7 +27,7 @@ struct Options {
   std::vector<std::string> scenes;
   std::optional<std::string> methods;
   std::optional<std::string> orders, steps, rtols;
-  bool without_ida = false;
+  bool without_ida = false, without_erk = false;
   int repeat = 5;
   double budget = 1.0;
   std::optional<double> end;
@@ -86,7 +86,8 @@ StudyOptions study_options(const Options& options) {
   if (options.orders) study.orders = whole_numbers("--orders", *options.orders);
   if (options.steps) study.steps = numbers("--steps", *options.steps);
   if (options.rtols) study.rtols = numbers("--rtols", *options.rtols);
-  if (options.without_ida) study.rtols.clear();
+  if (options.without_ida) std::erase(study.yardsticks, ida_method);
+  if (options.without_erk) std::erase(study.yardsticks, erk_method);
   study.repeats = options.repeat;
   study.run_budget = options.budget;
   study.t_end = options.end;
@@ -95,7 +96,7 @@ StudyOptions study_options(const Options& options) {
 }
 
 std::string label(const StudyRow& row) {
-  if (row.is_ida()) return fmt::format("IDA, rtol {:g}", row.rtol);
+  if (row.is_yardstick()) return fmt::format("{}, rtol {:g}", row.method, row.rtol);
   const std::string step = row.fits() ? fmt::format(", step {:g}", row.step) : "";
   return fmt::format("{} order {}{}", row.method, row.order, step);
 }
@@ -103,7 +104,7 @@ std::string label(const StudyRow& row) {
 /// Whether a failed row is a failure of the study.  It is where the user chose the step or the tolerance; on
 /// a ladder, which looks for the largest possible step, only where no other row of the same kind succeeded.
 bool counts(const StudyRow& failed_row, const Study& study, const Options& options) {
-  const bool chosen = (failed_row.is_ida() ? options.rtols : options.steps).has_value();
+  const bool chosen = (failed_row.is_yardstick() ? options.rtols : options.steps).has_value();
   if (chosen && failed_row.fits()) return true;
   return std::ranges::none_of(study.rows, [&](const StudyRow& row) {
     return row.ok() && row.method == failed_row.method &&
@@ -165,7 +166,8 @@ void study(const Options& options, Session& session) {
 }  // namespace
 
 void add_study(CLI::App& app, Session& session) {
-  CLI::App* verb = app.add_subcommand("study", "Error against run time, with SUNDIALS IDA beside it");
+  CLI::App* verb = app.add_subcommand(
+      "study", "Error against run time, beside SUNDIALS IDA and an explicit Runge–Kutta method");
   const auto options = std::make_shared<Options>();
   verb->add_option("SCENE", options->scenes, "Scenes, all without any; see diracstep list scenes");
   verb->add_option(
@@ -173,8 +175,9 @@ void add_study(CLI::App& app, Session& session) {
       "Methods, A,B,…; without it type1/midpoint,\nand GL(3), GL(4), GL(6) where no orders are given either");
   verb->add_option("--orders", options->orders, "Orders, 2,4,…; without it all that fit");
   verb->add_option("--steps", options->steps, "Step sizes, H1,H2,…; a ladder without it");
-  verb->add_option("--rtols", options->rtols, "Tolerances of IDA; 1e-4,1e-5,…,1e-12 without it");
+  verb->add_option("--rtols", options->rtols, "Tolerances of the yardsticks; 1e-4,1e-5,…,1e-14 without it");
   verb->add_flag("--without-ida", options->without_ida, "No runs of IDA");
+  verb->add_flag("--without-erk", options->without_erk, "No runs of the explicit Runge–Kutta method");
   verb->add_option("--repeat", options->repeat, "Timed runs of each row")->capture_default_str();
   verb->add_option("--budget", options->budget, "CPU seconds that a run of a ladder may take")
       ->capture_default_str();
