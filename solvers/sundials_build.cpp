@@ -7,7 +7,8 @@ namespace diracstep {
 
 std::string sundials_build() {
   std::array<char, 64> version{};
-  if (SUNDIALSGetVersion(version.data(), static_cast<int>(version.size())) != 0) version = {"of unknown version"};
+  if (SUNDIALSGetVersion(version.data(), static_cast<int>(version.size())) != 0)
+    version = {"of unknown version"};
 #ifdef DIRACSTEP_SUNDIALS_FLAGS
   return std::string("SUNDIALS ") + version.data() + " built with " DIRACSTEP_SUNDIALS_FLAGS;
 #else

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <diracstep/validation/build_facts.hpp>
 #include <diracstep/validation/report.hpp>
 #include <iterator>
 #include <nlohmann/json.hpp>
@@ -233,7 +234,8 @@ std::string studies_csv(const std::vector<Study>& studies) {
 }
 
 std::string studies_json(const std::vector<Study>& studies) {
-  Json json{{"studies", Json::array()}};
+  Json json{{"studies", Json::array()}, {"build", Json::object()}};
+  for (const auto& [key, value] : build_facts()) json["build"][key] = value;
   for (const Study& study : studies) json["studies"].push_back(study_json(study));
   return json.dump(2, ' ', false, Json::error_handler_t::replace);
 }

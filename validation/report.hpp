@@ -13,7 +13,7 @@ std::string study_table(const Study& study);
 /// All rows of all studies, one line each, with a header; a number that does not apply is left empty.
 std::string studies_csv(const std::vector<Study>& studies);
 
-/// {"studies": [...]}; a number that does not apply or is not finite is null.
+/// {"studies": [...], "build": {...}}; a number that does not apply or is not finite is null.
 std::string studies_json(const std::vector<Study>& studies);
 
 /// A field of a CSV file, quoted where it must be.

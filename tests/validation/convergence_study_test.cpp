@@ -141,16 +141,18 @@ TEST(ConvergenceStudy, BudgetEndsTheLadderAndSaysSo) {
   for (const StudyRow& row : study.rows) EXPECT_TRUE(row.ok());
 }
 
-TEST(ConvergenceStudy, IdaRowsCarryTheirOwnErrorEstimate) {
+TEST(ConvergenceStudy, RowsOfTheYardsticksCarryTheirOwnErrorEstimate) {
   StudyOptions options = short_study("knife_edge");
   options.rtols = {1e-8, 1e-5};
   const Study study = study_of("knife_edge", options);
-  std::vector<StudyRow> ida;
+  std::vector<StudyRow> yardsticks;
   for (const StudyRow& row : study.rows)
-    if (row.is_yardstick()) ida.push_back(row);
-  ASSERT_EQ(ida.size(), 2u);
-  EXPECT_EQ(ida[0].rtol, 1e-5);
-  for (const StudyRow& row : ida) {
+    if (row.is_yardstick()) yardsticks.push_back(row);
+  ASSERT_EQ(yardsticks.size(), 4u);
+  EXPECT_EQ(yardsticks[0].method, ida_method);
+  EXPECT_EQ(yardsticks[2].method, erk_method);
+  EXPECT_EQ(yardsticks[0].rtol, 1e-5);
+  for (const StudyRow& row : yardsticks) {
     EXPECT_TRUE(row.ok()) << row.status;
     // An estimate by a ten to a thousand times tighter run has the size of the error itself.
     EXPECT_LT(row.self_error, 10.0 * row.error());

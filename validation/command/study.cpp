@@ -5,6 +5,7 @@
 #include <cerrno>
 #include <cstring>
 #include <diracstep/core/errors.hpp>
+#include <diracstep/validation/build_facts.hpp>
 #include <diracstep/validation/command/arguments.hpp>
 #include <diracstep/validation/command/interrupt.hpp>
 #include <diracstep/validation/command/verbs.hpp>
@@ -146,6 +147,7 @@ void study(const Options& options, Session& session) {
   const StudyOptions chosen = study_options(options);
   std::optional<OutputDirectory> out;
   if (!options.out.empty()) out.emplace(options.out);
+  for (const auto& [name, value] : build_facts()) say(name + ": " + value);
   std::vector<Study> studies;
   for (const CatalogueScene& scene : scenes) {
     if (interrupted()) break;
