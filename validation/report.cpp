@@ -21,14 +21,6 @@ std::string short_number(double value) {
   return value < 100.0 ? fmt::format("{:#.3g}", value) : fmt::format("{:.0f}", value);
 }
 
-/// 1.23e-05 s as "12.3 µs".
-std::string time_cell(double seconds) {
-  if (!std::isfinite(seconds) || seconds <= 0.0) return "-";
-  if (seconds < 1e-3) return short_number(seconds * 1e6) + " µs";
-  if (seconds < 1.0) return short_number(seconds * 1e3) + " ms";
-  return short_number(seconds) + " s";
-}
-
 /// How far the times lie from their median: "-3 % +8 % of 5".
 std::string spread_cell(const CpuSeconds& cpu) {
   if (cpu.repeats < 2) return cpu.repeats == 0 ? "-" : "one run";
@@ -238,6 +230,13 @@ std::string studies_json(const std::vector<Study>& studies) {
   for (const auto& [key, value] : build_facts()) json["build"][key] = value;
   for (const Study& study : studies) json["studies"].push_back(study_json(study));
   return json.dump(2, ' ', false, Json::error_handler_t::replace);
+}
+
+std::string time_cell(double seconds) {
+  if (!std::isfinite(seconds) || seconds <= 0.0) return "-";
+  if (seconds < 1e-3) return short_number(seconds * 1e6) + " µs";
+  if (seconds < 1.0) return short_number(seconds * 1e3) + " ms";
+  return short_number(seconds) + " s";
 }
 
 std::string csv_field(std::string_view text) {

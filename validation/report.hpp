@@ -16,6 +16,9 @@ std::string studies_csv(const std::vector<Study>& studies);
 /// {"studies": [...], "build": {...}}; a number that does not apply or is not finite is null.
 std::string studies_json(const std::vector<Study>& studies);
 
+/// 1.23e-05 s as "12.3 µs"; "-" for a time that is not finite.
+std::string time_cell(double seconds);
+
 /// A field of a CSV file, quoted where it must be.
 std::string csv_field(std::string_view text);
 

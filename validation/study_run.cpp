@@ -35,7 +35,7 @@ CpuSeconds repeat(Run run, int repeats) {
   return summary(std::move(seconds));
 }
 
-double largest_violation(const ConstraintRows& rows, const Sample& end) {
+double violation(const ConstraintRows& rows, const Sample& end) {
   Vector a(rows.pattern().nonzeros()), residual(rows.rows()), phi = Vector::Zero(rows.rows());
   rows.coefficients(end.time, end.q, a, residual);
   rows.pattern().multiply_add(a.data(), end.v.data(), residual.data());
@@ -79,6 +79,12 @@ double Truth::distance(const Sample& end) const {
   return std::max(relative_error(end.q, q), relative_error(end.p, p));
 }
 
+double largest_violation(const Scene& scene, const Sample& at) {
+  double largest = 0.0;
+  for (const auto& rows : scene.constraints) largest = std::max(largest, violation(*rows, at));
+  return largest;
+}
+
 Truth true_end(const CatalogueScene& scene, double t_end) {
   const auto point = scene.reference.at ? scene.reference.at(t_end) : std::nullopt;
   const auto complete = completed(scene.scene);
@@ -96,9 +102,7 @@ Truth true_end(const CatalogueScene& scene, double t_end) {
 
 void judge(StudyRow& row, const Scene& scene, const Sample& end, const Truth& truth) {
   const double energy = scene.energy(scene.start.time, scene.start.q, scene.start.v);
-  row.constraint = 0.0;
-  for (const auto& rows : scene.constraints)
-    row.constraint = std::max(row.constraint, largest_violation(*rows, end));
+  row.constraint = largest_violation(scene, end);
   row.energy_error = std::abs(end.energy - energy) / std::max(std::abs(energy), 1.0);
   if (truth.missing.empty()) {
     row.error_q = relative_error(end.q, truth.q);

@@ -62,6 +62,9 @@ struct Truth {
 /// The scene's reference at t_end with p = ∂L/∂v, or IDA's result at the tolerance 1e-13 where there is none.
 Truth true_end(const CatalogueScene& scene, double t_end);
 
+/// Largest |φ(q)| and |A(q)v + b| at a point.
+double largest_violation(const Scene& scene, const Sample& at);
+
 /// Fills in the errors, the violation of the rows and the change of the energy at the end of a run.  Like
 /// run_yardstick it needs a scene with a Lagrangian, see completed().
 void judge(StudyRow& row, const Scene& scene, const Sample& end, const Truth& truth);

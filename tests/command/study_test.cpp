@@ -66,6 +66,27 @@ TEST_F(StudyCommand, WritesTablesAndPictures) {
   }
 }
 
+TEST_F(StudyCommand, ReportHoldsItsPicturesAndComparesWithAnEarlierStudy) {
+  const std::string options = " --orders 2 --steps 0.1,0.05 --rtols 1e-6 --repeat 1 --end 5";
+  ASSERT_EQ(run("study knife_edge --out " + path("old") + options).status, 0);
+  const std::string page = contents(path("old/report.html"));
+  EXPECT_NE(page.find("id=\"knife_edge\""), std::string::npos);
+  const Outcome again = run("study 'knife*' --compare " + path("old/study.json") + options);
+  EXPECT_EQ(again.status, 0) << again.err;
+  EXPECT_NE(again.err.find("comparisons within the noise"), std::string::npos) << again.err;
+  expect_misuse("study knife_edge --compare " + path("nothing.json") + options,
+                {"--compare", "nothing.json"});
+}
+
+TEST_F(StudyCommand, PatternsAndClassesChooseScenes) {
+  const std::string rest = " --orders 2 --steps 0.5 --without-ida --without-erk --repeat 1 --end 1 --json";
+  const Json studies = Json::parse(run("study 'knife_edg?' --scenes 'kepler_e06'" + rest).out)["studies"];
+  ASSERT_EQ(studies.size(), 2u);
+  EXPECT_EQ(studies[0]["scene"], "knife_edge");
+  EXPECT_EQ(studies[1]["scene"], "kepler_e06");
+  expect_misuse("study 'zz*'", {"zz*", "knife_edge"});
+}
+
 TEST_F(StudyCommand, WithoutGnuplotEverythingElseIsWritten) {
   const Outcome outcome = run("study knife_edge --out " + path("out") + ' ' + small, "PATH=/nonexistent");
   EXPECT_EQ(outcome.status, 0);

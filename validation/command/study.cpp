@@ -8,21 +8,29 @@
 #include <diracstep/validation/build_facts.hpp>
 #include <diracstep/validation/command/arguments.hpp>
 #include <diracstep/validation/command/interrupt.hpp>
+#include <diracstep/validation/command/scene_selection.hpp>
 #include <diracstep/validation/command/verbs.hpp>
 #include <diracstep/validation/plot.hpp>
 #include <diracstep/validation/progress.hpp>
 #include <diracstep/validation/report.hpp>
+#include <diracstep/validation/study_comparison.hpp>
+#include <diracstep/validation/study_page.hpp>
 #include <filesystem>
+#include <fstream>
 #include <memory>
 #include <optional>
+#include <sstream>
 
 namespace diracstep::command {
 
 namespace {
 
-/// What a study without scenes runs: one of each constraint class with a closed form.
-const std::vector<std::string> published_scenes{"kepler_e06", "pendulum_cartesian", "knife_edge",
-                                                "nonholonomic_particle_free"};
+/// What a study without scenes runs: scenes of every constraint class, in a few minutes.
+const std::vector<std::string> fair_selection{"kepler_e06",         "stiff_spring_pendulum",
+                                              "pendulum_cartesian", "double_pendulum",
+                                              "knife_edge",         "chaplygin_sleigh",
+                                              "contact_oscillator", "nonholonomic_particle_free",
+                                              "lotka_volterra_2d",  "toda_200"};
 
 struct Options {
   std::vector<std::string> scenes;
@@ -33,10 +41,13 @@ struct Options {
   double budget = 1.0;
   std::optional<double> end;
   std::string momentum = "projected";
-  std::string out;
+  std::string out, compare, more_scenes;
   std::vector<std::string> set;
   bool json = false;
 };
+
+/// Where a study of no named scenes leaves its report.
+const std::string default_directory = "diracstep-study";
 
 /// Replaces a file; what went wrong, or empty.
 std::string write_file(const std::filesystem::path& path, const std::string& text) {
@@ -50,7 +61,7 @@ std::string write_file(const std::filesystem::path& path, const std::string& tex
                      std::strerror(written ? errno : error));
 }
 
-/// The directory of --out: study.csv, study.json and the pictures, renewed after each scene.
+/// The directory of --out: study.csv, study.json, the pictures and report.html, renewed after each scene.
 class OutputDirectory {
  public:
   explicit OutputDirectory(const std::string& path) : path_(path) {
@@ -61,14 +72,23 @@ class OutputDirectory {
   }
 
   /// Empty, or what could not be written.
-  std::string write(const std::vector<Study>& studies) const {
+  std::string write(const std::vector<Study>& studies, const std::vector<PageEntry>& page) const {
     const std::string failure = write_tables(studies);
-    if (const auto no_picture = draw_work_precision(studies.back(), path_); !no_picture.empty())
-      say(no_picture);
-    return failure;
+    tell(draw_work_precision(page.back().study, path_));
+    if (!page.back().history.time.empty())
+      tell(draw_history(page.back().history, page.back().study.scene, path_));
+    tell(draw_summary(studies, path_));
+    const std::string no_page = write_file(path_ / "report.html", study_page(page, path_));
+    return failure.empty() ? no_page : failure;
   }
 
+  std::string report() const { return (path_ / "report.html").string(); }
+
  private:
+  static void tell(const std::string& failure) {
+    if (!failure.empty()) say(failure);
+  }
+
   std::string write_tables(const std::vector<Study>& studies) const {
     const std::string csv = write_file(path_ / "study.csv", studies_csv(studies));
     const std::string json = write_file(path_ / "study.json", studies_json(studies) + '\n');
@@ -125,10 +145,14 @@ bool tell_failures(const Study& study, const Options& options) {
 }
 
 std::vector<CatalogueScene> chosen_scenes(const Options& options) {
+  std::vector<std::string> words = options.scenes;
+  if (!options.more_scenes.empty())
+    for (const std::string& word : names("--scenes", options.more_scenes)) words.push_back(word);
+  if (words.empty()) words = fair_selection;
   std::vector<CatalogueScene> scenes;
   const Parameters changes = parameters(options.set);
-  for (const auto& scene : options.scenes.empty() ? published_scenes : options.scenes)
-    scenes.push_back(make_scene(scene, changes));
+  for (const auto& word : words)
+    for (CatalogueScene& scene : scenes_meant(word, changes)) scenes.push_back(std::move(scene));
   return scenes;
 }
 
@@ -142,24 +166,50 @@ Study one_study(const CatalogueScene& scene, const StudyOptions& options, const 
                            });
 }
 
+std::string read_file(const std::string& path) {
+  std::ifstream file(path);
+  const std::string text = (std::ostringstream() << file.rdbuf()).str();
+  if (text.empty()) throw Misuse(fmt::format("--compare: '{}' cannot be read, or is empty", path));
+  return text;
+}
+
+PageEntry page_entry(const Study& study, const CatalogueScene& scene, const Session& session) {
+  History history =
+      study.interrupted ? History{} : record_history(scene, session.registry, session.solvers, study);
+  return {study, std::move(history), scene.kind, scene.description, scene.source};
+}
+
+/// Where the report goes: --out, or a default where no scenes are named.
+std::optional<OutputDirectory> output_directory(const Options& options) {
+  const bool nothing_named = options.scenes.empty() && options.more_scenes.empty();
+  if (!options.out.empty()) return OutputDirectory(options.out);
+  if (nothing_named) return OutputDirectory(default_directory);
+  return {};
+}
+
 void study(const Options& options, Session& session) {
   const std::vector<CatalogueScene> scenes = chosen_scenes(options);
   const StudyOptions chosen = study_options(options);
-  std::optional<OutputDirectory> out;
-  if (!options.out.empty()) out.emplace(options.out);
+  const std::string before = options.compare.empty() ? "" : read_file(options.compare);
+  const std::optional<OutputDirectory> out = output_directory(options);
   for (const auto& [name, value] : build_facts()) say(name + ": " + value);
   std::vector<Study> studies;
+  std::vector<PageEntry> page;
   for (const CatalogueScene& scene : scenes) {
     if (interrupted()) break;
     studies.push_back(one_study(scene, chosen, session, studies.size() + 1, scenes.size()));
     if (tell_failures(studies.back(), options)) session.exit_status = failed;
     if (!options.json) print(study_table(studies.back()) + '\n');
-    const std::string failure = out ? out->write(studies) : "";
-    if (failure.empty()) continue;
-    say(failure);
-    session.exit_status = failed;
+    if (!out) continue;
+    page.push_back(page_entry(studies.back(), scene, session));
+    if (const std::string failure = out->write(studies, page); !failure.empty()) {
+      say(failure);
+      session.exit_status = failed;
+    }
   }
   if (options.json) print(studies_json(studies) + '\n');
+  if (!before.empty()) say(comparison_table(compare_studies(studies, before)));
+  if (out) say("the report of this study: " + out->report());
   if (!interrupted()) return;
   say("interrupted; what was finished is there");
   session.exit_status = failed;
@@ -171,7 +221,10 @@ void add_study(CLI::App& app, Session& session) {
   CLI::App* verb = app.add_subcommand(
       "study", "Error against run time, beside SUNDIALS IDA and an explicit Runge–Kutta method");
   const auto options = std::make_shared<Options>();
-  verb->add_option("SCENE", options->scenes, "Scenes, all without any; see diracstep list scenes");
+  verb->add_option("SCENE", options->scenes,
+                   "Scenes, patterns such as 'kepler*', or classes such as holonomic;\na fair selection "
+                   "without any, with its report in diracstep-study/");
+  verb->add_option("--scenes", options->more_scenes, "The same, as a list A,B,…");
   verb->add_option(
       "--methods", options->methods,
       "Methods, A,B,…; without it type1/midpoint,\nand GL(3), GL(4), GL(6) where no orders are given either");
@@ -187,8 +240,11 @@ void add_study(CLI::App& app, Session& session) {
   verb->add_option("--momentum", options->momentum,
                    "Representative of the momentum: plus, minus or projected")
       ->capture_default_str();
-  verb->add_option("--out", options->out, "Directory for study.csv, study.json, SCENE.svg and SCENE.png")
+  verb->add_option("--out", options->out, "Directory for report.html, study.csv, study.json and the pictures")
       ->type_name("DIR");
+  verb->add_option("--compare", options->compare,
+                   "An earlier study.json: tells what got faster, slower, more or less exact")
+      ->type_name("OLD.json");
   verb->add_option("--set", options->set, "Set a parameter of the scenes; may be repeated")
       ->type_name("NAME=VALUE")
       ->allow_extra_args(false);
