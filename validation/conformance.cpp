@@ -184,7 +184,7 @@ double membership_residual(const Registry& registry, const std::shared_ptr<const
     if (!report.ok()) return std::nan("");
   }
   const auto s = method.make(*scene);
-  const StepRule rule = options.constraint_rule.value_or(method.info.constraint_rule);
+  const ConstraintRule rule = options.constraint_rule.value_or(method.info.constraint_rule);
   DiscreteDiracStructure structure(scene->constraints, scene->dimension(), rule);
   const GraphOf graph = graph_of(s->type());
   double largest = 0.0;

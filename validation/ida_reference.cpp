@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <ctime>
 #include <diracstep/core/errors.hpp>
+#include <diracstep/core/hidden_rows.hpp>
 #include <diracstep/core/saddle_point.hpp>
 #include <diracstep/solvers/detail/linear_solver.hpp>
 #include <diracstep/solvers/detail/sundials.hpp>
@@ -388,7 +389,7 @@ class IdaIntegration {
 }  // namespace
 
 IdaRun integrate_with_ida(const Scene& given, double t_end, const IdaOptions& options) {
-  const auto scene = completed(std::make_shared<const Scene>(given));
+  const auto scene = with_hidden_rows(completed(std::make_shared<const Scene>(given)));
   require_consistent(*scene, scene->start);
   if (!(t_end > scene->start.time && std::isfinite(t_end)))
     throw_bad("t_end", t_end, "a finite time after the start is needed");
