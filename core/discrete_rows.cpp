@@ -93,7 +93,7 @@ void require_discretisation(const DiscreteRows& rows, const ConstraintBlocks& co
       Columns(forms.transpose()).colPivHouseholderQr().solve(Columns(d.transpose())).transpose();
   const Vector rate = residual(rows, small, q, q) / small.size;
   require_below(max_norm(rate - combination * offset),
-                1e-5 * usable_scale(std::max(max_norm(rate), max_norm(offset))),
+                1e-5 * usable_scale(std::max({max_norm(rate), max_norm(offset), max_norm(d)})),
                 "c(q,q)/h misses the term b of A v + b");
   Vector q1 = q;
   for (int i = 0; i < n; ++i) q1[i] += 1e-2 * std::sin(1.0 + 1.7 * i) * std::max(1.0, std::abs(q[i]));
