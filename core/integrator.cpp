@@ -5,6 +5,7 @@
 #include <diracstep/core/errors.hpp>
 #include <diracstep/core/hidden_rows.hpp>
 #include <diracstep/core/integrator.hpp>
+#include <diracstep/core/singularity.hpp>
 #include <sstream>
 
 namespace diracstep {
@@ -200,7 +201,11 @@ StepReport Integrator::step() {
     const double h = stage.fraction * options_.step;
     if (k > 0 || !first_stage_solved_) {
       const SolveReport report = solve_stage(k, t, q_stage_, p_stage_);
-      if (!report.ok()) return failed(report, problem, start);
+      if (!report.ok()) {
+        StepReport failure = failed(report, problem, start);
+        failure.failure += describe_singularity(problem, stage.solution, *scene_);
+        return failure;
+      }
       total.iterations += report.iterations;
       total.residual_evaluations += report.residual_evaluations;
       total.jacobian_evaluations += report.jacobian_evaluations;
