@@ -12,6 +12,21 @@ namespace {
 
 constexpr std::array rules{StepRule::left, StepRule::right, StepRule::midpoint, StepRule::trapezoidal};
 
+constexpr const char* rule_explanation =
+    "## The rule for the rows\n\n"
+    "The same on the nonholonomic scene, with each rule for the rows in place of the method's own. A "
+    "one-sided\n"
+    "rule takes a method to order 1, and composing does not raise it. A method of order 1 composed with its\n"
+    "adjoint stays at 2 with every rule, since the adjoint half takes the mirrored one.\n\n"
+    "| method | claimed |";
+
+constexpr const char* circuit_explanation =
+    "## Degenerate circuits\n\n"
+    "The same on a driven circuit with a loop of non-linear capacitors, whose Lagrangian is singular along "
+    "the\n"
+    "rows (`core/hidden_rows.hpp`). Methods that need a Hamiltonian are left out: it has none.\n\n"
+    "| method | claimed | measured |\n|---|---|---|\n";
+
 bool agrees(const MeasuredOrder& measured, int expected) {
   return measured.failure.empty() && std::abs(measured.order - expected) <= 0.2;
 }
@@ -22,14 +37,9 @@ std::string cell(const MeasuredOrder& measured) {
 
 bool one_sided(StepRule rule) { return rule == StepRule::left || rule == StepRule::right; }
 
-/// A one-sided      "The same on the nonholonomic scene, with each rule for the rows in place of the method's
-/// own. A one-sided rule "
-"takes any\nmethod to order 1, and composing does not raise it. A method of order 1 composed with its "
-"adjoint "
-    "stays at 2\nwith every rule, since the adjoint half takes the mirrored one.\n\n| method composed with its adjoint takes the mirrored rule in the adjoint half, so that the
-    /// whole is symmetric with any rule; a self-adjoint one is symmetric with symmetric rules only.
-    int
-    expected_order(const MethodInfo& info, int order, StepRule rule) {
+/// A one-sided method composed with its adjoint takes the mirrored rule in the adjoint half, so that the
+/// whole is symmetric with any rule; a self-adjoint one is symmetric with symmetric rules only.
+int expected_order(const MethodInfo& info, int order, StepRule rule) {
   const bool symmetric = info.order == 1 ? order == 2 : !one_sided(rule);
   return symmetric ? order : 1;
 }
@@ -81,13 +91,7 @@ bool holds(const RuleRow& row) {
 bool holds(const CircuitRow& row) { return agrees(row.measured, row.order); }
 
 std::string rule_table_markdown(const std::vector<RuleRow>& rows) {
-  std::string text =
-      "## The rule for the rows\n\n"
-      "The same on the nonholonomic scene, with each rule for the rows in place of the method's own. A "
-      "one-sided rule "
-      "makes\nany method one of order 1, composed or not, but where the adjoint half of a step takes its "
-      "mirror "
-      "image.\n\n| method | claimed |";
+  std::string text = rule_explanation;
   for (const StepRule rule : rules) text += fmt::format(" {} |", name(rule));
   text += "\n|---|---|---|---|---|---|\n";
   for (const RuleRow& row : rows) {
@@ -99,11 +103,7 @@ std::string rule_table_markdown(const std::vector<RuleRow>& rows) {
 }
 
 std::string circuit_table_markdown(const std::vector<CircuitRow>& rows) {
-  std::string text =
-      "## Degenerate circuits\n\n"
-      "The same on a driven circuit with a loop of non-linear capacitors, whose Lagrangian is singular along "
-      "the rows "
-      "(`core/hidden_rows.hpp`).\n\n| method | claimed | measured |\n|---|---|---|\n";
+  std::string text = circuit_explanation;
   for (const CircuitRow& row : rows)
     text += fmt::format("| `{}` | {} | {} |\n", row.method, row.order, cell(row.measured));
   return text;

@@ -1,7 +1,6 @@
 #pragma once
 
-#include <diracstep/core/nonlinear_solver.hpp>
-#include <diracstep/core/registry.hpp>
+#include <diracstep/core/integrator.hpp>
 #include <diracstep/validation/scene_catalogue.hpp>
 #include <string>
 #include <vector>

@@ -19,7 +19,7 @@ Integrator integrator_for(const std::shared_ptr<const Scene>& scene, const std::
   return {scene, Registry::with_built_ins(), kinsol(), {.method = method, .step = h}};
 }
 
-/// Largest |E − E0| in each tenth of the run; every step is looked at.
+/// Largest |E − E0| in each tenth of the run; every tenth step is looked at.
 std::vector<double> energy_errors(const std::shared_ptr<const Scene>& scene, const std::string& method,
                                   double h) {
   Integrator integrator = integrator_for(scene, method, h);
@@ -90,13 +90,24 @@ TEST(LongRun, PhaseSpaceLagrangiansStayBounded_slow) {
   EXPECT_LT(*std::max_element(errors.begin() + 1, errors.end()), 1.1 * errors.front());
 }
 
-/// The contact oscillator with a potential that breaks its reversibility: every known nonholonomic integrator
-/// drifts on such scenes (Modin and Verdier 2020).  The drift is reported, and only its being there is
-/// asserted.
+/// The contact oscillator with a potential that couples its driving coordinate y to the others and has no
+/// symmetry.  On such scenes known nonholonomic integrators may drift (Modin and Verdier 2020).
+Scene perturbed_contact_oscillator() {
+  Scene scene = *laws::nonholonomic();
+  scene.name = "perturbed contact oscillator";
+  scene.lagrangian = lagrangian<3>([](const auto& q, const auto& v) {
+    return 0.5 * (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]) - 0.5 * (q[0] * q[0] + q[1] * q[1] + q[2] * q[2]) -
+           0.15 * q[0] * q[0] * q[2] * q[2] - 0.2 * q[0] * q[1] * q[2] - 0.1 * q[0] * q[1];
+  });
+  return scene;
+}
+
+/// What happens is printed and recorded; asserted is only that the energy ends near that of the start.
 TEST(LongRun, APerturbedNonReversibleSceneIsReportedAsItIs_slow) {
-  const std::vector<double> errors = energy_errors(laws::nonholonomic(), "type1/midpoint", 0.1);
-  for (const double error : errors) EXPECT_TRUE(std::isfinite(error));
-  ::testing::Test::RecordProperty("last_tenth", std::to_string(errors.back()));
+  const auto scene = std::make_shared<const Scene>(perturbed_contact_oscillator());
+  const std::vector<double> errors = energy_errors(scene, "type1/midpoint", 0.1);
+  RecordProperty("energy_error_in_the_first_tenth", std::to_string(errors.front()));
+  RecordProperty("energy_error_in_the_last_tenth", std::to_string(errors.back()));
   EXPECT_LT(errors.back(), 1.0);
 }
 
