@@ -3,7 +3,9 @@
 #include <diracstep/core/composition.hpp>
 #include <diracstep/core/consistent_start.hpp>
 #include <diracstep/core/errors.hpp>
+#include <diracstep/core/hidden_rows.hpp>
 #include <diracstep/core/integrator.hpp>
+#include <diracstep/core/singularity.hpp>
 #include <sstream>
 
 namespace diracstep {
@@ -36,6 +38,14 @@ Integrator::Preparation Integrator::prepare(std::shared_ptr<const Scene> given,
       result.lines.push_back({"dropped rows", joined(dependent), "they depend on others at the start"});
     }
   }
+  const int own_rows = scene->rows();
+  scene = with_hidden_rows(scene);
+  if (scene->rows() > own_rows) {
+    std::vector<std::string> names = scene->row_names();
+    names.erase(names.begin(), names.begin() + own_rows);
+    result.lines.push_back(
+        {"hidden rows", joined(names), "motions without momentum; these rows determine them"});
+  }
   if (options.project_start) {
     const ConsistentStart moved = project_start(*scene, scene->start, solvers);
     auto copy = std::make_shared<Scene>(*scene);
@@ -63,7 +73,10 @@ Integrator::Integrator(Preparation preparation, const Registry& registry, const 
       velocity_problem_(*scene_, dense_),
       acceleration_problem_(*scene_, dense_) {
   require_step(options_.step);
-  if (scene_->lagrangian->structure().y_hessian_zero) {
+  if (options_.constraint_rule && options_.constraint_rule->own)
+    require_discretisation(*options_.constraint_rule->own, scene_->constraints, scene_->start.time,
+                           scene_->start.q);
+  if (scene_->lagrangian->structure().phase_space()) {
     phase_space_velocity_problem_.emplace(*scene_, dense_);
     velocity_solver_ = solvers(*phase_space_velocity_problem_);
   } else {
@@ -78,9 +91,14 @@ Integrator::Integrator(Preparation preparation, const Registry& registry, const 
 
 Integrator::Part Integrator::make_part(const Method& method, bool mirror_rule,
                                        const SolverFactory& solvers) const {
-  std::optional<StepRule> rule = options_.constraint_rule;
-  if (rule && mirror_rule) rule = mirrored(*rule);
-  Part part{method.step(*scene_, dense_, rule, options_.force_degenerate), nullptr};
+  const std::optional<ConstraintRule>& given = options_.constraint_rule;
+  const bool other_rule = mirror_rule && given;
+  if (other_rule && given->own)
+    throw Misuse("a discrete constraint of one's own has no adjoint; compose a method that is self-adjoint");
+  const auto step = [&](const std::optional<ConstraintRule>& rule) {
+    return method.step(*scene_, dense_, rule, options_.force_degenerate);
+  };
+  Part part{other_rule ? step(mirrored(given->nodes)) : step(given), nullptr};
   if (part.problem->size() > 0) part.solver = solvers(*part.problem);
   return part;
 }
@@ -183,7 +201,11 @@ StepReport Integrator::step() {
     const double h = stage.fraction * options_.step;
     if (k > 0 || !first_stage_solved_) {
       const SolveReport report = solve_stage(k, t, q_stage_, p_stage_);
-      if (!report.ok()) return failed(report, problem, start);
+      if (!report.ok()) {
+        StepReport failure = failed(report, problem, start);
+        failure.failure += describe_singularity(problem, stage.solution, *scene_);
+        return failure;
+      }
       total.iterations += report.iterations;
       total.residual_evaluations += report.residual_evaluations;
       total.jacobian_evaluations += report.jacobian_evaluations;
@@ -239,6 +261,7 @@ SolveReport Integrator::sample(Momentum momentum, Sample& sample) {
   sample.lambda = acceleration_unknowns_.tail(m);
   sample.energy = scene_->energy(t, q_, sample.v);
   sample.p = p_;
+  sample.impulse.resize(0);
   if (momentum == Momentum::projected) {
     q_next_.resize(n);
     scene_->lagrangian->gradient(t, q_, sample.v, q_next_, sample.p);
@@ -252,6 +275,7 @@ SolveReport Integrator::sample(Momentum momentum, Sample& sample) {
     ConstraintsAtPoint rows(scene_->constraints, static_cast<int>(n));
     rows.evaluate(t, q_);
     rows.add_annihilator(impulse_, sample.p);
+    sample.impulse = impulse_;
   }
   return report;
 }

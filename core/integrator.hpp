@@ -26,8 +26,8 @@ struct IntegratorOptions {
   std::string method = "type1/midpoint";
   int order = 0;  ///< composed to this order, methods that are not self-adjoint with their adjoint; 0 keeps
                   ///< the method's own
-  double step = 0.0;                                       ///< step size, may be negative; must be given
-  std::optional<StepRule> constraint_rule = std::nullopt;  ///< instead of the method's own
+  double step = 0.0;  ///< step size, may be negative; must be given
+  std::optional<ConstraintRule> constraint_rule = std::nullopt;  ///< instead of the method's own
   int dense_limit = 40;           ///< systems of up to this many unknowns use full matrices
   bool force_degenerate = false;  ///< use a method on a degenerate scene that is known to be unstable there
   bool project_start = false;     ///< move an inconsistent start onto the constraints instead of refusing it
@@ -60,7 +60,10 @@ struct Sample {
   Vector q;       ///< configuration
   Vector v;       ///< velocity in Δ_Q(q)
   Vector p;       ///< momentum, in the representative asked for
-  Vector lambda;  ///< forces Λ of the constraint rows at (q, v)
+  Vector lambda;  ///< forces Λ of the rows at (q, v): Aᵀ Λ is a generalised force, so Λ is power over the
+                  ///< unit of a row A v: a force for a row in m/s, a voltage for one in A
+  Vector impulse;  ///< with Momentum::minus the impulses λ that the next step lets in at q, units of Λ times
+                   ///< time; empty with the others
   double energy = 0.0;
 };
 

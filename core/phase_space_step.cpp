@@ -200,7 +200,7 @@ class PhaseSpaceStep final : public StepProblem {
 
 std::unique_ptr<StepProblem> phase_space_step(int s, const Scene& scene, bool dense) {
   const std::string prefix = "scene '" + scene.name + "': ";
-  if (!scene.lagrangian->structure().y_hessian_zero)
+  if (!scene.lagrangian->structure().phase_space())
     throw Misuse(prefix + "its Lagrangian is not linear in v");
   if (scene.rows() > 0 || scene.force)
     throw Misuse(prefix + "rows and forces on a Lagrangian that is linear in v are not supported");

@@ -60,16 +60,19 @@ std::optional<Method> gauss_lobatto_method(const std::string& name) {
 
 }  // namespace
 
-std::unique_ptr<StepProblem> Method::step(const Scene& scene, bool dense, std::optional<StepRule> rule,
+std::unique_ptr<StepProblem> Method::step(const Scene& scene, bool dense, std::optional<ConstraintRule> rule,
                                           bool force_degenerate) const {
-  if (scene.lagrangian->structure().y_hessian_zero && !force_degenerate) {
+  if (scene.lagrangian->structure().phase_space() && !force_degenerate) {
     if (stages > 0) return phase_space_step(stages, scene, dense);
     throw Misuse("scene '" + scene.name + "': its Lagrangian is linear in v, where '" + info.name +
                  "' is unstable or leaves p = ∂L/∂v; use type1/midpoint or typeN/gl:S");
   }
-  const bool own_rule = !rule || *rule == info.constraint_rule;
-  if (make_step && own_rule) return make_step(scene, dense);
-  if (make) return dirac_step(make(scene), scene, rule.value_or(info.constraint_rule), dense);
+  const bool stated_rule = !rule || (!rule->own && rule->nodes == info.constraint_rule);
+  if (make_step && stated_rule) return make_step(scene, dense);
+  ConstraintRule applied = info.constraint_rule;
+  if (rule && rule->own) applied.own = rule->own;  // forces keep the method's nodes
+  if (rule && !rule->own) applied.nodes = rule->nodes;
+  if (make) return dirac_step(make(scene), scene, applied, dense);
   throw Misuse("method '" + info.name + "' has its own nodes for the constraint; no other rule applies");
 }
 

@@ -42,7 +42,7 @@ struct Method {
   /// where the method is no generating function of its end points, and for a degenerate scene (a Lagrangian
   /// linear in v) where the method is not one of the Gauss-Lobatto family, unless `force_degenerate`:
   /// one-sided and trapezoidal rules are unstable there.
-  std::unique_ptr<StepProblem> step(const Scene& scene, bool dense, std::optional<StepRule> rule = {},
+  std::unique_ptr<StepProblem> step(const Scene& scene, bool dense, std::optional<ConstraintRule> rule = {},
                                     bool force_degenerate = false) const;
 };
 

@@ -55,8 +55,10 @@ void require_well_formed(const Scene& scene) {
   if (scene.hamiltonian)
     require_size(prefix + "the Hamiltonian", scene.hamiltonian->dimension(), scene.dimension());
   if (scene.force) require_size(prefix + "the force", scene.force->dimension(), scene.dimension());
-  for (const auto& block : scene.constraints)
+  for (const auto& block : scene.constraints) {
+    if (!block) throw Misuse(prefix + "scene.constraints holds a null pointer");
     require_size(prefix + "a constraint row", block->dimension(), scene.dimension());
+  }
 }
 
 std::shared_ptr<const Scene> completed(std::shared_ptr<const Scene> scene) {

@@ -12,7 +12,7 @@ namespace {
 
 /// What both forms of the step share: the frozen data and the two constraints of Δ_Q and Δ^d_Q.
 struct StepData {
-  StepData(const ConstraintBlocks& constraints, int dimension, StepRule rule)
+  StepData(const ConstraintBlocks& constraints, int dimension, const ConstraintRule& rule)
       : n(dimension), start_rows(constraints, dimension), discrete_constraint(constraints, dimension, rule) {
     q0.setZero(n);
     p0.setZero(n);
@@ -42,7 +42,8 @@ struct StepData {
 /// The graph and the constraint solved together.
 class ImplicitStep final : public StepProblem {
  public:
-  ImplicitStep(std::unique_ptr<GeneratingFunction> s, const Scene& scene, StepRule rule, bool dense)
+  ImplicitStep(std::unique_ptr<GeneratingFunction> s, const Scene& scene, const ConstraintRule& rule,
+               bool dense)
       : s_(std::move(s)),
         graph_(graph_of(s_->type())),
         data_(scene.constraints, s_->dimension(), rule),
@@ -56,7 +57,7 @@ class ImplicitStep final : public StepProblem {
     q1_.setZero(n_);
     if (scene.force) {
       if (s_->type() == GeneratingType::four) throw Misuse("generating functions of type 4 take no forces");
-      force_.emplace(scene.force, rule);
+      force_.emplace(scene.force, rule.nodes);
       force_by_end_.setZero(force_->pattern().nonzeros());
     }
     plan_blocks(dense);
@@ -361,7 +362,8 @@ class ImplicitStep final : public StepProblem {
 /// The graph is solved for its end by S itself; what is left is c(q0, q1(p0 + A(q0)ᵀλ)) = 0 for hλ.
 class MultiplierStep final : public StepProblem {
  public:
-  MultiplierStep(std::unique_ptr<GeneratingFunction> s, const Scene& scene, StepRule rule, bool dense)
+  MultiplierStep(std::unique_ptr<GeneratingFunction> s, const Scene& scene, const ConstraintRule& rule,
+                 bool dense)
       : s_(std::move(s)),
         graph_(*s_->explicit_graph()),
         data_(scene.constraints, s_->dimension(), rule),
@@ -442,7 +444,7 @@ class MultiplierStep final : public StepProblem {
 }  // namespace
 
 std::unique_ptr<StepProblem> dirac_step(std::unique_ptr<GeneratingFunction> generating_function,
-                                        const Scene& scene, StepRule rule, bool dense) {
+                                        const Scene& scene, const ConstraintRule& rule, bool dense) {
   if (generating_function->explicit_graph() != nullptr && !scene.force)
     return std::make_unique<MultiplierStep>(std::move(generating_function), scene, rule, dense);
   return std::make_unique<ImplicitStep>(std::move(generating_function), scene, rule, dense);

@@ -58,6 +58,6 @@ class StepProblem : public NonlinearProblem {
 /// none. With `dense` the Jacobian is a full matrix.  Throws Misuse for a force with type four, whose end
 /// point is not known before its momentum.
 std::unique_ptr<StepProblem> dirac_step(std::unique_ptr<GeneratingFunction> generating_function,
-                                        const Scene& scene, StepRule rule, bool dense);
+                                        const Scene& scene, const ConstraintRule& rule, bool dense);
 
 }  // namespace diracstep

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <diracstep/core/errors.hpp>
 #include <diracstep/solvers/detail/linear_solver.hpp>
 #include <diracstep/solvers/detail/sundials.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
@@ -24,6 +25,9 @@ class KinsolSolver final : public NonlinearSolver {
  public:
   KinsolSolver(NonlinearProblem& problem, KinsolOptions options)
       : problem_(problem), options_(options), linear_solver_(detail::make_linear_solver(problem.pattern())) {
+    if (problem.blocks().size() > report_.residual_norms.size())
+      throw Misuse("a problem with " + std::to_string(problem.blocks().size()) +
+                   " residual blocks; at most 4 are reported");
     const int size = problem.size();
     x_.reset(require(N_VNew_Serial(size, context_), "N_VNew_Serial"));
     unknown_scale_.reset(require(N_VClone(x_.get()), "N_VClone"));

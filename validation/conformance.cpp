@@ -67,6 +67,12 @@ bool settled(const std::vector<Point>& points) {
                   slope_of({end - 2 * fitted_points, end - fitted_points})) < 0.01;
 }
 
+void find_reference(OrderScene& scene) {
+  const StepGrid grid = fit_steps(0.0, scene.t_end, scene.t_end / 240.0);
+  const IntegratorOptions options{.method = "type1/gl:6", .step = grid.step};
+  end_of(Registry::with_built_ins(), scene.scene, options, grid.steps, Momentum::projected, scene.reference);
+}
+
 }  // namespace
 
 std::vector<OrderScene> order_scenes() {
@@ -77,13 +83,14 @@ std::vector<OrderScene> order_scenes() {
   scenes.push_back({"mixed", laws::mixed(), 6.0, {}});
   scenes.push_back({"affine, driven", laws::driven(), 6.0, {}});
   scenes.push_back({"forced, mixed", laws::forced(laws::mixed()), 6.0, {}});
-  const Registry registry = Registry::with_built_ins();
-  for (OrderScene& scene : scenes) {
-    const StepGrid grid = fit_steps(0.0, scene.t_end, scene.t_end / 240.0);
-    end_of(registry, scene.scene, {.method = "type1/gl:6", .step = grid.step}, grid.steps,
-           Momentum::projected, scene.reference);
-  }
+  for (OrderScene& scene : scenes) find_reference(scene);
   return scenes;
+}
+
+OrderScene degenerate_order_scene() {
+  OrderScene scene{"degenerate circuit", laws::degenerate_circuit(), 6.0, {}};
+  find_reference(scene);
+  return scene;
 }
 
 MeasuredOrder measure_order(const Registry& registry, const OrderScene& scene, IntegratorOptions options,
@@ -184,7 +191,7 @@ double membership_residual(const Registry& registry, const std::shared_ptr<const
     if (!report.ok()) return std::nan("");
   }
   const auto s = method.make(*scene);
-  const StepRule rule = options.constraint_rule.value_or(method.info.constraint_rule);
+  const ConstraintRule rule = options.constraint_rule.value_or(method.info.constraint_rule);
   DiscreteDiracStructure structure(scene->constraints, scene->dimension(), rule);
   const GraphOf graph = graph_of(s->type());
   double largest = 0.0;

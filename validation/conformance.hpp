@@ -18,6 +18,9 @@ struct OrderScene {
   Sample reference;
 };
 
+/// The scene of `validation/law_scenes.hpp` for degenerate circuits, in the same way.
+OrderScene degenerate_order_scene();
+
 /// One scene of each class: unconstrained, holonomic, nonholonomic, mixed, affine and time-dependent, forced.
 std::vector<OrderScene> order_scenes();
 

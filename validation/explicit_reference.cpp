@@ -1,6 +1,7 @@
 #include <arkode/arkode_erkstep.h>
 
 #include <cstdlib>
+#include <diracstep/core/hidden_rows.hpp>
 #include <diracstep/solvers/detail/sundials.hpp>
 #include <diracstep/validation/explicit_reference.hpp>
 #include <exception>
@@ -165,7 +166,7 @@ class ExplicitIntegration {
 }  // namespace
 
 ReferenceRun integrate_explicitly(const Scene& given, double t_end, const ReferenceOptions& options) {
-  const auto scene = completed(std::make_shared<const Scene>(given));
+  const auto scene = with_hidden_rows(completed(std::make_shared<const Scene>(given)));
   require_reference("ARKODE", *scene, t_end, options);
   return ExplicitIntegration(*scene, options).run(t_end);
 }

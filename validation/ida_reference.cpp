@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <diracstep/core/errors.hpp>
+#include <diracstep/core/hidden_rows.hpp>
 #include <diracstep/core/saddle_point.hpp>
 #include <diracstep/solvers/detail/linear_solver.hpp>
 #include <diracstep/solvers/detail/sundials.hpp>
@@ -375,7 +376,7 @@ class IdaIntegration {
 }  // namespace
 
 ReferenceRun integrate_with_ida(const Scene& given, double t_end, const ReferenceOptions& options) {
-  const auto scene = completed(std::make_shared<const Scene>(given));
+  const auto scene = with_hidden_rows(completed(std::make_shared<const Scene>(given)));
   require_reference("IDA", *scene, t_end, options);
   return IdaIntegration(*scene, options).run(t_end);
 }

@@ -37,6 +37,32 @@ OrderTableRow measure_row(const Registry& registry, const TableMethod& method,
 /// its claim fails too: the claim is then wrong.
 bool holds(const OrderTableRow& row);
 
+/// The order of one method, composed or not, with each rule for the nonholonomic rows, left, right, midpoint
+/// and trapezoidal, on a nonlinear nonholonomic scene.
+struct RuleRow {
+  std::string method;
+  int order = 0;  ///< claimed with the method's own rule
+  std::vector<MeasuredOrder> measured;
+  std::vector<int> expected;  ///< 1 with a one-sided rule, else the claim
+};
+std::vector<RuleRow> measure_rules(const Registry& registry, const OrderScene& nonholonomic);
+
+/// The order of a method on a degenerate circuit.
+struct CircuitRow {
+  std::string method;
+  int order = 0;
+  MeasuredOrder measured;
+};
+std::vector<CircuitRow> measure_circuit(const Registry& registry);
+
+/// Whether measured and expected agree within 0.2.
+bool holds(const RuleRow& row);
+bool holds(const CircuitRow& row);
+
+/// Both as Markdown, with what they say.
+std::string rule_table_markdown(const std::vector<RuleRow>& rows);
+std::string circuit_table_markdown(const std::vector<CircuitRow>& rows);
+
 /// The table as Markdown, for the documentation.
 std::string order_table_markdown(const std::vector<OrderTableRow>& rows,
                                  const std::vector<OrderScene>& scenes);

@@ -54,6 +54,25 @@ TEST(OrderTable, AOneSidedRuleForTheRowsIsFoundOut) {
   }
 }
 
+TEST(OrderTable, EveryRuleForTheRowsHasTheOrderThatIsStated) {
+  for (const OrderScene& scene : scenes()) {
+    if (scene.constraint_class != "nonholonomic") continue;
+    const std::vector<RuleRow> rows = measure_rules(Registry::with_built_ins(), scene);
+    EXPECT_EQ(rows.size(), 7U);
+    for (const RuleRow& row : rows) EXPECT_TRUE(holds(row)) << row.method << " of order " << row.order;
+    RuleRow wrong = rows[2];  // type1/midpoint with the left rule is of order 1
+    wrong.expected[0] = 2;
+    EXPECT_FALSE(holds(wrong));
+  }
+}
+
+TEST(OrderTable, DegenerateCircuitsKeepEveryOrder) {
+  const std::vector<CircuitRow> rows = measure_circuit(Registry::with_built_ins());
+  EXPECT_GT(rows.size(), 20U);
+  for (const CircuitRow& row : rows)
+    EXPECT_TRUE(holds(row)) << row.method << " of order " << row.order << " measured " << row.measured.order;
+}
+
 TEST(OrderTable, TheUnprojectedMomentumIsOneOrderLower) {
   const Registry registry = Registry::with_built_ins();
   for (const OrderScene& scene : scenes()) {

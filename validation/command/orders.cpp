@@ -33,10 +33,19 @@ constexpr const char* explanation =
     "class.\n\n"
     "A dash: not stated for that method, or it does not take that class (type 4 takes no forces).\n\n";
 
+nlohmann::ordered_json number(double x) {
+  return std::isfinite(x) ? nlohmann::ordered_json(x) : nlohmann::ordered_json();
+}
+
+nlohmann::ordered_json as_json(const RuleRow& row) {
+  nlohmann::ordered_json json{
+      {"method", row.method}, {"order", row.order}, {"measured", nlohmann::json::array()}};
+  for (const MeasuredOrder& measured : row.measured) json["measured"].push_back(number(measured.order));
+  json["holds"] = holds(row);
+  return json;
+}
+
 nlohmann::ordered_json as_json(const OrderTableRow& row, const std::vector<OrderScene>& scenes) {
-  const auto number = [](double x) {
-    return std::isfinite(x) ? nlohmann::ordered_json(x) : nlohmann::ordered_json();
-  };
   nlohmann::ordered_json json{
       {"method", row.method}, {"order", row.order}, {"measured", nlohmann::json::object()}};
   for (std::size_t k = 0; k < scenes.size(); ++k)
@@ -55,7 +64,13 @@ void orders(const Options& options, Session& session) {
     if (interrupted()) break;
     rows.push_back(measure_row(session.registry, method, scenes));
   }
-  const std::string table = order_table_markdown(rows, scenes);
+  std::vector<RuleRow> rules;
+  std::vector<CircuitRow> circuits;
+  const auto nonholonomic = std::ranges::find(scenes, "nonholonomic", &OrderScene::constraint_class);
+  if (!interrupted()) rules = measure_rules(session.registry, *nonholonomic);
+  if (!interrupted()) circuits = measure_circuit(session.registry);
+  const std::string table = order_table_markdown(rows, scenes) + '\n' + rule_table_markdown(rules) + '\n' +
+                            circuit_table_markdown(circuits);
   if (!options.out.empty()) {
     std::ofstream file(options.out);
     file << explanation << table << std::flush;
@@ -63,12 +78,25 @@ void orders(const Options& options, Session& session) {
   }
   nlohmann::ordered_json json{{"orders", nlohmann::json::array()}};
   for (const OrderTableRow& row : rows) json["orders"].push_back(as_json(row, scenes));
+  json["rules"] = nlohmann::json::array();
+  for (const RuleRow& row : rules) json["rules"].push_back(as_json(row));
+  json["circuits"] = nlohmann::json::array();
+  for (const CircuitRow& row : circuits)
+    json["circuits"].push_back({{"method", row.method},
+                                {"order", row.order},
+                                {"measured", number(row.measured.order)},
+                                {"holds", holds(row)}});
   print(options.json ? json.dump(2) + '\n' : table);
   for (const OrderTableRow& row : rows)
     if (!holds(row)) {
       say(fmt::format("{} composed to order {}: claim and measurement differ", row.method, row.order));
       session.exit_status = failed;
     }
+  const bool rest_holds = std::ranges::all_of(rules, [](const RuleRow& row) { return holds(row); }) &&
+                          std::ranges::all_of(circuits, [](const CircuitRow& row) { return holds(row); });
+  if (rest_holds) return;
+  say("the rules or the circuits: claim and measurement differ");
+  session.exit_status = failed;
 }
 
 }  // namespace

@@ -22,15 +22,18 @@ std::string header(const Scene& scene) {
 }  // namespace
 
 TrajectoryFile::TrajectoryFile(const std::string& path, const Scene& scene)
-    : path_(path), file_(std::fopen(path.c_str(), "w")) {
+    : rows_(scene.rows()), path_(path), file_(std::fopen(path.c_str(), "w")) {
   if (!file_) throw Misuse(fmt::format("--out: '{}' cannot be written: {}", path, std::strerror(errno)));
   put(header(scene));
 }
 
 void TrajectoryFile::write(const Sample& sample) {
   std::string line = fmt::format("{:.17g}", sample.time);
-  for (const Vector* column : {&sample.q, &sample.v, &sample.p, &sample.lambda})
-    for (const double value : *column) line += fmt::format(",{:.17g}", value);
+  const auto add = [&line](const auto& column) {
+    for (const double value : column) line += fmt::format(",{:.17g}", value);
+  };
+  for (const Vector* column : {&sample.q, &sample.v, &sample.p}) add(*column);
+  add(sample.lambda.head(rows_));
   put(line + fmt::format(",{:.17g}\n", sample.energy));
   ++lines_;
 }

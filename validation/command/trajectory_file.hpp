@@ -26,6 +26,7 @@ class TrajectoryFile {
   void put(const std::string& line);
   [[noreturn]] void refuse() const;
 
+  Eigen::Index rows_;  ///< of the scene; an integrator may know more, which are left out
   std::string path_;
   std::unique_ptr<std::FILE, Close> file_;
   long lines_ = 0;

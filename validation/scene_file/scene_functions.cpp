@@ -269,6 +269,13 @@ class FilePhaseFunction final : public Base {
     function_.run(3, call);
   }
 
+  void position_gradient_rate(double t, ConstVectorRef x, ConstVectorRef y, VectorRef fxt) const override {
+    fxt.setZero();
+    KernelCall call = at(t, x, y);
+    call.out[0] = fxt.data();
+    function_.run(4, call);
+  }
+
  private:
   static PhaseStructure structure_of(const SceneFunction& f) {
     return {f.separable, f.y_hessian_constant, f.y_hessian_diagonal, f.quadratic, f.y_hessian_zero};
