@@ -44,5 +44,5 @@ function(diracstep_library folder)
   install(EXPORT diracstep_${folder} NAMESPACE DiracStep:: FILE DiracStep-${folder}.cmake
     DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/DiracStep)
   install(DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR}/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/diracstep/${folder}
-    FILES_MATCHING PATTERN *.hpp PATTERN command EXCLUDE)  # the command's own parts are no interface
+    FILES_MATCHING PATTERN *.hpp PATTERN *.h PATTERN command EXCLUDE)  # the command's own parts are no interface
 endfunction()

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <diracstep/core/errors.hpp>
 #include <diracstep/core/gauss_lobatto_step.hpp>
 #include <diracstep/core/gauss_lobatto_tableau.hpp>
@@ -23,7 +24,7 @@ void add_quadrature(Registry& registry, StepRule rule, int order, std::string su
     step = [](const Scene& scene, bool dense) { return gauss_lobatto_step(1, scene, dense); };
   registry.add(
       {std::string("type1/") + name(rule), GeneratingType::one, order, order == 2, rule, std::move(summary),
-       std::move(adjoint)},
+       std::move(adjoint), 0, true},
       [rule](const Scene& scene) { return quadrature_lagrangian(scene.lagrangian, rule); }, std::move(step),
       rule == StepRule::midpoint ? 1 : 0);
 }
@@ -80,10 +81,10 @@ Registry Registry::with_built_ins() {
   add_quadrature(registry, StepRule::midpoint, 2, "L_d = h L((q0+q1)/2, (q1-q0)/h)");
   add_quadrature(registry, StepRule::trapezoidal, 2, "L_d = h/2 [L(q0, (q1-q0)/h) + L(q1, (q1-q0)/h)]");
   registry.add({"type2/euler", GeneratingType::two, 1, false, StepRule::left, "H_d+ = p1 q0 + h H(q0, p1)",
-                "type3/euler"},
+                "type3/euler", 0, true},
                [](const Scene& scene) { return euler_type2(hamiltonian_of(scene)); });
   registry.add({"type3/euler", GeneratingType::three, 1, false, StepRule::right,
-                "H_d- = -p0 q1 + h H(q1, p0)", "type2/euler"},
+                "H_d- = -p0 q1 + h H(q1, p0)", "type2/euler", 0, true},
                [](const Scene& scene) { return euler_type3(hamiltonian_of(scene)); });
   return registry;
 }
@@ -103,6 +104,20 @@ Method Registry::method(const std::string& name) const {
   if (found != methods_.end()) return found->second;
   if (const auto gauss_lobatto = gauss_lobatto_method(name)) return *gauss_lobatto;
   return transformed(name);
+}
+
+void Registry::add_rule(const StepRule& rule) {
+  if (std::ranges::find(rules_, rule.name(), &StepRule::name) != rules_.end())
+    throw Misuse("constraint rule '" + name(rule) + "' is already registered");
+  rules_.push_back(rule);
+}
+
+StepRule Registry::rule(std::string_view wanted) const {
+  const auto found = std::ranges::find(rules_, wanted, &StepRule::name);
+  if (found != rules_.end()) return *found;
+  std::string message = "unknown constraint rule '" + std::string(wanted) + "'; the rules are";
+  for (const StepRule& known : rules_) message += " " + name(known);
+  throw Misuse(message);
 }
 
 Method Registry::transformed(const std::string& name) const {
