@@ -15,15 +15,15 @@ namespace diracstep {
 
 /// What is stated of a method, and what an integrator needs to know to use it.
 struct MethodInfo {
-  std::string name;          ///< "type1/midpoint"
-  GeneratingType type;       ///< the type of its generating function
-  int order;                 ///< stated order in q and in projected p
-  bool self_adjoint;         ///< Φ_{−h} = Φ_h⁻¹
-  StepRule constraint_rule;  ///< the rule for Δ^d_Q that keeps its order
-  std::string summary;       ///< its formula in a line
-  std::string adjoint = {};  ///< the method that is its adjoint, if there is one by name; else one is made
-  int constrained_order = 0;      ///< stated order on scenes with rows or a force; 0: the same
-  bool allocation_free = false;   ///< it states that evaluating it allocates no memory
+  std::string name;           ///< "type1/midpoint"
+  GeneratingType type;        ///< the type of its generating function
+  int order;                  ///< stated order in q and in projected p
+  bool self_adjoint;          ///< Φ_{−h} = Φ_h⁻¹
+  StepRule constraint_rule;   ///< the rule for Δ^d_Q that keeps its order
+  std::string summary;        ///< its formula in a line
+  std::string adjoint = {};   ///< the method that is its adjoint, if there is one by name; else one is made
+  int constrained_order = 0;  ///< stated order on scenes with rows or a force; 0: the same
+  bool allocation_free = false;  ///< it states that evaluating it allocates no memory
 };
 
 /// Makes the generating function of a method for a scene that has a Lagrangian; throws Misuse where the scene

@@ -6,8 +6,8 @@
 
 namespace diracstep {
 
-/// A callback of a plugin or of a program in another language returned an error or threw.  Says whose callback
-/// it was, which one, and what it said.
+/// A callback of a plugin or of a program in another language returned an error or threw.  Says whose
+/// callback it was, which one, and what it said.
 class CallbackError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;

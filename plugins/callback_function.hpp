@@ -1,8 +1,9 @@
 #pragma once
 
+#include <diracstep/plugins/diracstep_plugin.h>
+
 #include <diracstep/core/generating_function.hpp>
 #include <diracstep/core/scene.hpp>
-#include <diracstep/plugins/diracstep_plugin.h>
 #include <memory>
 #include <string>
 
@@ -11,7 +12,8 @@ namespace diracstep {
 /// The generating function that C callbacks describe, on one scene; what they leave out is taken by
 /// differences.  `owner` stands in messages: "plugin 'x', method 'y'".  `library` is kept as long as the
 /// object.  Throws Misuse where create refuses the scene, or the scene lacks a Hamiltonian that is needed.
-/// A callback that fails later throws CallbackError, and an error of the scene's own functions passes through.
+/// A callback that fails later throws CallbackError, and an error of the scene's own functions passes
+/// through.
 std::unique_ptr<GeneratingFunction> callback_function(const diracstep_method& method, const Scene& scene,
                                                       const std::string& owner,
                                                       std::shared_ptr<const void> library);

@@ -220,8 +220,7 @@ Scene scene_from(const diracstep_scene& scene, const std::string& owner,
   made.name = scene.name != nullptr ? scene.name : "scene";
   made.coordinates = coordinate_names(scene);
   made.lagrangian = std::make_shared<const CallbackLagrangian>(*scene.lagrangian, n, origin);
-  for (int b = 0; b < scene.row_blocks; ++b)
-    made.constraints.push_back(rows_from(scene.rows[b], n, origin));
+  for (int b = 0; b < scene.row_blocks; ++b) made.constraints.push_back(rows_from(scene.rows[b], n, origin));
   if (scene.force != nullptr) made.force = std::make_shared<const CallbackForce>(*scene.force, n, origin);
   made.start = {scene.start_time, Eigen::Map<const Vector>(scene.start_q, n),
                 Eigen::Map<const Vector>(scene.start_v, n)};

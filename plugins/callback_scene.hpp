@@ -1,7 +1,8 @@
 #pragma once
 
-#include <diracstep/core/scene.hpp>
 #include <diracstep/plugins/diracstep_scene.h>
+
+#include <diracstep/core/scene.hpp>
 #include <memory>
 #include <string>
 

@@ -22,8 +22,8 @@ void require(bool condition, const std::string& owner, const std::string& what) 
 void require_version(const diracstep_plugin& plugin, const std::string& owner) {
   const auto differ = [&](const char* what, unsigned theirs, unsigned ours) {
     require(theirs == ours, owner,
-            std::string("it was built with ") + what + " " + std::to_string(theirs) + ", this DiracStep has " +
-                std::to_string(ours) + "; rebuild it with this version's headers");
+            std::string("it was built with ") + what + " " + std::to_string(theirs) +
+                ", this DiracStep has " + std::to_string(ours) + "; rebuild it with this version's headers");
   };
   differ("plugin interface version", plugin.version, DIRACSTEP_PLUGIN_VERSION);
   differ("a description of size", plugin.size, sizeof(diracstep_plugin));
@@ -77,7 +77,8 @@ std::shared_ptr<const void> open(const fs::path& file, const std::string& owner)
   std::error_code ignored;
   require(fs::exists(file, ignored), owner, "there is no such file");
   void* const handle = dlopen(fs::absolute(file).c_str(), RTLD_NOW | RTLD_LOCAL);
-  if (handle == nullptr) throw Misuse(owner + ": it cannot be loaded: " + text_or(dlerror(), "no reason given"));
+  if (handle == nullptr)
+    throw Misuse(owner + ": it cannot be loaded: " + text_or(dlerror(), "no reason given"));
   return {handle, [](void* opened) { dlclose(opened); }};
 }
 

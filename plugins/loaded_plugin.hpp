@@ -1,7 +1,8 @@
 #pragma once
 
-#include <diracstep/core/registry.hpp>
 #include <diracstep/plugins/diracstep_plugin.h>
+
+#include <diracstep/core/registry.hpp>
 #include <filesystem>
 #include <memory>
 #include <string>

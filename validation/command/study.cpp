@@ -122,11 +122,11 @@ bool tell_failures(const Study& study, const Options& options) {
   return failure;
 }
 
-std::vector<CatalogueScene> chosen_scenes(const Options& options) {
+std::vector<CatalogueScene> chosen_scenes(const Options& options, const Session& session) {
   std::vector<CatalogueScene> scenes;
   const Parameters changes = parameters(options.set);
   for (const auto& scene : options.scenes.empty() ? published_scenes : options.scenes)
-    scenes.push_back(make_scene(scene, changes));
+    scenes.push_back(make_scene(session, scene, changes));
   return scenes;
 }
 
@@ -141,7 +141,7 @@ Study one_study(const CatalogueScene& scene, const StudyOptions& options, const 
 }
 
 void study(const Options& options, Session& session) {
-  const std::vector<CatalogueScene> scenes = chosen_scenes(options);
+  const std::vector<CatalogueScene> scenes = chosen_scenes(options, session);
   const StudyOptions chosen = study_options(options);
   std::optional<OutputDirectory> out;
   if (!options.out.empty()) out.emplace(options.out);
