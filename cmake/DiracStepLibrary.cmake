@@ -1,6 +1,11 @@
 # How every target of the project is compiled.
+# A second argument PRIVATE keeps the language standard from those that link it.
 function(diracstep_compile_options target)
-  target_compile_features(${target} PUBLIC cxx_std_20)
+  set(scope PUBLIC)
+  if(ARGC GREATER 1)
+    set(scope ${ARGV1})
+  endif()
+  target_compile_features(${target} ${scope} cxx_std_20)
   target_compile_options(${target} PRIVATE
     -Wall -Wextra -Wpedantic -Wshadow
     $<$<BOOL:${DIRACSTEP_WARNINGS_AS_ERRORS}>:-Werror>

@@ -81,10 +81,10 @@ Registry Registry::with_built_ins() {
   add_quadrature(registry, StepRule::midpoint, 2, "L_d = h L((q0+q1)/2, (q1-q0)/h)");
   add_quadrature(registry, StepRule::trapezoidal, 2, "L_d = h/2 [L(q0, (q1-q0)/h) + L(q1, (q1-q0)/h)]");
   registry.add({"type2/euler", GeneratingType::two, 1, false, StepRule::left, "H_d+ = p1 q0 + h H(q0, p1)",
-                "type3/euler", 0, true},
+                "type3/euler"},
                [](const Scene& scene) { return euler_type2(hamiltonian_of(scene)); });
   registry.add({"type3/euler", GeneratingType::three, 1, false, StepRule::right,
-                "H_d- = -p0 q1 + h H(q1, p0)", "type2/euler", 0, true},
+                "H_d- = -p0 q1 + h H(q1, p0)", "type2/euler"},
                [](const Scene& scene) { return euler_type3(hamiltonian_of(scene)); });
   return registry;
 }
