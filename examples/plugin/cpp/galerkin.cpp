@@ -3,8 +3,8 @@
 //   S(q0,q1; u) = h Σ b_i L(t_i, q(c_i), q'(c_i)/h),     c = 0, ½, 1,     b = 1/6, 4/6, 1/6,
 //
 // where q(c) is the parabola through q0, u, q1 at c = 0, ½, 1, and S is stationary in the inner column u.
-// Order 4 without rows (Marsden, West 2001, 2.6.5; Lobatto IIIA–IIIB with three stages), order 2 with rows or a
-// force, which act at the ends of the step alone.  Only S is written down; the derivatives are automatic.
+// Order 4 without rows (Marsden, West 2001, 2.6.5; Lobatto IIIA–IIIB with three stages), order 2 with rows or
+// a force, which act at the ends of the step alone.  Only S is written down; the derivatives are automatic.
 #include <diracstep/plugins/plugin.hpp>
 
 using namespace diracstep::plugin;
