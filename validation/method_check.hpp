@@ -29,7 +29,7 @@ struct ConformanceTable {
 struct CheckOptions {
   /// Heap allocations of this program so far; without it the claim to allocate nothing is not looked at.
   std::function<long()> allocations = {};
-  /// Called before each check with its name; false ends the table there.
+  /// Called before each check with its name; false leaves it out.
   std::function<bool(const std::string&)> proceed = {};
 };
 
@@ -45,7 +45,7 @@ struct CheckOptions {
 ///   holonomic rows    φ(q_k) = 0 along a run
 ///   nonholonomic rows the velocities read lie in Δ_Q along a run
 ///   allocation        where claimed: evaluating S allocates nothing
-///   two instances     used in turn and on two threads they give the same bits as alone
+///   two instances     used in turn, one inside the other and on two threads they give the same bits as alone
 ///   not a number      NaN is handed on, ends a run with a report, and leaves nothing behind
 ///
 /// `scenes` are those of order_scenes(), which take a moment to make.  An exception in a check is a failure

@@ -54,7 +54,8 @@ TEST_F(Plugins, ComeFromThePathToo) {
   const Outcome outcome = run("list plugins --json", path);
   EXPECT_EQ(outcome.status, 0);
   bool found = false;
-  for (const Json& entry : Json::parse(outcome.out)["plugins"]) found = found || entry["name"] == "harmonic";
+  const Json list = Json::parse(outcome.out);
+  for (const Json& entry : list["plugins"]) found = found || entry["name"] == "harmonic";
   EXPECT_TRUE(found);
   // What cannot be loaded is told and left out.
   for (const char* word :
@@ -83,7 +84,8 @@ TEST_F(Plugins, ThatFailWhileRunningEndTheRunAndNotTheStudy) {
       "study kepler_e06 --methods type1/faulty,type1/midpoint --orders 1,2 --steps 0.05 --end 1 --repeat 1 " +
       ("--without-ida --json" + plugin("faulty_3")));
   bool midpoint = false;
-  for (const Json& row : Json::parse(study.out)["studies"][0]["rows"])
+  const Json json = Json::parse(study.out);
+  for (const Json& row : json["studies"][0]["rows"])
     midpoint = midpoint || (row["method"] == "type1/midpoint" && row["status"] == "ok");
   EXPECT_TRUE(midpoint) << study.out << study.err;
 }
