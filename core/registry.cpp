@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <diracstep/core/errors.hpp>
 #include <diracstep/core/gauss_lobatto_step.hpp>
 #include <diracstep/core/gauss_lobatto_tableau.hpp>
@@ -23,7 +24,7 @@ void add_quadrature(Registry& registry, StepRule rule, int order, std::string su
     step = [](const Scene& scene, bool dense) { return gauss_lobatto_step(1, scene, dense); };
   registry.add(
       {std::string("type1/") + name(rule), GeneratingType::one, order, order == 2, rule, std::move(summary),
-       std::move(adjoint)},
+       std::move(adjoint), 0, true},
       [rule](const Scene& scene) { return quadrature_lagrangian(scene.lagrangian, rule); }, std::move(step),
       rule == StepRule::midpoint ? 1 : 0);
 }
@@ -106,6 +107,20 @@ Method Registry::method(const std::string& name) const {
   if (found != methods_.end()) return found->second;
   if (const auto gauss_lobatto = gauss_lobatto_method(name)) return *gauss_lobatto;
   return transformed(name);
+}
+
+void Registry::add_rule(const StepRule& rule) {
+  if (std::ranges::find(rules_, rule.name(), &StepRule::name) != rules_.end())
+    throw Misuse("constraint rule '" + name(rule) + "' is already registered");
+  rules_.push_back(rule);
+}
+
+StepRule Registry::rule(std::string_view wanted) const {
+  const auto found = std::ranges::find(rules_, wanted, &StepRule::name);
+  if (found != rules_.end()) return *found;
+  std::string message = "unknown constraint rule '" + std::string(wanted) + "'; the rules are";
+  for (const StepRule& known : rules_) message += " " + name(known);
+  throw Misuse(message);
 }
 
 Method Registry::transformed(const std::string& name) const {

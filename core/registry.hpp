@@ -15,13 +15,15 @@ namespace diracstep {
 
 /// What is stated of a method, and what an integrator needs to know to use it.
 struct MethodInfo {
-  std::string name;          ///< "type1/midpoint"
-  GeneratingType type;       ///< the type of its generating function
-  int order;                 ///< stated order in q and in projected p
-  bool self_adjoint;         ///< Φ_{−h} = Φ_h⁻¹
-  StepRule constraint_rule;  ///< the rule for Δ^d_Q that keeps its order
-  std::string summary;       ///< its formula in a line
-  std::string adjoint = {};  ///< the method that is its adjoint, if there is one by name; else one is made
+  std::string name;           ///< "type1/midpoint"
+  GeneratingType type;        ///< the type of its generating function
+  int order;                  ///< stated order in q and in projected p
+  bool self_adjoint;          ///< Φ_{−h} = Φ_h⁻¹
+  StepRule constraint_rule;   ///< the rule for Δ^d_Q that keeps its order
+  std::string summary;        ///< its formula in a line
+  std::string adjoint = {};   ///< the method that is its adjoint, if there is one by name; else one is made
+  int constrained_order = 0;  ///< stated order on scenes with rows or a force; 0: the same
+  bool allocation_free = false;  ///< it states that evaluating it allocates no memory
 };
 
 /// Makes the generating function of a method for a scene that has a Lagrangian; throws Misuse where the scene
@@ -70,6 +72,13 @@ class Registry {
   /// The adjoint of a method: itself, the one it names, or one made from it.
   Method adjoint_of(const Method& method) const;
 
+  /// A rule for Δ^d_Q beside left, right, midpoint and trapezoidal; throws Misuse for a name that is taken.
+  void add_rule(const StepRule& rule);
+
+  /// Throws Misuse for an unknown name, listing the known ones.
+  StepRule rule(std::string_view name) const;
+  const std::vector<StepRule>& rules() const { return rules_; }
+
   /// Registered names, the Legendre transforms of those of type 1, and GL(1) to GL(4).
   std::vector<std::string> names() const;
 
@@ -77,6 +86,7 @@ class Registry {
   Method transformed(const std::string& name) const;
 
   std::map<std::string, Method> methods_;
+  std::vector<StepRule> rules_{StepRule::left, StepRule::right, StepRule::midpoint, StepRule::trapezoidal};
 };
 
 }  // namespace diracstep

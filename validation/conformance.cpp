@@ -93,12 +93,12 @@ OrderScene degenerate_order_scene() {
   return scene;
 }
 
-MeasuredOrder measure_order(const Registry& registry, const OrderScene& scene, IntegratorOptions options,
-                            Momentum momentum) {
+OrderMeasurement measure_order(const Registry& registry, const OrderScene& scene, IntegratorOptions options,
+                               Momentum momentum) {
   const Vector expected = join(scene.reference.q, scene.reference.p);
   const double claimed = options.order > 0 ? options.order : registry.method(options.method).info.order;
   std::vector<Point> points;
-  MeasuredOrder result{std::nan(""), 0.0, 0.0, {}};
+  OrderMeasurement result{std::nan(""), 0.0, 0.0, {}};
   for (int quarter_octave = 0; quarter_octave <= 40; ++quarter_octave) {
     const long steps = std::lround(4.0 * std::pow(2.0, 0.25 * quarter_octave));
     options.step = scene.t_end / static_cast<double>(steps);

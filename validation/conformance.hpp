@@ -25,7 +25,7 @@ OrderScene degenerate_order_scene();
 std::vector<OrderScene> order_scenes();
 
 /// An order found by halving the step until the errors are asymptotic.
-struct MeasuredOrder {
+struct OrderMeasurement {
   double order = 0.0;  ///< NaN where it could not be measured
   double error = 0.0;  ///< at the finer step of the last pair
   double step = 0.0;
@@ -36,8 +36,8 @@ struct MeasuredOrder {
 /// log(h) through the four finest of a ladder of steps, four to an octave, that lie above round-off: above
 /// 1e-12 and 1e-13 times the square root of the solves (it grows like a random walk), and, where the slope
 /// falls below half the claimed order before, above 30 times the error there.
-MeasuredOrder measure_order(const Registry& registry, const OrderScene& scene, IntegratorOptions options,
-                            Momentum momentum = Momentum::projected);
+OrderMeasurement measure_order(const Registry& registry, const OrderScene& scene, IntegratorOptions options,
+                               Momentum momentum = Momentum::projected);
 
 /// |Φ_{−h}(Φ_h(y)) − y| in q and projected p, with the method's own step both ways: round-off for a
 /// self-adjoint method.

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <diracstep/core/errors.hpp>
 #include <diracstep/core/run.hpp>
+#include <diracstep/plugins/callback_error.hpp>
 #include <diracstep/validation/convergence_study.hpp>
 #include <diracstep/validation/work_precision.hpp>
 #include <utility>
@@ -129,6 +130,8 @@ class StudyInProgress {
                   static_cast<double>(i) / static_cast<double>(options_.steps.size()));
     } catch (const Misuse& misuse) {
       study_.rows.push_back({.method = series.first, .order = series.second, .status = misuse.what()});
+    } catch (const CallbackError& error) {
+      study_.rows.push_back({.method = series.first, .order = series.second, .status = error.what()});
     }
     std::stable_sort(
         study_.rows.begin() + static_cast<std::ptrdiff_t>(first), study_.rows.end(),

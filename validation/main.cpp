@@ -33,6 +33,18 @@ int tell(const CLI::App& app, const CLI::ParseError& error) {
   return misused;
 }
 
+/// --plugin for every verb; the plugins are there when the verb runs.
+void take_plugins(CLI::App& app, Session& session) {
+  for (CLI::App* verb : app.get_subcommands({})) {
+    verb->add_option("--plugin", session.plugin_files,
+                     "Load a plugin; may be repeated. Also taken: every *.so in the\ndirectories of "
+                     "DIRACSTEP_PLUGIN_PATH")
+        ->type_name("FILE.so")
+        ->allow_extra_args(false);
+    verb->parse_complete_callback([&session] { load_plugins(session); });
+  }
+}
+
 int execute(CLI::App& app, const Session& session, int count, char** arguments) {
   try {
     app.parse(count, arguments);
@@ -70,5 +82,6 @@ int main(int count, char** arguments) {
   add_plan(app, session);
   add_run(app, session);
   add_study(app, session);
+  take_plugins(app, session);
   return execute(app, session, count, arguments);
 }

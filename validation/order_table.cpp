@@ -17,7 +17,7 @@ bool takes(const Registry& registry, const TableMethod& method, const OrderScene
 
 std::string number(double value) { return std::isfinite(value) ? fmt::format("{:.1e}", value) : "–"; }
 
-std::string cell(const MeasuredOrder& measured) {
+std::string cell(const OrderMeasurement& measured) {
   if (std::isfinite(measured.order)) return fmt::format("{:.2f}", measured.order);
   return measured.failure.empty() ? "–" : "**failed**";
 }
@@ -43,7 +43,7 @@ OrderTableRow measure_row(const Registry& registry, const TableMethod& method,
   const MethodInfo info = registry.method(method.name).info;
   const bool composed = method.order != info.order;
   for (const OrderScene& scene : scenes) {
-    MeasuredOrder measured{std::nan(""), 0.0, 0.0, {}};
+    OrderMeasurement measured{std::nan(""), 0.0, 0.0, {}};
     if (takes(registry, method, scene)) measured = measure_order(registry, scene, options);
     row.measured.push_back(measured);
     if (composed || scene.scene->force) continue;
@@ -60,7 +60,7 @@ OrderTableRow measure_row(const Registry& registry, const TableMethod& method,
 }
 
 bool holds(const OrderTableRow& row) {
-  return std::ranges::all_of(row.measured, [&](const MeasuredOrder& m) {
+  return std::ranges::all_of(row.measured, [&](const OrderMeasurement& m) {
     return m.failure.empty() && (std::isnan(m.order) || std::abs(m.order - row.order) <= 0.2);
   });
 }
@@ -76,7 +76,7 @@ std::string order_table_markdown(const std::vector<OrderTableRow>& rows,
   text += fmt::format(" reversal | symplecticity | membership |\n{}---|---|---|\n", rule);
   for (const OrderTableRow& row : rows) {
     text += fmt::format("| `{}` | {} |", row.method, row.order);
-    for (const MeasuredOrder& measured : row.measured) text += fmt::format(" {} |", cell(measured));
+    for (const OrderMeasurement& measured : row.measured) text += fmt::format(" {} |", cell(measured));
     text += fmt::format(" {} | {} | {} |\n", number(row.reversal_defect), number(row.symplecticity_defect),
                         number(row.membership_residual));
   }

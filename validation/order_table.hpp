@@ -11,8 +11,8 @@ namespace diracstep {
 /// Claimed and measured order of one method, composed or not, on every constraint class, and its defects.
 struct OrderTableRow {
   std::string method;
-  int order = 0;                        ///< claimed
-  std::vector<MeasuredOrder> measured;  ///< one for each of order_scenes()
+  int order = 0;                           ///< claimed
+  std::vector<OrderMeasurement> measured;  ///< one for each of order_scenes()
   double reversal_defect = 0.0;  ///< on the mixed scene, h = 0.05; NaN where the method is not self-adjoint
   double symplecticity_defect = 0.0;  ///< on the unconstrained scene, h = 0.05; NaN for a composition
   double membership_residual =

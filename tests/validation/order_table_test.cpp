@@ -47,7 +47,7 @@ TEST(OrderTable, AOneSidedRuleForTheRowsIsFoundOut) {
   const Registry registry = Registry::with_built_ins();
   for (const OrderScene& scene : scenes()) {
     if (scene.constraint_class != "nonholonomic") continue;
-    const MeasuredOrder measured =
+    const OrderMeasurement measured =
         measure_order(registry, scene, {.method = "type1/midpoint", .constraint_rule = StepRule::left});
     EXPECT_NEAR(measured.order, 1.0, 0.1);
     EXPECT_FALSE(holds({"type1/midpoint", 2, {measured}, 0.0, 0.0, 0.0}));
@@ -77,7 +77,7 @@ TEST(OrderTable, TheUnprojectedMomentumIsOneOrderLower) {
   const Registry registry = Registry::with_built_ins();
   for (const OrderScene& scene : scenes()) {
     if (scene.constraint_class != "nonholonomic") continue;
-    const MeasuredOrder measured =
+    const OrderMeasurement measured =
         measure_order(registry, scene, {.method = "type1/midpoint"}, Momentum::plus);
     EXPECT_NEAR(measured.order, 1.0, 0.1);
   }

@@ -9,6 +9,7 @@
 #include <diracstep/validation/scene_catalogue.hpp>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 namespace diracstep::command {
 
@@ -18,6 +19,7 @@ struct Options {
   std::string scene;
   std::string method = "type1/midpoint";
   int order = 0;
+  std::optional<std::string> rule;
   std::vector<std::string> set;
   bool json = false;
 };
@@ -41,9 +43,10 @@ std::string as_text(const Integrator& integrator) {
 }
 
 void plan(const Options& options, Session& session) {
-  const CatalogueScene entry = make_scene(options.scene, parameters(options.set));
-  const Integrator integrator(entry.scene, session.registry, session.solvers,
-                              {options.method, options.order, entry.natural_step, {}});
+  const CatalogueScene entry = make_scene(session, options.scene, parameters(options.set));
+  const Integrator integrator(
+      entry.scene, session.registry, session.solvers,
+      {options.method, options.order, entry.natural_step, rule(session, options.rule)});
   print(options.json ? as_json(integrator) : as_text(integrator));
 }
 
@@ -57,6 +60,9 @@ void add_plan(CLI::App& app, Session& session) {
       ->capture_default_str();
   verb->add_option("--order", options->order, "Compose to this order; 0 keeps the method's own")
       ->capture_default_str();
+  verb->add_option("--rule", options->rule,
+                   "Rule for nonholonomic rows: left, right, midpoint, trapezoidal or one of a plugin;\n"
+                   "the method's own without it");
   verb->add_option("--set", options->set, "Set a parameter of the scene; may be repeated")
       ->type_name("NAME=VALUE")
       ->allow_extra_args(false);

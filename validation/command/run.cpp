@@ -24,6 +24,7 @@ struct Options {
   std::optional<double> step;
   std::optional<double> end;
   std::string momentum = "projected";
+  std::optional<std::string> rule;
   std::string out;
   long every = 1;
   std::vector<std::string> set;
@@ -94,12 +95,12 @@ StepGrid fitted_steps(const CatalogueScene& entry, double end, const std::option
 }
 
 void run(const Options& options, Session& session) {
-  const CatalogueScene entry = make_scene(options.scene, parameters(options.set));
+  const CatalogueScene entry = make_scene(session, options.scene, parameters(options.set));
   const Momentum representative = momentum(options.momentum);
   if (options.every < 1) throw Misuse(fmt::format("--every = {}; 1 or more is needed", options.every));
   const StepGrid grid = fitted_steps(entry, options.end.value_or(entry.t_end), options.step);
   Integrator integrator(entry.scene, session.registry, session.solvers,
-                        {options.method, options.order, grid.step, {}});
+                        {options.method, options.order, grid.step, rule(session, options.rule)});
   std::optional<TrajectoryFile> file;
   if (!options.out.empty()) file.emplace(options.out, *entry.scene);
 
@@ -132,6 +133,9 @@ void add_run(CLI::App& app, Session& session) {
       ->capture_default_str();
   verb->add_option("--order", options->order, "Compose to this order; 0 keeps the method's own")
       ->capture_default_str();
+  verb->add_option("--rule", options->rule,
+                   "Rule for nonholonomic rows: left, right, midpoint, trapezoidal or one of a plugin;\n"
+                   "the method's own without it");
   verb->add_option("--step", options->step, "Step size; the scene's own without it");
   verb->add_option("--end", options->end, "End time; the scene's own without it");
   verb->add_option("--momentum", options->momentum,

@@ -144,7 +144,7 @@ bool tell_failures(const Study& study, const Options& options) {
   return failure;
 }
 
-std::vector<CatalogueScene> chosen_scenes(const Options& options) {
+std::vector<CatalogueScene> chosen_scenes(const Options& options, const Session& session) {
   std::vector<std::string> words = options.scenes;
   if (!options.more_scenes.empty())
     for (const std::string& word : names("--scenes", options.more_scenes)) words.push_back(word);
@@ -152,7 +152,7 @@ std::vector<CatalogueScene> chosen_scenes(const Options& options) {
   std::vector<CatalogueScene> scenes;
   const Parameters changes = parameters(options.set);
   for (const auto& word : words)
-    for (CatalogueScene& scene : scenes_meant(word, changes)) scenes.push_back(std::move(scene));
+    for (CatalogueScene& scene : scenes_meant(session, word, changes)) scenes.push_back(std::move(scene));
   return scenes;
 }
 
@@ -188,7 +188,7 @@ std::optional<OutputDirectory> output_directory(const Options& options) {
 }
 
 void study(const Options& options, Session& session) {
-  const std::vector<CatalogueScene> scenes = chosen_scenes(options);
+  const std::vector<CatalogueScene> scenes = chosen_scenes(options, session);
   const StudyOptions chosen = study_options(options);
   const std::string before = options.compare.empty() ? "" : read_file(options.compare);
   const std::optional<OutputDirectory> out = output_directory(options);
