@@ -42,7 +42,7 @@ bool holds(const OrderTableRow& row);
 struct RuleRow {
   std::string method;
   int order = 0;  ///< claimed with the method's own rule
-  std::vector<MeasuredOrder> measured;
+  std::vector<OrderMeasurement> measured;
   std::vector<int> expected;  ///< 1 with a one-sided rule, else the claim
 };
 std::vector<RuleRow> measure_rules(const Registry& registry, const OrderScene& nonholonomic);
@@ -51,7 +51,7 @@ std::vector<RuleRow> measure_rules(const Registry& registry, const OrderScene& n
 struct CircuitRow {
   std::string method;
   int order = 0;
-  MeasuredOrder measured;
+  OrderMeasurement measured;
 };
 std::vector<CircuitRow> measure_circuit(const Registry& registry);
 

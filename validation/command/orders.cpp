@@ -40,7 +40,7 @@ nlohmann::ordered_json number(double x) {
 nlohmann::ordered_json as_json(const RuleRow& row) {
   nlohmann::ordered_json json{
       {"method", row.method}, {"order", row.order}, {"measured", nlohmann::json::array()}};
-  for (const MeasuredOrder& measured : row.measured) json["measured"].push_back(number(measured.order));
+  for (const OrderMeasurement& measured : row.measured) json["measured"].push_back(number(measured.order));
   json["holds"] = holds(row);
   return json;
 }
