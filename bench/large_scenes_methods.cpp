@@ -38,7 +38,8 @@ void compare(const LargeScene& large) {
   const Registry registry = Registry::with_built_ins();
   const CatalogueScene entry = with_own_reference(large, registry);
   StudyOptions options;
-  options.methods = {"type1/midpoint", "type1/gl:2", "type1/gl:3", "type1/gl:4", "type1/gl:6"};
+  options.methods = {"type1/trapezoidal", "type1/midpoint", "type1/gl:2",
+                     "type1/gl:3",        "type1/gl:4",     "type1/gl:6"};
   options.rtols = {};
   options.repeats = 1;
   options.t_end = large.t_end;

@@ -17,13 +17,17 @@ struct DefaultMethod {
   std::string reason;
 };
 
-/// The method for a scene of which nothing is asked but an order, or not even that (0):
+/// The method for a scene where no method is asked for, and an order p or none (0):
 ///
-///   GL(3), order 6: in every scene class measured it needs the least time, or nearly, for errors from 1e-3
-///   to 1e-8; below, GL(4) needs less (docs/at_error.md).  An even order p gives GL(p/2). A rule for Δ^d_Q
-///   excludes GL(s), whose rows hold inside the step: type1/midpoint, composed to the order.
+///   a rule for Δ^d_Q is given          type1/midpoint composed to p: rows inside the step know no such rule
+///   more than `large` unknowns, no     type1/trapezoidal, explicit there, composed to p or 6: a fifth of the
+///   rows, no force, L separable        time of GL(3) on Toda lattices of 200 and 1000 sites
+///   all others                         GL(p/2), or GL(3); below an error of 1e-8 GL(4), p = 8, takes less
+///                                      time (docs/at_error.md)
 ///
-/// Throws Misuse for an order that is odd or above 40.
-DefaultMethod default_method(const Scene& scene, int order, std::optional<StepRule> rule);
+/// `large` is the integrator's dense_limit.  On chains of 16 to 1000 links and on lattices GL(3) through KLU
+/// takes less time than every composition of the midpoint step (bench/large_scenes_methods).  Throws Misuse
+/// for an order that is odd or above 40.
+DefaultMethod default_method(const Scene& scene, int order, std::optional<StepRule> rule, int large);
 
 }  // namespace diracstep

@@ -79,7 +79,8 @@ Integrator::Integrator(Preparation preparation, const Registry& registry, const 
 
 Method Integrator::choose_method(const Registry& registry) {
   if (options_.method == automatic_method) {
-    const DefaultMethod choice = default_method(*scene_, options_.order, options_.constraint_rule);
+    const DefaultMethod choice =
+        default_method(*scene_, options_.order, options_.constraint_rule, options_.dense_limit);
     options_.method = choice.method;
     options_.order = choice.order;
     preparation_.push_back({"method", "by default", choice.reason});

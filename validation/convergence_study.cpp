@@ -78,7 +78,8 @@ class StudyInProgress {
 
   Series chosen(const std::string& method, int order) const {
     if (method != automatic_method) return {method, order};
-    const DefaultMethod choice = default_method(*entry_.scene, order, options_.constraint_rule);
+    const DefaultMethod choice =
+        default_method(*entry_.scene, order, options_.constraint_rule, IntegratorOptions{}.dense_limit);
     return {choice.method, choice.order};
   }
 
