@@ -2,6 +2,7 @@
 #include <cmath>
 #include <diracstep/core/composition.hpp>
 #include <diracstep/core/consistent_start.hpp>
+#include <diracstep/core/default_method.hpp>
 #include <diracstep/core/errors.hpp>
 #include <diracstep/core/hidden_rows.hpp>
 #include <diracstep/core/integrator.hpp>
@@ -68,7 +69,7 @@ Integrator::Integrator(Preparation preparation, const Registry& registry, const 
     : scene_(std::move(preparation.scene)),
       preparation_(std::move(preparation.lines)),
       options_(std::move(options)),
-      method_(registry.method(options_.method)),
+      method_(choose_method(registry)),
       dense_(scene_->dimension() + scene_->rows() <= options_.dense_limit),
       velocity_problem_(*scene_, dense_),
       acceleration_problem_(*scene_, dense_) {
@@ -89,6 +90,17 @@ Integrator::Integrator(Preparation preparation, const Registry& registry, const 
   reset(scene_->start);
 }
 
+Method Integrator::choose_method(const Registry& registry) {
+  if (options_.method == automatic_method) {
+    const DefaultMethod choice =
+        default_method(*scene_, options_.order, options_.constraint_rule, options_.dense_limit);
+    options_.method = choice.method;
+    options_.order = choice.order;
+    preparation_.push_back({"method", "by default", choice.reason});
+  }
+  return registry.method(options_.method);
+}
+
 Integrator::Part Integrator::make_part(const Method& method, bool mirror_rule,
                                        const SolverFactory& solvers) const {
   const std::optional<ConstraintRule>& given = options_.constraint_rule;
@@ -103,24 +115,36 @@ Integrator::Part Integrator::make_part(const Method& method, bool mirror_rule,
   return part;
 }
 
+/// The composition of a self-adjoint method; others are followed by their adjoint with half the step each,
+/// which is self-adjoint and of the next even order.
+Integrator::Sequence Integrator::composed(const MethodInfo& info) const {
+  const int order = options_.order, own = info.self_adjoint ? info.order : info.order + info.order % 2;
+  const auto fractions = composition_fractions(!info.self_adjoint && order == own ? 2 : order);
+  if (order < own || order == info.order)
+    throw Misuse("method '" + info.name + "' of order " + std::to_string(info.order) +
+                 " cannot be composed to order " + std::to_string(order));
+  Sequence sequence;
+  for (const double fraction : fractions) {
+    if (info.self_adjoint) {
+      sequence.emplace_back(fraction, 0);
+      continue;
+    }
+    sequence.emplace_back(fraction / 2.0, 0);
+    sequence.emplace_back(fraction / 2.0, 1);
+  }
+  return sequence;
+}
+
 void Integrator::plan_stages(const Registry& registry, const SolverFactory& solvers) {
   const MethodInfo& info = method_.info;
   if (options_.order == 0) options_.order = info.order;
   parts_.push_back(make_part(method_, false, solvers));
-  std::vector<std::pair<double, std::size_t>> sequence;  // fraction and part
+  Sequence sequence;
   if (options_.order == info.order) {
     sequence = {{1.0, 0}};
-  } else if (info.self_adjoint && info.order == 2) {
-    for (const double fraction : composition_fractions(options_.order)) sequence.emplace_back(fraction, 0);
-  } else if (info.order == 1) {
-    parts_.push_back(make_part(registry.adjoint_of(method_), true, solvers));
-    for (const double fraction : composition_fractions(options_.order)) {
-      sequence.emplace_back(fraction / 2.0, 0);
-      sequence.emplace_back(fraction / 2.0, 1);
-    }
   } else {
-    throw Misuse("method '" + info.name + "' of order " + std::to_string(info.order) +
-                 " cannot be composed to order " + std::to_string(options_.order));
+    sequence = composed(info);
+    if (!info.self_adjoint) parts_.push_back(make_part(registry.adjoint_of(method_), true, solvers));
   }
   for (const auto& [fraction, part] : sequence) {
     StepProblem& problem = *parts_[part].problem;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <diracstep/core/default_method.hpp>
 #include <diracstep/core/nonlinear_solver.hpp>
 #include <diracstep/core/phase_space_step.hpp>
 #include <diracstep/core/predictor.hpp>
@@ -11,6 +12,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace diracstep {
@@ -23,7 +25,7 @@ enum class Momentum {
 };
 
 struct IntegratorOptions {
-  std::string method = "type1/midpoint";
+  std::string method = automatic_method;  ///< a name of the registry, or "auto": see default_method()
   int order = 0;  ///< composed to this order, methods that are not self-adjoint with their adjoint; 0 keeps
                   ///< the method's own
   double step = 0.0;  ///< step size, may be negative; must be given
@@ -126,6 +128,11 @@ class Integrator {
   Integrator(Preparation preparation, const Registry& registry, const SolverFactory& solvers,
              IntegratorOptions options);
 
+  /// Fractions of the step and the part that takes each.
+  using Sequence = std::vector<std::pair<double, std::size_t>>;
+
+  Method choose_method(const Registry& registry);
+  Sequence composed(const MethodInfo& info) const;
   Part make_part(const Method& method, bool mirror_rule, const SolverFactory& solvers) const;
   void plan_stages(const Registry& registry, const SolverFactory& solvers);
   SolveReport solve_velocity(double t, Vector& v);

@@ -23,10 +23,11 @@ std::vector<PlanLine> Integrator::plan() const {
     lines.push_back({"projection", "left out", "every momentum is that of a velocity"});
   } else {
     const ConstraintRule rule = options_.constraint_rule.value_or(method_.info.constraint_rule);
-    lines.push_back({"multipliers", std::to_string(m) + (method_.make ? "" : " a node"),
-                     !method_.make ? "nonholonomic rows at the Gauss, holonomic rows at the Lobatto nodes"
-                                   : std::string("nonholonomic rows by the ") + rule.description() +
-                                         " rule, holonomic rows at the end of the step"});
+    lines.push_back({"multipliers", std::to_string(m) + (method_.rows_inside ? " a node" : ""),
+                     method_.rows_inside
+                         ? "nonholonomic rows at the Gauss, holonomic rows at the Lobatto nodes"
+                         : std::string("nonholonomic rows by the ") + rule.description() +
+                               " rule, holonomic rows at the end of the step"});
     lines.push_back(
         {"projection", "where the state is read", "p is defined up to the annihilator between steps"});
   }

@@ -1,3 +1,4 @@
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <diracstep/core/errors.hpp>
@@ -196,6 +197,33 @@ class PhaseSpaceStep final : public StepProblem {
   Derivatives end_, end_along_;      ///< at q1, likewise
 };
 
+constexpr int most_coordinates_to_test = 1000;  // the test takes full matrices
+
+/// Throws Misuse where dθ has no full rank at the start: then the equations leave some velocities open, and
+/// the Lagrangian is not degenerate but wrong, or needs rows.
+void require_regular_two_form(const Scene& scene) {
+  const Lagrangian& l = *scene.lagrangian;
+  const int n = scene.dimension();
+  if (n > most_coordinates_to_test || scene.start.q.size() != n) return;
+  Derivatives at_start(l);
+  l.hessian(scene.start.time, scene.start.q, Vector::Zero(n), at_start.qq, at_start.qv, at_start.vv);
+  const Columns transposed = l.pattern().full(at_start.qv);  // Dθᵀ
+  if (!transposed.allFinite()) return;                       // the step says so itself
+  const Eigen::FullPivLU<Columns> two_form(transposed - transposed.transpose());
+  if (two_form.isInvertible()) return;
+  const Columns kernel = two_form.kernel();
+  std::string open;
+  for (int i = 0; i < n; ++i)
+    if (kernel.row(i).lpNorm<Eigen::Infinity>() > 1e-8)
+      open += " '" + scene.coordinates[static_cast<std::size_t>(i)] + "'";
+  throw Misuse("scene '" + scene.name +
+               "': its Lagrangian θ(q)·v − H(q) is linear in v, and the two-form dθ has rank " +
+               std::to_string(two_form.rank()) + " of " + std::to_string(n) +
+               " at the start, so nothing determines the velocities of" + open +
+               "; a phase-space Lagrangian pairs every coordinate with another one" +
+               (n % 2 == 1 ? ", which an odd number of them cannot be" : ""));
+}
+
 }  // namespace
 
 std::unique_ptr<StepProblem> phase_space_step(int s, const Scene& scene, bool dense) {
@@ -204,6 +232,7 @@ std::unique_ptr<StepProblem> phase_space_step(int s, const Scene& scene, bool de
     throw Misuse(prefix + "its Lagrangian is not linear in v");
   if (scene.rows() > 0 || scene.force)
     throw Misuse(prefix + "rows and forces on a Lagrangian that is linear in v are not supported");
+  require_regular_two_form(scene);
   return std::make_unique<PhaseSpaceStep>(s, scene, dense);
 }
 

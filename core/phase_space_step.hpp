@@ -17,7 +17,8 @@ namespace diracstep {
 /// the other one the order is lost or the system is singular.  Without the projection p leaves the constraint
 /// and the order in a general gauge drops to s.
 ///
-/// Throws Misuse unless L is known to be linear in v, has no rows and no force, and 1 ≤ s ≤ 20.
+/// Throws Misuse unless L is known to be linear in v, has no rows and no force, and 1 ≤ s ≤ 20; and where the
+/// two-form dθ is singular at the start, with the coordinates whose velocities nothing determines.
 std::unique_ptr<StepProblem> phase_space_step(int s, const Scene& scene, bool dense);
 
 /// Unknown v, linear:   ∂L/∂q(q,v) = Dθ(q) v,  that is (Dθᵀ − Dθ) v = ∂H/∂q: the velocity of a phase-space

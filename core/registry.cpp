@@ -4,6 +4,7 @@
 #include <diracstep/core/gauss_lobatto_tableau.hpp>
 #include <diracstep/core/generating_functions/adjoint.hpp>
 #include <diracstep/core/generating_functions/euler.hpp>
+#include <diracstep/core/generating_functions/gauss_lobatto.hpp>
 #include <diracstep/core/generating_functions/legendre.hpp>
 #include <diracstep/core/generating_functions/quadrature.hpp>
 #include <diracstep/core/phase_space_step.hpp>
@@ -55,8 +56,10 @@ std::optional<Method> gauss_lobatto_method(const std::string& name) {
                         true,
                         StepRule::midpoint,
                         "Gauss-Lobatto Dirac step, " + std::to_string(s) + (s == 1 ? " stage" : " stages")};
-  return Method{info, nullptr,
-                [s](const Scene& scene, bool dense) { return gauss_lobatto_step(s, scene, dense); }, s};
+  return Method{
+      info,
+      [s, type = info.type](const Scene& scene) { return gauss_lobatto_function(type, s, scene.lagrangian); },
+      [s](const Scene& scene, bool dense) { return gauss_lobatto_step(s, scene, dense); }, s, true};
 }
 
 }  // namespace
@@ -73,7 +76,7 @@ std::unique_ptr<StepProblem> Method::step(const Scene& scene, bool dense, std::o
   ConstraintRule applied = info.constraint_rule;
   if (rule && rule->own) applied.own = rule->own;  // forces keep the method's nodes
   if (rule && !rule->own) applied.nodes = rule->nodes;
-  if (make) return dirac_step(make(scene), scene, applied, dense);
+  if (make && !rows_inside) return dirac_step(make(scene), scene, applied, dense);
   throw Misuse("method '" + info.name + "' has its own nodes for the constraint; no other rule applies");
 }
 
@@ -131,8 +134,11 @@ Method Registry::transformed(const std::string& name) const {
     throw Misuse(message + " typeN/gl:S typeN/adjoint(...)");
   }
   const Method inner = method(transform.inner);
-  if (!inner.make)
-    throw Misuse("'" + name + "': " + transform.inner + " is no generating function of its end points");
+  if (!inner.make || inner.rows_inside)
+    throw Misuse(
+        "'" + name + "': " + transform.inner +
+        " keeps the rows at nodes inside the step, so no function of its end points makes it; typeN/gl:S "
+        "are its transforms, and it is its own adjoint");
   MethodInfo info = inner.info;
   info.name = name;
   info.type = transform.type;

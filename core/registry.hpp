@@ -36,13 +36,16 @@ using StepFactory = std::function<std::unique_ptr<StepProblem>(const Scene&, boo
 /// A method ready for use.
 struct Method {
   MethodInfo info;
-  GeneratingFunctionFactory make;  ///< empty where the method is no generating function of its end points
+  GeneratingFunctionFactory make;  ///< its generating function; empty where it has none
   StepFactory make_step = {};      ///< a step of its own; empty where it is that of the generating function
   int stages = 0;                  ///< S for a step GL(S); 0 for others
+  /// The rows hold at nodes inside the step: `make` is its generating function on scenes without rows and
+  /// forces; with them only `make_step` is the step.
+  bool rows_inside = false;
 
   /// The step on a scene, with the method's own rule for Δ^d_Q or another.  Throws Misuse for another rule
-  /// where the method is no generating function of its end points, and for a degenerate scene (a Lagrangian
-  /// linear in v) where the method is not one of the Gauss-Lobatto family, unless `force_degenerate`:
+  /// where the rows of the method hold inside the step, and for a degenerate scene (a Lagrangian linear in v)
+  /// where the method is not one of the Gauss-Lobatto family, unless `force_degenerate`:
   /// one-sided and trapezoidal rules are unstable there.
   std::unique_ptr<StepProblem> step(const Scene& scene, bool dense, std::optional<ConstraintRule> rule = {},
                                     bool force_degenerate = false) const;
@@ -52,8 +55,8 @@ struct Method {
 ///
 /// Beside the registered names it knows three families:
 ///   typeN/gl:S                N = 1, 2, 3: the Gauss–Lobatto Dirac step with S stages, order 2S
-///   (gauss_lobatto_step.hpp);
-///                             the three types are one system, written with other data given
+///                             (gauss_lobatto_step.hpp); one step, whose generating functions of the three
+///                             types are in generating_functions/gauss_lobatto.hpp
 ///   typeN/legendre(type1/…)   N = 2, 3, 4: the discrete Legendre transform of a method of type 1
 ///   typeN/adjoint(…)          the adjoint of a method; N is its type
 class Registry {

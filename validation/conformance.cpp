@@ -83,6 +83,7 @@ std::vector<OrderScene> order_scenes() {
   scenes.push_back({"mixed", laws::mixed(), 6.0, {}});
   scenes.push_back({"affine, driven", laws::driven(), 6.0, {}});
   scenes.push_back({"forced, mixed", laws::forced(laws::mixed()), 6.0, {}});
+  scenes.push_back({"phase space", laws::phase_space(), 6.0, {}});
   for (OrderScene& scene : scenes) find_reference(scene);
   return scenes;
 }
@@ -95,7 +96,8 @@ OrderScene degenerate_order_scene() {
 
 OrderMeasurement measure_order(const Registry& registry, const OrderScene& scene, IntegratorOptions options,
                                Momentum momentum) {
-  const Vector expected = join(scene.reference.q, scene.reference.p);
+  const auto everything = [](const Sample& s) { return join(join(s.q, s.p), s.lambda); };
+  const Vector expected = everything(scene.reference);
   const double claimed = options.order > 0 ? options.order : registry.method(options.method).info.order;
   std::vector<Point> points;
   OrderMeasurement result{std::nan(""), 0.0, 0.0, {}};
@@ -111,7 +113,7 @@ OrderMeasurement measure_order(const Registry& registry, const OrderScene& scene
       points.clear();
       continue;
     }
-    const double error = (join(end.q, end.p) - expected).lpNorm<Eigen::Infinity>();
+    const double error = (everything(end) - expected).lpNorm<Eigen::Infinity>();
     if (error < std::max(round_off, 1e-13 * std::sqrt(static_cast<double>(solves)))) break;
     if (std::ssize(points) >= fitted_points && error < 1e-9) {
       std::vector<Point> last(points.end() - fitted_points + 1, points.end());
@@ -178,7 +180,8 @@ double symplecticity_defect(const Registry& registry, const std::shared_ptr<cons
 double membership_residual(const Registry& registry, const std::shared_ptr<const Scene>& scene,
                            const IntegratorOptions& options, long steps) {
   const Method method = registry.method(options.method);
-  if (!method.make || method.info.type == GeneratingType::four) return std::nan("");
+  const bool no_function_of_end_points = !method.make || (method.rows_inside && scene->rows() > 0);
+  if (no_function_of_end_points || method.info.type == GeneratingType::four) return std::nan("");
   std::vector<Vector> q, plus, minus;
   for (const Momentum momentum : {Momentum::plus, Momentum::minus}) {
     Integrator integrator(scene, registry, kinsol(), options);

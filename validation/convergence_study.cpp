@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <diracstep/core/composition.hpp>
 #include <diracstep/core/errors.hpp>
 #include <diracstep/core/run.hpp>
 #include <diracstep/plugins/callback_error.hpp>
@@ -39,7 +40,7 @@ class StudyInProgress {
     natural_step_ = std::copysign(scene.natural_step, study_.t_end - study_.t_start);
     require_options();
     for (const auto& method : options_.methods)
-      for (const int order : orders_of(method)) series_.emplace_back(method, order);
+      for (const int order : orders_of(method)) series_.push_back(chosen(method, order));
     require_one_that_fits();
   }
 
@@ -78,7 +79,15 @@ class StudyInProgress {
     for (const double step : options_.steps) (void)fit_steps(study_.t_start, study_.t_end, step);
   }
 
+  Series chosen(const std::string& method, int order) const {
+    if (method != automatic_method) return {method, order};
+    const DefaultMethod choice =
+        default_method(*entry_.scene, order, options_.constraint_rule, IntegratorOptions{}.dense_limit);
+    return {choice.method, choice.order};
+  }
+
   std::vector<int> orders_of(const std::string& method) const {
+    if (method == automatic_method) return options_.orders.empty() ? std::vector<int>{0} : options_.orders;
     const Method known = registry_.method(method);
     return options_.orders.empty() ? possible_orders(known.info) : options_.orders;
   }
@@ -216,8 +225,9 @@ std::vector<WorkPoint> points(const Study& study, const std::string& method, int
 }  // namespace
 
 std::vector<int> possible_orders(const MethodInfo& method) {
-  if (method.order == 1) return {1, 2, 4, 6, 8};
-  if (method.order == 2 && method.self_adjoint) return {2, 4, 6, 8};
+  std::vector<int> orders{composition_orders.begin(), composition_orders.end()};
+  if (method.order == 1) orders.insert(orders.begin(), 1);
+  if (method.order == 1 || (method.order == 2 && method.self_adjoint)) return orders;
   return {method.order};
 }
 

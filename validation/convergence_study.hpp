@@ -12,13 +12,13 @@ namespace diracstep {
 /// "plus", "minus" or "projected".
 const char* name(Momentum momentum);
 
-/// The orders a method can be run at: its own, and those it can be composed to.
+/// The orders a study runs a method at: its own and, for methods of order 1 and 2, those of its compositions.
 std::vector<int> possible_orders(const MethodInfo& method);
 
 struct StudyOptions {
-  std::vector<std::string> methods = {"type1/midpoint"};
-  std::vector<int> orders = {};    ///< empty: all possible ones
-  std::vector<double> steps = {};  ///< empty: a ladder, see convergence_study
+  std::vector<std::string> methods = {"type1/midpoint"};  ///< "auto" is default_method()
+  std::vector<int> orders = {};                           ///< empty: all possible ones of each method
+  std::vector<double> steps = {};                         ///< empty: a ladder, see convergence_study
   /// Tolerances of the yardsticks; empty: no runs of theirs.
   std::vector<double> rtols = {1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12, 1e-13, 1e-14};
   std::vector<std::string> yardsticks = {ida_method, erk_method};  ///< beside the methods
@@ -53,7 +53,7 @@ struct AtError {
 };
 
 /// The errors `at_error` is taken at.
-inline constexpr std::array<double, 3> compared_errors{1e-3, 1e-6, 1e-9};
+inline constexpr std::array<double, 4> compared_errors{1e-3, 1e-6, 1e-9, 1e-12};
 
 struct Study {
   std::string scene;

@@ -151,6 +151,22 @@ inline std::shared_ptr<const Scene> forced(const std::shared_ptr<const Scene>& s
   return std::make_shared<const Scene>(copy);
 }
 
+/// Lotka–Volterra, a phase-space Lagrangian θ(q)·v − H(q) in a gauge where no component of θ vanishes; data
+/// of JuliaGNI/GeometricProblems.jl, src/lotka_volterra_2d.jl.
+inline std::shared_ptr<const Scene> phase_space() {
+  Scene scene;
+  scene.name = "phase space";
+  scene.coordinates = {"prey", "predators"};
+  scene.lagrangian = lagrangian<2>([](const auto& q, const auto& v) {
+    using std::log;
+    return (q[1] + log(q[1]) / q[0]) * v[0] + q[0] * v[1] + q[0] + q[1] - log(q[0]) - 2.0 * log(q[1]);
+  });
+  scene.start = {0.0, Vector(2), Vector(2)};
+  scene.start.q << 2.0, 1.0;
+  scene.start.v << 2.0, 1.0;
+  return std::make_shared<const Scene>(scene);
+}
+
 inline const std::array<std::shared_ptr<const Scene>, 4>& every_constraint_class() {
   static const std::array<std::shared_ptr<const Scene>, 4> scenes{unconstrained(), nonholonomic(),
                                                                   holonomic_sphere(), mixed()};

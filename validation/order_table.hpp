@@ -15,8 +15,9 @@ struct OrderTableRow {
   std::vector<OrderMeasurement> measured;  ///< one for each of order_scenes()
   double reversal_defect = 0.0;  ///< on the mixed scene, h = 0.05; NaN where the method is not self-adjoint
   double symplecticity_defect = 0.0;  ///< on the unconstrained scene, h = 0.05; NaN for a composition
-  double membership_residual =
-      0.0;  ///< largest over the constraint classes, 20 steps of h = 0.05; NaN where none is stated
+  /// Largest over the constraint classes, 20 steps of h = 0.05; of GL(s) with rows in the stage space.  NaN
+  /// where none is stated.
+  double membership_residual = 0.0;
 };
 
 /// One line of the table is one of these.
@@ -25,8 +26,9 @@ struct TableMethod {
   int order;
 };
 
-/// Every method of the registry with its own order, the symmetric compositions of those of order 1, and
-/// type1/midpoint composed to 4, 6 and 8.
+/// Every method of the registry with its own order, the symmetric compositions of those of order 1,
+/// type1/midpoint composed to every order there is, and one example each of an explicit step, of a
+/// symmetrised pair and of GL(2) composed.
 std::vector<TableMethod> table_methods(const Registry& registry);
 
 /// Measures a row.

@@ -27,11 +27,11 @@ constexpr const char* circuit_explanation =
     "rows (`core/hidden_rows.hpp`). Methods that need a Hamiltonian are left out: it has none.\n\n"
     "| method | claimed | measured |\n|---|---|---|\n";
 
-bool agrees(const MeasuredOrder& measured, int expected) {
+bool agrees(const OrderMeasurement& measured, int expected) {
   return measured.failure.empty() && std::abs(measured.order - expected) <= 0.2;
 }
 
-std::string cell(const MeasuredOrder& measured) {
+std::string cell(const OrderMeasurement& measured) {
   return std::isfinite(measured.order) ? fmt::format("{:.2f}", measured.order) : "**failed**";
 }
 
@@ -96,7 +96,7 @@ std::string rule_table_markdown(const std::vector<RuleRow>& rows) {
   text += "\n|---|---|---|---|---|---|\n";
   for (const RuleRow& row : rows) {
     text += fmt::format("| `{}` | {} |", row.method, row.order);
-    for (const MeasuredOrder& measured : row.measured) text += fmt::format(" {} |", cell(measured));
+    for (const OrderMeasurement& measured : row.measured) text += fmt::format(" {} |", cell(measured));
     text += '\n';
   }
   return text;

@@ -214,6 +214,32 @@ std::string study_table(const Study& study) {
                      comparison_table(study), study.interrupted ? "\ninterrupted\n" : "");
 }
 
+std::string at_error_markdown(const Study& study) {
+  std::vector<MeasuredOrder> series = study.measured_orders;
+  std::erase_if(series, [&](const MeasuredOrder& m) { return !has_run(study, m.method, m.order); });
+  std::string text =
+      fmt::format("## `{}`, t = {:g} to {:g}\n\n| error |", study.scene, study.t_start, study.t_end);
+  std::string rule = "|---|";
+  for (const MeasuredOrder& m : series) {
+    text += fmt::format(" `{}`, order {} |", m.method, m.order);
+    rule += "---|";
+  }
+  text += " IDA |\n" + rule + "---|\n";
+  for (const double error : compared_errors) {
+    text += fmt::format("| {:.0e} |", error);
+    std::optional<double> ida;
+    for (const MeasuredOrder& m : series)
+      for (const AtError& at : study.at_error) {
+        if (at.error != error || at.method != m.method || at.order != m.order) continue;
+        const std::string cell = at.cpu_seconds ? time_cell(*at.cpu_seconds) : "-";
+        text += at.best ? " **" + cell + "** |" : " " + cell + " |";
+        ida = at.ida_cpu_seconds;
+      }
+    text += fmt::format(" {} |\n", ida ? time_cell(*ida) : "-");
+  }
+  return text + '\n';
+}
+
 std::string studies_csv(const std::vector<Study>& studies) {
   std::string text =
       "scene,method,order,momentum,step,rtol,status,error_q,error_p,self_error,constraint,energy_error,"

@@ -10,6 +10,10 @@ namespace diracstep {
 /// A study as tables for a person: the rows, the measured orders, and the time to reach an error.
 std::string study_table(const Study& study);
 
+/// CPU time at the compared errors as a Markdown table with its heading: methods side by side, the fastest
+/// bold.
+std::string at_error_markdown(const Study& study);
+
 /// All rows of all studies, one line each, with a header; a number that does not apply is left empty.
 std::string studies_csv(const std::vector<Study>& studies);
 

@@ -22,16 +22,21 @@ struct Options {
 
 constexpr const char* explanation =
     "# Orders, claimed and measured\n\n"
-    "Written by `diracstep orders --out FILE`. Each number is the slope of the error in q and projected p at "
-    "t = 2.4\n"
-    "between two steps h and h/2, on non-linear scenes with a position-dependent mass and no special "
-    "symmetry\n"
-    "(`validation/law_scenes.hpp`), against GL(6) at h = 0.025; errors below 1e-12 are left out.\n\n"
+    "Written by `diracstep orders --out FILE`. Each number is the slope of log(error) over log(h), the "
+    "error\n"
+    "being the largest in q, projected p and the forces of the rows at t = 6, on non-linear scenes without "
+    "a\n"
+    "special symmetry (`validation/law_scenes.hpp`), against GL(6) at h = 0.025; errors at round-off are "
+    "left\n"
+    "out.\n\n"
     "* *reversal*: |Φ_{-h}(Φ_h(y)) - y| on the mixed scene, h = 0.05, for self-adjoint steps.\n"
     "* *symplecticity*: largest entry of MᵀΩM - Ω on the unconstrained scene, M by sixth-order differences.\n"
     "* *membership*: largest residual of membership in the discrete Dirac structures over 20 steps of every "
-    "class.\n\n"
-    "A dash: not stated for that method, or it does not take that class (type 4 takes no forces).\n\n";
+    "class;\n"
+    "  for GL(s) with rows, in the Dirac structure of its stage space "
+    "(`validation/stage_membership.hpp`).\n\n"
+    "A dash: not stated for that method, or it does not take that class: type 4 takes no forces; only the\n"
+    "Gauss-Lobatto family, which type1/midpoint belongs to, is stable on phase-space Lagrangians.\n\n";
 
 nlohmann::ordered_json number(double x) {
   return std::isfinite(x) ? nlohmann::ordered_json(x) : nlohmann::ordered_json();

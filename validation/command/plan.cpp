@@ -17,7 +17,7 @@ namespace {
 
 struct Options {
   std::string scene;
-  std::string method = "type1/midpoint";
+  std::string method = automatic_method;
   int order = 0;
   std::optional<std::string> rule;
   std::vector<std::string> set;
@@ -56,9 +56,12 @@ void add_plan(CLI::App& app, Session& session) {
   CLI::App* verb = app.add_subcommand("plan", "What is assembled for a scene, and what is left out and why");
   const auto options = std::make_shared<Options>();
   verb->add_option("SCENE", options->scene, "A scene; see diracstep list scenes")->required();
-  verb->add_option("--method", options->method, "A method; see diracstep list methods")
+  verb->add_option(
+          "--method", options->method,
+          "A method; see diracstep list methods.  auto: GL(S) of the order asked for, or as plan says")
       ->capture_default_str();
-  verb->add_option("--order", options->order, "Compose to this order; 0 keeps the method's own")
+  verb->add_option("--order", options->order,
+                   "Order; methods of another one are composed to it.  0 keeps the method's own")
       ->capture_default_str();
   verb->add_option("--rule", options->rule,
                    "Rule for nonholonomic rows: left, right, midpoint, trapezoidal or one of a plugin;\n"
@@ -67,7 +70,7 @@ void add_plan(CLI::App& app, Session& session) {
       ->type_name("NAME=VALUE")
       ->allow_extra_args(false);
   verb->add_flag("--json", options->json, "One JSON document on standard output");
-  verb->footer("Example:  diracstep plan knife_edge --method type1/midpoint");
+  verb->footer("Example:  diracstep plan knife_edge --method type1/midpoint --order 4");
   verb->callback([options, &session] { plan(*options, session); });
 }
 

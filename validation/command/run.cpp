@@ -19,7 +19,7 @@ namespace {
 
 struct Options {
   std::string scene;
-  std::string method = "type1/midpoint";
+  std::string method = automatic_method;
   int order = 0;
   std::optional<double> step;
   std::optional<double> end;
@@ -129,9 +129,12 @@ void add_run(CLI::App& app, Session& session) {
   CLI::App* verb = app.add_subcommand("run", "One trajectory");
   const auto options = std::make_shared<Options>();
   verb->add_option("SCENE", options->scene, "A scene; see diracstep list scenes")->required();
-  verb->add_option("--method", options->method, "A method; see diracstep list methods")
+  verb->add_option(
+          "--method", options->method,
+          "A method; see diracstep list methods.  auto: GL(S) of the order asked for, or as plan says")
       ->capture_default_str();
-  verb->add_option("--order", options->order, "Compose to this order; 0 keeps the method's own")
+  verb->add_option("--order", options->order,
+                   "Order; methods of another one are composed to it.  0 keeps the method's own")
       ->capture_default_str();
   verb->add_option("--rule", options->rule,
                    "Rule for nonholonomic rows: left, right, midpoint, trapezoidal or one of a plugin;\n"

@@ -41,7 +41,7 @@ struct Options {
   double budget = 1.0;
   std::optional<double> end;
   std::string momentum = "projected";
-  std::string out, compare, more_scenes;
+  std::string out, compare, more_scenes, table;
   std::vector<std::string> set;
   bool json = false;
 };
@@ -59,6 +59,23 @@ std::string write_file(const std::filesystem::path& path, const std::string& tex
   if (std::fclose(file) == 0 && written) return {};
   return fmt::format("'{}' could not be written in full: {}", path.string(),
                      std::strerror(written ? errno : error));
+}
+
+constexpr const char* explanation =
+    "# CPU time to an error\n\n"
+    "Written by `diracstep study SCENE... --methods A,B,... --table FILE`: the thread's CPU time at which "
+    "the relative\n"
+    "error (maximum norm, q and projected p) at the end of the motion reaches each level, read off the lower "
+    "envelope of\n"
+    "error against time by log-log interpolation. A dash: the method does not get there, or is below the "
+    "level with the\n"
+    "coarsest step it was run with. The fastest of ours is bold. One run on one machine: compare within a "
+    "table.\n\n";
+
+std::string tables(const std::vector<Study>& studies) {
+  std::string text = explanation;
+  for (const Study& study : studies) text += at_error_markdown(study);
+  return text;
 }
 
 /// The directory of --out: study.csv, study.json, the pictures and report.html, renewed after each scene.
@@ -200,12 +217,15 @@ void study(const Options& options, Session& session) {
     studies.push_back(one_study(scene, chosen, session, studies.size() + 1, scenes.size()));
     if (tell_failures(studies.back(), options)) session.exit_status = failed;
     if (!options.json) print(study_table(studies.back()) + '\n');
-    if (!out) continue;
-    page.push_back(page_entry(studies.back(), scene, session));
-    if (const std::string failure = out->write(studies, page); !failure.empty()) {
-      say(failure);
-      session.exit_status = failed;
+    std::string failure;
+    if (out) {
+      page.push_back(page_entry(studies.back(), scene, session));
+      failure = out->write(studies, page);
     }
+    if (failure.empty() && !options.table.empty()) failure = write_file(options.table, tables(studies));
+    if (failure.empty()) continue;
+    say(failure);
+    session.exit_status = failed;
   }
   if (options.json) print(studies_json(studies) + '\n');
   if (!before.empty()) say(comparison_table(compare_studies(studies, before)));
@@ -245,6 +265,8 @@ void add_study(CLI::App& app, Session& session) {
   verb->add_option("--compare", options->compare,
                    "An earlier study.json: tells what got faster, slower, more or less exact")
       ->type_name("OLD.json");
+  verb->add_option("--table", options->table, "Markdown file: CPU time of each method at the compared errors")
+      ->type_name("FILE");
   verb->add_option("--set", options->set, "Set a parameter of the scenes; may be repeated")
       ->type_name("NAME=VALUE")
       ->allow_extra_args(false);

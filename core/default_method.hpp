@@ -1,0 +1,33 @@
+#pragma once
+
+#include <diracstep/core/scene.hpp>
+#include <diracstep/core/step_nodes.hpp>
+#include <optional>
+#include <string>
+
+namespace diracstep {
+
+/// The name that stands for the method the library would take.
+inline constexpr const char* automatic_method = "auto";
+
+/// What was taken for "auto", and why; `order` as in IntegratorOptions.
+struct DefaultMethod {
+  std::string method;
+  int order = 0;
+  std::string reason;
+};
+
+/// The method for a scene where no method is asked for, and an order p or none (0):
+///
+///   a rule for Δ^d_Q is given          type1/midpoint composed to p: rows inside the step know no such rule
+///   more than `large` unknowns, no     type1/trapezoidal, explicit there, composed to p or 6: a fifth of the
+///   rows, no force, L separable        time of GL(3) on Toda lattices of 200 and 1000 sites
+///   all others                         GL(p/2), or GL(3); below an error of 1e-8 GL(4), p = 8, takes less
+///                                      time (docs/at_error.md)
+///
+/// `large` is the integrator's dense_limit.  On chains of 16 to 1000 links and on lattices GL(3) through KLU
+/// takes less time than every composition of the midpoint step (bench/large_scenes_methods).  Throws Misuse
+/// for an order that is odd or above 40.
+DefaultMethod default_method(const Scene& scene, int order, std::optional<StepRule> rule, int large);
+
+}  // namespace diracstep
