@@ -18,10 +18,12 @@ bool explicit_at_the_ends(const Scene& scene) {
 
 }  // namespace
 
-DefaultMethod default_method(const Scene& scene, int order, std::optional<StepRule> rule, int large) {
+DefaultMethod default_method(const Scene& scene, int order, const std::optional<ConstraintRule>& rule,
+                             int large) {
   if (rule)
     return {"type1/midpoint", order,
-            std::string("the ") + name(*rule) + " rule was asked for; GL(s) has its own nodes for the rows"};
+            std::string("the ") + rule->description() +
+                " rule was asked for; GL(s) has its own nodes for the rows"};
   if (order < 0 || order > highest_order || order % 2 != 0)
     throw Misuse("order " + std::to_string(order) + " without a method: even orders up to " +
                  std::to_string(highest_order) + " are allowed; type1/left and type2/euler are of order 1");

@@ -1,7 +1,7 @@
 #pragma once
 
+#include <diracstep/core/discrete_rows.hpp>
 #include <diracstep/core/scene.hpp>
-#include <diracstep/core/step_nodes.hpp>
 #include <optional>
 #include <string>
 
@@ -28,6 +28,7 @@ struct DefaultMethod {
 /// `large` is the integrator's dense_limit.  On chains of 16 to 1000 links and on lattices GL(3) through KLU
 /// takes less time than every composition of the midpoint step (bench/large_scenes_methods).  Throws Misuse
 /// for an order that is odd or above 40.
-DefaultMethod default_method(const Scene& scene, int order, std::optional<StepRule> rule, int large);
+DefaultMethod default_method(const Scene& scene, int order, const std::optional<ConstraintRule>& rule,
+                             int large);
 
 }  // namespace diracstep
