@@ -4,6 +4,8 @@
 #include <diracstep/core/gauss_lobatto_step.hpp>
 #include <diracstep/core/gauss_lobatto_tableau.hpp>
 #include <diracstep/core/scales.hpp>
+#include <diracstep/core/stage_splitting.hpp>
+#include <optional>
 
 namespace diracstep {
 
@@ -38,7 +40,11 @@ class GaussLobattoStep final : public StepProblem {
     }
     affine_ = lagrangian_->structure().quadratic && !force_ &&
               std::ranges::all_of(scene.constraints, [](const auto& block) { return block->constant(); });
-    last_x_.setConstant(size(), std::nan(""));
+    last_x_.setZero(size());
+    const auto holonomic = [](const auto& block) { return block->holonomic(); };
+    const auto kinds = std::ranges::count_if(scene.constraints, holonomic);
+    if (dense && (kinds == 0 || kinds == std::ssize(scene.constraints)))
+      splitting_.emplace(table_, n_, m_, kinds > 0);
     plan_blocks(dense);
     blocks_.push_back({"momentum", n_ * s_});
     if (m_ > 0) blocks_.push_back({"constraint", m_ * s_});
@@ -59,10 +65,17 @@ class GaussLobattoStep final : public StepProblem {
 
   void reset() override {
     lq_.setZero();
-    curvature_ = 0.0;
-    hessians_known_ = false;
+    last_x_.setZero();
+    curvature_ = row_curvature_ = 0.0;
+    hessians_known_ = mass_known_ = false;
   }
   double constant_jacobian_parameter() const override { return affine_ ? step_.size : std::nan(""); }
+
+  bool has_splitting() const override { return splitting_.has_value(); }
+  void solve_splitting(VectorRef f) override {
+    if (!splitting_known_) move_splitting();
+    splitting_->solve(f);
+  }
   const SparsityPattern& pattern() const override { return pattern_; }
   std::span<const ResidualBlock> blocks() const override { return blocks_; }
 
@@ -76,9 +89,10 @@ class GaussLobattoStep final : public StepProblem {
     step_ = step;
     q0_ = q0;
     p0_ = p0;
-    last_x_[0] = std::nan("");
+    splitting_known_ = false;
     for (Rows& rows : rows_) rows.evaluate_impulse_rows(step_.start, q0_, 0);
     update_scales();
+    last_x_[0] = std::nan("");
   }
 
   void guess(const Vector& v0, VectorRef x) override {
@@ -113,6 +127,7 @@ class GaussLobattoStep final : public StepProblem {
     evaluate(x);
     if (!rows_at_gauss_known_) evaluate_rows_at_gauss();
     second_derivatives(x);
+    row_curvature_ = 0.0;
     values.setZero();
     for (int i = 0; i < s_; ++i)
       for (int k = 0; k < s_; ++k) add_momentum_block(i, k, values);
@@ -191,6 +206,7 @@ class GaussLobattoStep final : public StepProblem {
         rows.block->pattern().transposed_multiply_add(
             rows.at_lobatto.col(j).data(), x.data() + row_of(j) + rows.first, impulses_.col(j).data());
       }
+    blocks_[0].scale = std::max(blocks_[0].scale, impulse_scale(x));
   }
 
   void evaluate_rows_at_gauss() {
@@ -223,6 +239,21 @@ class GaussLobattoStep final : public StepProblem {
     }
     if (!hessians_known_) curvature_ = max_norm(lqq_);
     hessians_known_ = lagrangian_->structure().quadratic;
+  }
+
+  /// The splitting is taken in the middle of the step, at the stages that were evaluated last.
+  void move_splitting() {
+    const int middle = s_ / 2;
+    if (!mass_known_) {
+      lagrangian_->hessian(gauss_time(middle), q_.col(middle), last_x_.segment(n_ * middle, n_),
+                           lqq_.col(middle), lqv_.col(middle), lvv_.col(middle));
+      splitting_->set_mass(lagrangian_->pattern(), lvv_.col(middle));
+      mass_known_ = lagrangian_->structure().y_hessian_constant;
+    }
+    for (Rows& rows : rows_)
+      splitting_->set_rows(rows.first, rows.block->pattern(), rows.at_lobatto.col(middle));
+    if (m_ > 0) splitting_->factor_rows();
+    splitting_known_ = true;
   }
 
   void plan_blocks(bool dense) {
@@ -272,6 +303,7 @@ class GaussLobattoStep final : public StepProblem {
       rows.block->annihilator_derivative(lobatto_time(j), lobatto_q_.col(j),
                                          x.segment(row_of(j) + rows.first, rows.block->rows()),
                                          rows.curvature.col(j));
+    if (s_ > 1) row_curvature_ = std::max(row_curvature_, max_norm(rows.curvature));
     for (int i = 0; i < s_; ++i)
       for (int k = 0; k < s_; ++k) {
         add(values, rows.impulse_places[at(i, k)], -table_.e(i, k), rows.at_lobatto.col(k).data());
@@ -301,14 +333,21 @@ class GaussLobattoStep final : public StepProblem {
     for (std::size_t k = 0; k < places.size(); ++k) values[places[k]] += factor * block[k];
   }
 
-  /// Terms of the momentum rows are momenta; a velocity of size |q|/h loses ε|q|/h to round-off.
+  /// Size of the impulses at x, and of what they lose to the round-off of positions.
+  double impulse_scale(ConstVectorRef x) const {
+    return one_forms_ * max_norm(x.tail(m_ * s_)) + row_curvature_ * max_norm(q0_);
+  }
+
+  /// Terms of the momentum rows are momenta, those of the last step where this one is not solved yet; a velocity of size |q|/h loses ε|q|/h to round-off.
   void update_scales() {
     const double h = std::abs(step_.size);
     const double size = max_norm(q0_), velocity = size / h;
-    double one_forms = 0.0;
-    for (const Rows& rows : rows_) one_forms = std::max(one_forms, max_norm(rows.at_lobatto.col(0)));
-    blocks_[0].scale = usable_scale(max_norm(p0_) + h * max_norm(lq_) + h * curvature_ * size);
-    if (m_ > 0) blocks_[1].scale = usable_scale(one_forms * velocity);
+    one_forms_ = 0.0;
+    for (const Rows& rows : rows_) one_forms_ = std::max(one_forms_, max_norm(rows.at_lobatto.col(0)));
+    double momentum = max_norm(p0_) + h * max_norm(lq_) + h * curvature_ * size;
+    if (m_ > 0) momentum += impulse_scale(last_x_);
+    blocks_[0].scale = usable_scale(momentum);
+    if (m_ > 0) blocks_[1].scale = usable_scale(one_forms_ * velocity);
   }
 
   std::shared_ptr<const Lagrangian> lagrangian_;
@@ -331,7 +370,10 @@ class GaussLobattoStep final : public StepProblem {
   Columns lq_, lv_;        ///< ∂L/∂q + f and ∂L/∂v at the Gauss nodes
   Columns impulses_;       ///< A(Q~_j)ᵀ λ_j
   Columns lqq_, lqv_, lvv_, fq_, fv_;
+  double one_forms_ = 0.0, row_curvature_ = 0.0;  ///< largest entries of A(q0) and ∂(Aᵀλ)/∂q
   double curvature_ = 0.0;  ///< largest second derivative ∂²L/∂q² met
+  std::optional<StageSplitting> splitting_;  ///< small scenes with rows of one kind
+  bool splitting_known_ = false, mass_known_ = false;
   bool affine_ = false;  ///< the residual is affine in the unknowns
   bool hessians_known_ = false, rows_at_gauss_known_ = false;
 };

@@ -200,23 +200,29 @@ class KinsolSolver final : public NonlinearSolver {
     });
   }
 
-  /// g = x − P⁻¹F(x); x itself, which ends the iteration, where the residual is round-off; a failure where it
+  /// g = x − P⁻¹F(x); x = g as well, which ends the iteration, where the residual is round-off; a failure where it
   /// grows.
-  int contract(const Eigen::Map<Vector>& x, Eigen::Map<Vector> g) {
+  int contract(Eigen::Map<Vector> x, Eigen::Map<Vector> g) {
     const double norm = scaled_norm();
     const bool stagnates = norm > smallest_norm_ / 2.0;
-    if (not_finite_ || norm > 2.0 * smallest_norm_) return norm <= options_.accept ? end_at(x, g) : -1;
+    if (not_finite_ || norm > 2.0 * smallest_norm_) return norm <= options_.accept ? end_near(x, g) : -1;
     smallest_norm_ = std::min(smallest_norm_, norm);
     if (norm <= options_.tolerance || (stagnates && norm <= round_off * options_.tolerance))
-      return end_at(x, g);
-    g = last_residual_;
-    problem_.solve_splitting(g);
-    g = x - g;
+      return end_near(x, g);
+    contract_to(x, g);
     return 0;
   }
 
-  static int end_at(const Eigen::Map<Vector>& x, Eigen::Map<Vector> g) {
-    g = x;
+  void contract_to(const Eigen::Map<Vector>& x, Eigen::Map<Vector> g) {
+    g = last_residual_;
+    problem_.solve_splitting(g);
+    g = x - g;
+  }
+
+  /// KINSOL ends where x does not move and gives x back, so x takes the last correction.
+  int end_near(Eigen::Map<Vector> x, Eigen::Map<Vector> g) {
+    contract_to(x, g);
+    x = g;
     return 0;
   }
 

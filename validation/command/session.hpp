@@ -5,6 +5,10 @@
 #include <string>
 #include <string_view>
 
+namespace CLI {
+class App;
+}
+
 namespace diracstep::command {
 
 /// Exit statuses of the command.
@@ -15,9 +19,13 @@ inline constexpr int misused = 2;
 /// What the verbs share.
 struct Session {
   Registry registry = Registry::with_built_ins();
+  KinsolOptions solver_options = {};
   SolverFactory solvers = kinsol();
   int exit_status = done;
 };
+
+/// Adds --solver and --jacobian, which change the session's solvers when the command line is read.
+void add_solver_options(CLI::App& verb, Session& session);
 
 /// A message for a person, on standard error.
 void say(std::string_view message);

@@ -166,6 +166,7 @@ void study(const Options& options, Session& session) {
 
 void add_study(CLI::App& app, Session& session) {
   CLI::App* verb = app.add_subcommand("study", "Error against run time, with SUNDIALS IDA beside it");
+  add_solver_options(*verb, session);
   const auto options = std::make_shared<Options>();
   verb->add_option("SCENE", options->scenes, "Scenes, all without any; see diracstep list scenes");
   verb->add_option(
