@@ -10,6 +10,8 @@ namespace {
 constexpr int largest_fresh = 32;
 /// A residual that falls by less than this factor asks for a new Jacobian.
 constexpr double slow = 0.1;
+/// Where an old Jacobian fails, so many solves do without one before it is tried again.
+constexpr int fresh_starts_after_failure = 16;
 /// So many different step sizes keep factors of their own: those of a symmetric composition of 31 stages.
 constexpr std::size_t most_parameters = 16;
 
@@ -38,6 +40,7 @@ void JacobianFactors::reset() {
   factors_.front().solver->reset();
   current_ = factors_.front().solver.get();
   usable_ = false;
+  fresh_starts_ = 0;
 }
 
 /// Takes the factors of this parameter; false where they are still to be made.
@@ -55,12 +58,20 @@ bool JacobianFactors::select(double parameter) {
   return false;
 }
 
-bool JacobianFactors::wanted(double norm) const {
+void JacobianFactors::begin() {
+  evaluations_ = iterations_ = 0;
+  if (fresh_starts_ > 0) --fresh_starts_;
+}
+
+bool JacobianFactors::wanted(double norm) {
+  if (!usable_) return true;
+  const bool too_slow = iterations_ > 0 && norm > slow * last_norm_;
   switch (policy_) {
     case JacobianPolicy::per_step:
-      return !usable_ || iterations_ == 0 || norm > slow * last_norm_;
+      return iterations_ == 0 || too_slow;
     case JacobianPolicy::kept:
-      return !usable_ || (iterations_ > 0 && norm > slow * last_norm_);
+      if (too_slow && evaluations_ == 0) fresh_starts_ = fresh_starts_after_failure;
+      return too_slow || (iterations_ == 0 && fresh_starts_ > 0);
     default:
       return true;
   }

@@ -16,7 +16,7 @@ class JacobianFactors {
   enum class Outcome { ready, singular, not_finite };
 
   /// A solve begins: a Jacobian of an earlier point may now be taken for one of this solve.
-  void begin() { evaluations_ = iterations_ = 0; }
+  void begin();
   /// Factors that serve for a Newton step at x, new or old ones; `norm` is the scaled residual at x.
   Outcome prepare(ConstVectorRef x, double norm);
   /// Replaces b by the solution.
@@ -38,7 +38,7 @@ class JacobianFactors {
     std::unique_ptr<LinearSolver> solver;
   };
 
-  bool wanted(double norm) const;
+  bool wanted(double norm);
   bool select(double parameter);
 
   NonlinearProblem& problem_;
@@ -49,6 +49,7 @@ class JacobianFactors {
   Vector values_;
   double last_norm_ = 0.0;
   int evaluations_ = 0, iterations_ = 0;
+  int fresh_starts_ = 0;  ///< so many solves more begin with a new Jacobian, since an old one failed
   bool usable_ = false;
 };
 
