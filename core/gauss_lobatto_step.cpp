@@ -335,7 +335,17 @@ class GaussLobattoStep final : public StepProblem {
 
   /// Size of the impulses at x, and of what they lose to the round-off of positions.
   double impulse_scale(ConstVectorRef x) const {
-    return one_forms_ * max_norm(x.tail(m_ * s_)) + row_curvature_ * max_norm(q0_);
+    double largest = 0.0;
+    for (const Rows& rows : rows_) {
+      const auto places = rows.block->pattern().row_indices();
+      for (int j = 0; j < s_; ++j) {
+        const double *const a = rows.at_lobatto.col(0).data(),
+                            *const lambda = x.data() + row_of(j) + rows.first;
+        for (std::size_t k = 0; k < places.size(); ++k)
+          largest = std::max(largest, std::abs(a[k] * lambda[places[k]]));
+      }
+    }
+    return largest + row_curvature_ * max_norm(q0_);
   }
 
   /// Terms of the momentum rows are momenta, those of the last step where this one is not solved yet; a velocity of size |q|/h loses ε|q|/h to round-off.
@@ -370,7 +380,7 @@ class GaussLobattoStep final : public StepProblem {
   Columns lq_, lv_;        ///< ∂L/∂q + f and ∂L/∂v at the Gauss nodes
   Columns impulses_;       ///< A(Q~_j)ᵀ λ_j
   Columns lqq_, lqv_, lvv_, fq_, fv_;
-  double one_forms_ = 0.0, row_curvature_ = 0.0;  ///< largest entries of A(q0) and ∂(Aᵀλ)/∂q
+  double one_forms_ = 0.0, row_curvature_ = 0.0;  ///< of A(q0) and of ∂(Aᵀλ)/∂q
   double curvature_ = 0.0;  ///< largest second derivative ∂²L/∂q² met
   std::optional<StageSplitting> splitting_;  ///< small scenes with rows of one kind
   bool splitting_known_ = false, mass_known_ = false;

@@ -65,7 +65,7 @@ class PhaseSpaceStep final : public StepProblem {
     if (!two_form_known_) factor_two_form();
     split_ = f.reshaped(n_, s_ + 1);
     mixed_ = split_.lazyProduct(unmix_);
-    split_ = two_form_factors_.permutationP() * mixed_;
+    split_.noalias() = two_form_factors_.permutationP() * mixed_;
     two_form_factors_.matrixLU().triangularView<Eigen::UnitLower>().solveInPlace(split_);
     two_form_factors_.matrixLU().triangularView<Eigen::Upper>().solveInPlace(split_);
     split_.leftCols(s_) /= step_.size;

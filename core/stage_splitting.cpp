@@ -8,6 +8,7 @@ StageSplitting::StageSplitting(const GaussLobattoTableau& table, int n, int m, b
   if (holonomic) constraint_weights_ = table.lobatto_a.bottomRows(s_);
   if (m_ > 0) unmix_ = (constraint_weights_ * impulse_weights_).inverse();
   mass_.setZero(n_, n_);
+  permuted_.setZero(n_);
   rows_.setZero(m_, n_);
   response_.setZero(m_, m_);
   through_mass_.setZero(n_, m_);
@@ -43,9 +44,12 @@ void StageSplitting::solve_mass(Columns& columns) {
     for (Eigen::Index k = 0; k < columns.cols(); ++k) columns.col(k).array() *= inverse_mass_.array();
     return;
   }
-  mass_factors_.permutationP().applyThisOnTheLeft(columns);
-  mass_factors_.matrixLU().triangularView<Eigen::UnitLower>().solveInPlace(columns);
-  mass_factors_.matrixLU().triangularView<Eigen::Upper>().solveInPlace(columns);
+  for (Eigen::Index k = 0; k < columns.cols(); ++k) {
+    permuted_.noalias() = mass_factors_.permutationP() * columns.col(k);  // in place Eigen would allocate
+    mass_factors_.matrixLU().triangularView<Eigen::UnitLower>().solveInPlace(permuted_);
+    mass_factors_.matrixLU().triangularView<Eigen::Upper>().solveInPlace(permuted_);
+    columns.col(k) = permuted_;
+  }
 }
 
 void StageSplitting::factor_rows() {
@@ -62,7 +66,7 @@ void StageSplitting::solve(VectorRef f) {
     gaps_ = rows_.lazyProduct(velocities_);
     impulses_ = f.tail(m_ * s_).reshaped(m_, s_) - gaps_.lazyProduct(constraint_weights_.transpose());
     gaps_ = impulses_.lazyProduct(unmix_.transpose());
-    impulses_ = response_factors_.permutationP() * gaps_;
+    impulses_.noalias() = response_factors_.permutationP() * gaps_;
     response_factors_.matrixLU().triangularView<Eigen::UnitLower>().solveInPlace(impulses_);
     response_factors_.matrixLU().triangularView<Eigen::Upper>().solveInPlace(impulses_);
     f.tail(m_ * s_) = impulses_.reshaped();

@@ -28,6 +28,16 @@ struct StepData {
 
   int rows() const { return discrete_constraint.rows(); }
 
+  /// Size of the terms of A(q0)ᵀλ.
+  double impulse_scale(ConstVectorRef lambda) const {
+    const auto places = start_rows.pattern().row_indices();
+    const double* const a = start_rows.coefficients().data();
+    double largest = 0.0;
+    for (std::size_t k = 0; k < places.size(); ++k)
+      largest = std::max(largest, std::abs(a[k] * lambda[places[k]]));
+    return largest;
+  }
+
   /// Size of the terms that cancel in c(q0,q1).
   double constraint_scale() const { return usable_scale(max_norm(start_rows.coefficients()) * max_norm(q0)); }
 
@@ -324,7 +334,7 @@ class ImplicitStep final : public StepProblem {
     // The impulse, as large as it was in the last step.
     const double impulse =
         graph_.starts_from_position && m_ > 0
-            ? max_norm(data_.start_rows.coefficients()) * max_norm(last_x_.segment(n_, m_))
+            ? data_.impulse_scale(last_x_.segment(n_, m_))
             : 0.0;
     blocks_[0].scale =
         usable_scale(std::max({own, impulse, std::abs(row_factor()) * cancelling_terms(0)}));

@@ -7,9 +7,10 @@ namespace diracstep::detail {
 namespace {
 
 /// Up to this size a new Jacobian costs less than the iterations it saves.
-constexpr int largest_fresh = 32;
-/// A residual that falls by less than this factor asks for a new Jacobian.
-constexpr double slow = 0.1;
+constexpr int largest_fresh = 11;
+/// Where so many further iterations at the pace of the last one would not do, a new Jacobian is taken.
+constexpr int patience = 6;
+constexpr double done = 1e-14;
 /// Where an old Jacobian fails, so many solves do without one before it is tried again.
 constexpr int fresh_starts_after_failure = 16;
 /// So many different step sizes keep factors of their own: those of a symmetric composition of 31 stages.
@@ -65,7 +66,7 @@ void JacobianFactors::begin() {
 
 bool JacobianFactors::wanted(double norm) {
   if (!usable_) return true;
-  const bool too_slow = iterations_ > 0 && norm > slow * last_norm_;
+  const bool too_slow = iterations_ > 0 && norm * std::pow(norm / last_norm_, patience) > done;
   switch (policy_) {
     case JacobianPolicy::per_step:
       return iterations_ == 0 || too_slow;
@@ -97,7 +98,7 @@ std::string JacobianFactors::policy() const {
     case JacobianPolicy::per_step:
       return "a new Jacobian in each solve";
     case JacobianPolicy::kept:
-      return "a Jacobian kept for as long as the residual falls tenfold";
+      return "a Jacobian kept for as long as it converges";
     default:
       return "a new Jacobian in each iteration";
   }
