@@ -105,6 +105,16 @@ class KinsolSolver final : public NonlinearSolver {
       report_.status = SolveStatus::not_finite;
     else
       report_.status = SolveStatus::no_convergence;
+    if (report_.ok() && strategy != KIN_FP && !factors_.exact() && report_.iterations > 0) correct_again();
+  }
+
+  /// Where the convergence is linear, what is left of the error is as large as the last residual and of the
+  /// same sign in one step after the other; a last correction, which is not evaluated any more, makes it
+  /// small beside round-off.
+  void correct_again() {
+    last_ = last_residual_;
+    factors_.solve(last_.data());
+    unknowns() -= last_;
   }
 
   /// Goes on from the last point and keeps the better one; false where the residual does not halve.
