@@ -99,6 +99,7 @@ class RowSubset final : public ConstraintRows {
     }
   }
 
+  bool constant() const override { return block_->constant(); }
   void position(double t, ConstVectorRef q, VectorRef phi) const override {
     Vector all(block_->rows());
     block_->position(t, q, all);

@@ -4,6 +4,8 @@
 #include <diracstep/core/gauss_lobatto_step.hpp>
 #include <diracstep/core/gauss_lobatto_tableau.hpp>
 #include <diracstep/core/scales.hpp>
+#include <diracstep/core/stage_splitting.hpp>
+#include <optional>
 
 namespace diracstep {
 
@@ -36,7 +38,13 @@ class GaussLobattoStep final : public StepProblem {
       rows_.emplace_back(block, row, s_);
       row += block->rows();
     }
-    last_x_.setConstant(size(), std::nan(""));
+    affine_ = lagrangian_->structure().quadratic && !force_ &&
+              std::ranges::all_of(scene.constraints, [](const auto& block) { return block->constant(); });
+    last_x_.setZero(size());
+    const auto holonomic = [](const auto& block) { return block->holonomic(); };
+    const auto kinds = std::ranges::count_if(scene.constraints, holonomic);
+    if (dense && (kinds == 0 || kinds == std::ssize(scene.constraints)))
+      splitting_.emplace(table_, n_, m_, kinds > 0);
     plan_blocks(dense);
     blocks_.push_back({"momentum", n_ * s_});
     if (m_ > 0) blocks_.push_back({"constraint", m_ * s_});
@@ -56,7 +64,17 @@ class GaussLobattoStep final : public StepProblem {
   }
 
   void reset() override {
-    for (Columns* columns : {&lq_, &lqq_}) columns->setZero();
+    lq_.setZero();
+    last_x_.setZero();
+    curvature_ = row_curvature_ = 0.0;
+    hessians_known_ = mass_known_ = false;
+  }
+  double constant_jacobian_parameter() const override { return affine_ ? step_.size : std::nan(""); }
+
+  bool has_splitting() const override { return splitting_.has_value(); }
+  void solve_splitting(VectorRef f) override {
+    if (!splitting_known_) move_splitting();
+    splitting_->solve(f);
   }
   const SparsityPattern& pattern() const override { return pattern_; }
   std::span<const ResidualBlock> blocks() const override { return blocks_; }
@@ -71,9 +89,10 @@ class GaussLobattoStep final : public StepProblem {
     step_ = step;
     q0_ = q0;
     p0_ = p0;
-    last_x_[0] = std::nan("");
+    splitting_known_ = false;
     for (Rows& rows : rows_) rows.evaluate_impulse_rows(step_.start, q0_, 0);
     update_scales();
+    last_x_[0] = std::nan("");
   }
 
   void guess(const Vector& v0, VectorRef x) override {
@@ -85,12 +104,13 @@ class GaussLobattoStep final : public StepProblem {
     evaluate(x);
     const double h = step_.size;
     for (int i = 0; i < s_; ++i) {
-      auto momentum = f.segment(n_ * i, n_);
-      momentum = lv_.col(i) - p0_;
-      for (int j = 0; j < s_; ++j) momentum -= h * table_.a_hat(i, j) * lq_.col(j);
+      double* const momentum = f.data() + n_ * i;
+      for (int k = 0; k < n_; ++k) momentum[k] = lv_(k, i) - p0_[k];
+      for (int j = 0; j < s_; ++j) add_scaled(-h * table_.a_hat(i, j), lq_.col(j).data(), momentum);
       if (m_ > 0)
-        for (int j = 0; j < s_; ++j) momentum -= table_.e(i, j) * impulses_.col(j);
+        for (int j = 0; j < s_; ++j) add_scaled(-table_.e(i, j), impulses_.col(j).data(), momentum);
     }
+    rows_at_gauss_known_ = true;
     for (Rows& rows : rows_)
       for (int j = 0; j < s_; ++j) {
         auto out = f.segment(row_of(j) + rows.first, rows.block->rows());
@@ -98,19 +118,16 @@ class GaussLobattoStep final : public StepProblem {
           rows.block->position(lobatto_time(j + 1), lobatto_q_.col(j + 1), out);
           out /= h;
         } else {
-          rows.velocity_residual(gauss_time(j), q_.col(j), x.segment(n_ * j, n_), out);
+          rows.velocity_residual(gauss_time(j), q_.col(j), x.segment(n_ * j, n_), j, out);
         }
       }
   }
 
   void jacobian(ConstVectorRef x, VectorRef values) override {
     evaluate(x);
-    for (int i = 0; i < s_; ++i) {
-      lagrangian_->hessian(gauss_time(i), q_.col(i), x.segment(n_ * i, n_), lqq_.col(i), lqv_.col(i),
-                           lvv_.col(i));
-      if (force_)
-        force_->derivatives(gauss_time(i), q_.col(i), x.segment(n_ * i, n_), fq_.col(i), fv_.col(i));
-    }
+    if (!rows_at_gauss_known_) evaluate_rows_at_gauss();
+    second_derivatives(x);
+    row_curvature_ = 0.0;
     values.setZero();
     for (int i = 0; i < s_; ++i)
       for (int k = 0; k < s_; ++k) add_momentum_block(i, k, values);
@@ -122,8 +139,8 @@ class GaussLobattoStep final : public StepProblem {
     q1 = lobatto_q_.col(s_);
     p1 = p0_;
     for (int j = 0; j < s_; ++j) {
-      p1 += step_.size * table_.b[j] * lq_.col(j);
-      if (m_ > 0) p1 += table_.lobatto_b[j] * impulses_.col(j);
+      add_scaled(step_.size * table_.b[j], lq_.col(j).data(), p1.data());
+      if (m_ > 0) add_scaled(table_.lobatto_b[j], impulses_.col(j).data(), p1.data());
     }
     // The impulse at q0 is that part of λ_0 which enters there.
     impulse = table_.lobatto_b[0] * x.segment(n_ * s_, m_);
@@ -146,10 +163,10 @@ class GaussLobattoStep final : public StepProblem {
       block->coefficients(t, q, at_lobatto.col(node), offset);
     }
 
-    void velocity_residual(double t, ConstVectorRef q, ConstVectorRef v, VectorRef out) {
-      block->coefficients(t, q, derivative, offset);
+    void velocity_residual(double t, ConstVectorRef q, ConstVectorRef v, int node, VectorRef out) {
+      block->coefficients(t, q, at_gauss.col(node), offset);
       out = offset;
-      block->pattern().multiply_add(derivative.data(), v.data(), out.data());
+      block->pattern().multiply_add(at_gauss.col(node).data(), v.data(), out.data());
     }
 
     std::shared_ptr<const ConstraintRows> block;
@@ -170,24 +187,17 @@ class GaussLobattoStep final : public StepProblem {
   void evaluate(ConstVectorRef x) {
     if (last_x_ == x) return;
     last_x_ = x;
-    const double h = step_.size;
-    const auto v = x.head(n_ * s_).reshaped(n_, s_);
+    rows_at_gauss_known_ = false;
     for (int i = 0; i < s_; ++i) {
-      q_.col(i) = h * table_.a(i, 0) * v.col(0);
-      for (int k = 1; k < s_; ++k) q_.col(i) += h * table_.a(i, k) * v.col(k);
-      q_.col(i) += q0_;
-      lagrangian_->gradient(gauss_time(i), q_.col(i), v.col(i), lq_.col(i), lv_.col(i));
+      const auto v = x.segment(n_ * i, n_);
+      move(table_.a, i, x, q_.col(i).data());
+      lagrangian_->gradient(gauss_time(i), q_.col(i), v, lq_.col(i), lv_.col(i));
       if (force_) {
-        force_->value(gauss_time(i), q_.col(i), v.col(i), f_);
+        force_->value(gauss_time(i), q_.col(i), v, f_);
         lq_.col(i) += f_;
       }
     }
-    lobatto_q_.col(0) = q0_;
-    for (int j = m_ > 0 ? 1 : s_; j <= s_; ++j) {
-      lobatto_q_.col(j) = h * table_.lobatto_a(j, 0) * v.col(0);
-      for (int k = 1; k < s_; ++k) lobatto_q_.col(j) += h * table_.lobatto_a(j, k) * v.col(k);
-      lobatto_q_.col(j) += q0_;
-    }
+    for (int j = m_ > 0 ? 1 : s_; j <= s_; ++j) move(table_.lobatto_a, j, x, lobatto_q_.col(j).data());
     if (m_ == 0) return;
     impulses_.setZero();
     for (Rows& rows : rows_)
@@ -196,6 +206,54 @@ class GaussLobattoStep final : public StepProblem {
         rows.block->pattern().transposed_multiply_add(
             rows.at_lobatto.col(j).data(), x.data() + row_of(j) + rows.first, impulses_.col(j).data());
       }
+    blocks_[0].scale = std::max(blocks_[0].scale, impulse_scale(x));
+  }
+
+  void evaluate_rows_at_gauss() {
+    for (Rows& rows : rows_)
+      for (int j = 0; j < s_ && !rows.block->holonomic(); ++j)
+        rows.block->coefficients(gauss_time(j), q_.col(j), rows.at_gauss.col(j), rows.offset);
+    rows_at_gauss_known_ = true;
+  }
+
+  /// to += factor · from, n entries.
+  void add_scaled(double factor, const double* from, double* to) const {
+    for (int k = 0; k < n_; ++k) to[k] += factor * from[k];
+  }
+
+  /// q = q0 + h Σ_k a(row, k) V_k, the small terms summed first.
+  void move(const Columns& a, int row, ConstVectorRef x, double* q) const {
+    const double h = step_.size;
+    std::fill_n(q, n_, 0.0);
+    for (int k = 0; k < s_; ++k) add_scaled(h * a(row, k), x.data() + n_ * k, q);
+    add_scaled(1.0, q0_.data(), q);
+  }
+
+  /// Those of L and of the force at the Gauss nodes; of a quadratic L they are taken once.
+  void second_derivatives(ConstVectorRef x) {
+    for (int i = 0; i < s_; ++i) {
+      const auto v = x.segment(n_ * i, n_);
+      if (!hessians_known_)
+        lagrangian_->hessian(gauss_time(i), q_.col(i), v, lqq_.col(i), lqv_.col(i), lvv_.col(i));
+      if (force_) force_->derivatives(gauss_time(i), q_.col(i), v, fq_.col(i), fv_.col(i));
+    }
+    if (!hessians_known_) curvature_ = max_norm(lqq_);
+    hessians_known_ = lagrangian_->structure().quadratic;
+  }
+
+  /// The splitting is taken in the middle of the step, at the stages that were evaluated last.
+  void move_splitting() {
+    const int middle = s_ / 2;
+    if (!mass_known_) {
+      lagrangian_->hessian(gauss_time(middle), q_.col(middle), last_x_.segment(n_ * middle, n_),
+                           lqq_.col(middle), lqv_.col(middle), lvv_.col(middle));
+      splitting_->set_mass(lagrangian_->pattern(), lvv_.col(middle));
+      mass_known_ = lagrangian_->structure().y_hessian_constant;
+    }
+    for (Rows& rows : rows_)
+      splitting_->set_rows(rows.first, rows.block->pattern(), rows.at_lobatto.col(middle));
+    if (m_ > 0) splitting_->factor_rows();
+    splitting_known_ = true;
   }
 
   void plan_blocks(bool dense) {
@@ -245,6 +303,7 @@ class GaussLobattoStep final : public StepProblem {
       rows.block->annihilator_derivative(lobatto_time(j), lobatto_q_.col(j),
                                          x.segment(row_of(j) + rows.first, rows.block->rows()),
                                          rows.curvature.col(j));
+    if (s_ > 1) row_curvature_ = std::max(row_curvature_, max_norm(rows.curvature));
     for (int i = 0; i < s_; ++i)
       for (int k = 0; k < s_; ++k) {
         add(values, rows.impulse_places[at(i, k)], -table_.e(i, k), rows.at_lobatto.col(k).data());
@@ -264,7 +323,6 @@ class GaussLobattoStep final : public StepProblem {
         add(values, place(k), table_.lobatto_a(j + 1, k), rows.at_lobatto.col(j + 1).data());
       return;
     }
-    rows.block->coefficients(gauss_time(j), q_.col(j), rows.at_gauss.col(j), rows.offset);
     add(values, place(j), 1.0, rows.at_gauss.col(j).data());
     rows.block->derivative(gauss_time(j), q_.col(j), x.segment(n_ * j, n_), 1.0, rows.derivative);
     for (int k = 0; k < s_; ++k) add(values, place(k), h * table_.a(j, k), rows.derivative.data());
@@ -275,14 +333,31 @@ class GaussLobattoStep final : public StepProblem {
     for (std::size_t k = 0; k < places.size(); ++k) values[places[k]] += factor * block[k];
   }
 
-  /// Terms of the momentum rows are momenta; a velocity of size |q|/h loses ε|q|/h to round-off.
+  /// Size of the impulses at x, and of what they lose to the round-off of positions.
+  double impulse_scale(ConstVectorRef x) const {
+    double largest = 0.0;
+    for (const Rows& rows : rows_) {
+      const auto places = rows.block->pattern().row_indices();
+      for (int j = 0; j < s_; ++j) {
+        const double *const a = rows.at_lobatto.col(0).data(),
+                            *const lambda = x.data() + row_of(j) + rows.first;
+        for (std::size_t k = 0; k < places.size(); ++k)
+          largest = std::max(largest, std::abs(a[k] * lambda[places[k]]));
+      }
+    }
+    return largest + row_curvature_ * max_norm(q0_);
+  }
+
+  /// Terms of the momentum rows are momenta, those of the last step where this one is not solved yet; a velocity of size |q|/h loses ε|q|/h to round-off.
   void update_scales() {
     const double h = std::abs(step_.size);
-    const double velocity = max_norm(q0_) / h;
-    double one_forms = 0.0;
-    for (const Rows& rows : rows_) one_forms = std::max(one_forms, max_norm(rows.at_lobatto.col(0)));
-    blocks_[0].scale = usable_scale(max_norm(p0_) + h * max_norm(lq_) + h * max_norm(lqq_) * max_norm(q0_));
-    if (m_ > 0) blocks_[1].scale = usable_scale(one_forms * velocity);
+    const double size = max_norm(q0_), velocity = size / h;
+    one_forms_ = 0.0;
+    for (const Rows& rows : rows_) one_forms_ = std::max(one_forms_, max_norm(rows.at_lobatto.col(0)));
+    double momentum = max_norm(p0_) + h * max_norm(lq_) + h * curvature_ * size;
+    if (m_ > 0) momentum += impulse_scale(last_x_);
+    blocks_[0].scale = usable_scale(momentum);
+    if (m_ > 0) blocks_[1].scale = usable_scale(one_forms_ * velocity);
   }
 
   std::shared_ptr<const Lagrangian> lagrangian_;
@@ -305,6 +380,12 @@ class GaussLobattoStep final : public StepProblem {
   Columns lq_, lv_;        ///< ∂L/∂q + f and ∂L/∂v at the Gauss nodes
   Columns impulses_;       ///< A(Q~_j)ᵀ λ_j
   Columns lqq_, lqv_, lvv_, fq_, fv_;
+  double one_forms_ = 0.0, row_curvature_ = 0.0;  ///< of A(q0) and of ∂(Aᵀλ)/∂q
+  double curvature_ = 0.0;  ///< largest second derivative ∂²L/∂q² met
+  std::optional<StageSplitting> splitting_;  ///< small scenes with rows of one kind
+  bool splitting_known_ = false, mass_known_ = false;
+  bool affine_ = false;  ///< the residual is affine in the unknowns
+  bool hessians_known_ = false, rows_at_gauss_known_ = false;
 };
 
 }  // namespace

@@ -10,7 +10,7 @@ std::vector<PlanLine> Integrator::plan() const {
   lines.push_back({"unknowns", part.problem->unknowns(),
                    part.solver ? "one nonlinear system in each solve" : "the graph is solved for its end"});
   if (part.solver)
-    lines.push_back({"nonlinear solver", part.solver->description(), "Newton's method, exact Jacobian"});
+    lines.push_back({"nonlinear solver", part.solver->description(), part.solver->strategy()});
   else
     lines.push_back({"nonlinear solver", "left out", "the step is explicit and no rows bind"});
   if (part.solver) {

@@ -28,6 +28,16 @@ struct StepData {
 
   int rows() const { return discrete_constraint.rows(); }
 
+  /// Size of the terms of A(q0)ᵀλ.
+  double impulse_scale(ConstVectorRef lambda) const {
+    const auto places = start_rows.pattern().row_indices();
+    const double* const a = start_rows.coefficients().data();
+    double largest = 0.0;
+    for (std::size_t k = 0; k < places.size(); ++k)
+      largest = std::max(largest, std::abs(a[k] * lambda[places[k]]));
+    return largest;
+  }
+
   /// Size of the terms that cancel in c(q0,q1).
   double constraint_scale() const { return usable_scale(max_norm(start_rows.coefficients()) * max_norm(q0)); }
 
@@ -53,7 +63,7 @@ class ImplicitStep final : public StepProblem {
     y_.setZero(n_, s_->columns());
     gradient_ = y_;
     hessian_.setZero(s_->pattern().nonzeros(), s_->pairs());
-    last_x_.setConstant(size(), std::nan(""));
+    last_x_.setZero(size());
     q1_.setZero(n_);
     if (scene.force) {
       if (s_->type() == GeneratingType::four) throw Misuse("generating functions of type 4 take no forces");
@@ -70,6 +80,7 @@ class ImplicitStep final : public StepProblem {
   int leading_unknowns() const override { return n_; }
   void reset() override {
     for (Columns* columns : {&y_, &hessian_}) columns->setZero();
+    last_x_.setZero();
   }
   const SparsityPattern& pattern() const override { return pattern_; }
   std::span<const ResidualBlock> blocks() const override { return blocks_; }
@@ -83,9 +94,9 @@ class ImplicitStep final : public StepProblem {
 
   void begin(Interval step, const Vector& q0, const Vector& p0) override {
     data_.freeze(step, q0, p0);
-    last_x_[0] = std::nan("");
     if (hessian_.isZero(0.0)) sample_hessian();
     update_scales();
+    last_x_[0] = std::nan("");
   }
 
   void guess(const Vector& v0, VectorRef x) override {
@@ -321,7 +332,13 @@ class ImplicitStep final : public StepProblem {
   void update_scales() {
     const double own =
         graph_.starts_from_position ? std::abs(data_.step.size) * max_norm(data_.p0) : max_norm(data_.q0);
-    blocks_[0].scale = usable_scale(std::max(own, std::abs(row_factor()) * cancelling_terms(0)));
+    // The impulse, as large as it was in the last step.
+    const double impulse =
+        graph_.starts_from_position && m_ > 0
+            ? data_.impulse_scale(last_x_.segment(n_, m_))
+            : 0.0;
+    blocks_[0].scale =
+        usable_scale(std::max({own, impulse, std::abs(row_factor()) * cancelling_terms(0)}));
     if (m_ > 0) blocks_[1].scale = data_.constraint_scale();
     if (inner_ == 0) return;
     double largest = 0.0;

@@ -340,6 +340,22 @@ TEST(Integrator, StepsAllocateNothing) {
   });
 }
 
+TEST(Integrator, FixedPointStepsAndKeptJacobiansAllocateNothing) {
+  if (!testing::counts_allocations) GTEST_SKIP() << "allocations cannot be counted here";
+  for (const auto& scene : testing::every_constraint_class())
+    for (const KinsolOptions& solver : {KinsolOptions{.iteration = Iteration::fixed_point},
+                                        KinsolOptions{.jacobian = JacobianPolicy::kept}}) {
+      Integrator integrator(scene, Registry::with_built_ins(), kinsol(solver),
+                            {.method = "type1/gl:3", .step = 0.05});
+      for (int k = 0; k < 20; ++k) ASSERT_TRUE(integrator.step().ok());
+      const long before = testing::allocations;
+      bool ok = true;
+      for (int k = 0; k < 40; ++k) ok = ok && integrator.step().ok();
+      EXPECT_EQ(testing::allocations - before, 0) << scene->name;
+      EXPECT_TRUE(ok);
+    }
+}
+
 // --- Failure
 // ----------------------------------------------------------------------------------------------------
 

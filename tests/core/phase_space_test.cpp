@@ -101,6 +101,22 @@ TEST(PhaseSpaceStep, IsSelfAdjoint) {
   }
 }
 
+TEST(PhaseSpaceStep, FixedPointStepsAreThoseOfNewtonsMethodWithoutJacobians) {
+  for (const int s : {1, 2, 4, 5})
+    for (const auto& scene : {lotka_volterra<0>(), lotka_volterra<1>()}) {
+      const IntegratorOptions options{.method = gl(s), .step = 0.05};
+      Integrator newton(scene, Registry::with_built_ins(), kinsol(), options);
+      Integrator fixed_point(scene, Registry::with_built_ins(), kinsol({.iteration = Iteration::fixed_point}),
+                             options);
+      for (int k = 0; k < 60; ++k) {
+        ASSERT_TRUE(newton.step().ok());
+        ASSERT_TRUE(fixed_point.step().ok());
+      }
+      EXPECT_LT((newton.position() - fixed_point.position()).lpNorm<Eigen::Infinity>(), 2e-12) << s;
+      EXPECT_EQ(fixed_point.work().jacobian_evaluations, 0) << s;
+    }
+}
+
 TEST(PhaseSpaceStep, UnstableConstructionsAreRefusedUnlessForced) {
   for (const char* name : {"type1/left", "type1/right", "type1/trapezoidal"}) {
     try {

@@ -54,6 +54,7 @@ void plan(const Options& options, Session& session) {
 
 void add_plan(CLI::App& app, Session& session) {
   CLI::App* verb = app.add_subcommand("plan", "What is assembled for a scene, and what is left out and why");
+  add_solver_options(*verb, session);
   const auto options = std::make_shared<Options>();
   verb->add_option("SCENE", options->scene, "A scene; see diracstep list scenes")->required();
   verb->add_option(

@@ -127,6 +127,7 @@ void run(const Options& options, Session& session) {
 
 void add_run(CLI::App& app, Session& session) {
   CLI::App* verb = app.add_subcommand("run", "One trajectory");
+  add_solver_options(*verb, session);
   const auto options = std::make_shared<Options>();
   verb->add_option("SCENE", options->scene, "A scene; see diracstep list scenes")->required();
   verb->add_option(

@@ -9,6 +9,10 @@
 #include <string_view>
 #include <vector>
 
+namespace CLI {
+class App;
+}
+
 namespace diracstep::command {
 
 /// Exit statuses of the command.
@@ -19,6 +23,7 @@ inline constexpr int misused = 2;
 /// What the verbs share.
 struct Session {
   Registry registry = Registry::with_built_ins();
+  KinsolOptions solver_options = {};
   SolverFactory solvers = kinsol();
   std::vector<std::string> plugin_files;  ///< as given by --plugin
   std::vector<Plugin> plugins;            ///< those and the ones on DIRACSTEP_PLUGIN_PATH
@@ -37,6 +42,9 @@ std::vector<std::string> scene_names(const Session& session);
 
 /// The rule for nonholonomic rows that was asked for by name, if one was.
 std::optional<StepRule> rule(const Session& session, const std::optional<std::string>& name);
+
+/// Adds --solver and --jacobian, which change the session's solvers when the command line is read.
+void add_solver_options(CLI::App& verb, Session& session);
 
 /// A message for a person, on standard error.
 void say(std::string_view message);

@@ -240,6 +240,7 @@ void study(const Options& options, Session& session) {
 void add_study(CLI::App& app, Session& session) {
   CLI::App* verb = app.add_subcommand(
       "study", "Error against run time, beside SUNDIALS IDA and an explicit Runge–Kutta method");
+  add_solver_options(*verb, session);
   const auto options = std::make_shared<Options>();
   verb->add_option("SCENE", options->scenes,
                    "Scenes, patterns such as 'kepler*', or classes such as holonomic;\na fair selection "

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <diracstep/validation/scene_file/scene_functions.hpp>
 
@@ -301,6 +302,13 @@ class FileRows final : public ConstraintRows {
         function_(std::move(function)) {
     function_.find_positions(pattern(), false);
     function_.find_positions(curvature_pattern(), true);
+  }
+
+  bool constant() const override {
+    return std::ranges::all_of(function_.function().pieces, [](const Piece& piece) {
+      return std::ranges::all_of(std::array{std::size_t{2}, std::size_t{3}, annihilator_kernel},
+                                 [&](std::size_t number) { return piece.kernels[number].empty(); });
+    });
   }
 
   void position(double t, ConstVectorRef q, VectorRef phi) const override {

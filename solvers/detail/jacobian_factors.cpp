@@ -1,0 +1,107 @@
+#include <cmath>
+#include <diracstep/solvers/detail/jacobian_factors.hpp>
+#include <limits>
+
+namespace diracstep::detail {
+
+namespace {
+
+/// Up to this size a new Jacobian costs less than the iterations it saves.
+constexpr int largest_fresh = 11;
+/// Where so many further iterations at the pace of the last one would not do, a new Jacobian is taken.
+constexpr int patience = 6;
+constexpr double done = 1e-14;
+/// Where an old Jacobian fails, so many solves do without one before it is tried again.
+constexpr int fresh_starts_after_failure = 16;
+/// So many different step sizes keep factors of their own: those of a symmetric composition of 31 stages.
+constexpr std::size_t most_parameters = 16;
+
+constexpr double none = std::numeric_limits<double>::quiet_NaN();
+
+JacobianPolicy resolved(JacobianPolicy policy, int size) {
+  if (policy != JacobianPolicy::automatic) return policy;
+  return size <= largest_fresh ? JacobianPolicy::fresh : JacobianPolicy::kept;
+}
+
+}  // namespace
+
+JacobianFactors::JacobianFactors(NonlinearProblem& problem, JacobianPolicy policy)
+    : problem_(problem),
+      policy_(resolved(policy, problem.size())),
+      constant_(policy != JacobianPolicy::fresh && !std::isnan(problem.constant_jacobian_parameter())) {
+  factors_.reserve(most_parameters);
+  factors_.push_back({none, make_linear_solver(problem.pattern())});
+  current_ = factors_.front().solver.get();
+  values_.setZero(problem.pattern().nonzeros());
+}
+
+void JacobianFactors::reset() {
+  factors_.resize(1);
+  factors_.front().parameter = none;
+  factors_.front().solver->reset();
+  current_ = factors_.front().solver.get();
+  usable_ = false;
+  fresh_starts_ = 0;
+}
+
+/// Takes the factors of this parameter; false where they are still to be made.
+bool JacobianFactors::select(double parameter) {
+  for (const Factors& kept : factors_)
+    if (kept.parameter == parameter) {
+      current_ = kept.solver.get();
+      return true;
+    }
+  const bool first = std::isnan(factors_.front().parameter);
+  if (!first && factors_.size() < most_parameters)
+    factors_.push_back({none, make_linear_solver(problem_.pattern())});
+  factors_.back().parameter = parameter;
+  current_ = factors_.back().solver.get();
+  return false;
+}
+
+void JacobianFactors::begin() {
+  evaluations_ = iterations_ = 0;
+  if (fresh_starts_ > 0) --fresh_starts_;
+}
+
+bool JacobianFactors::wanted(double norm) {
+  if (!usable_) return true;
+  const bool too_slow = iterations_ > 0 && norm * std::pow(norm / last_norm_, patience) > done;
+  switch (policy_) {
+    case JacobianPolicy::per_step:
+      return iterations_ == 0 || too_slow;
+    case JacobianPolicy::kept:
+      if (too_slow && evaluations_ == 0) fresh_starts_ = fresh_starts_after_failure;
+      return too_slow || (iterations_ == 0 && fresh_starts_ > 0);
+    default:
+      return true;
+  }
+}
+
+JacobianFactors::Outcome JacobianFactors::prepare(ConstVectorRef x, double norm) {
+  const bool wanted_now =
+      constant_ ? !select(problem_.constant_jacobian_parameter()) || !usable_ : wanted(norm);
+  last_norm_ = norm;
+  ++iterations_;
+  if (!wanted_now) return Outcome::ready;
+  ++evaluations_;
+  usable_ = false;
+  problem_.jacobian(x, values_);
+  if (!values_.allFinite()) return Outcome::not_finite;
+  usable_ = current_->factor(values_.data());
+  return usable_ ? Outcome::ready : Outcome::singular;
+}
+
+std::string JacobianFactors::policy() const {
+  if (constant_) return "constant Jacobian, factored once for each step size";
+  switch (policy_) {
+    case JacobianPolicy::per_step:
+      return "a new Jacobian in each solve";
+    case JacobianPolicy::kept:
+      return "a Jacobian kept for as long as it converges";
+    default:
+      return "a new Jacobian in each iteration";
+  }
+}
+
+}  // namespace diracstep::detail
