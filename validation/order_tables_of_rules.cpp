@@ -57,7 +57,7 @@ std::vector<RuleRow> measure_rules(const Registry& registry, const OrderScene& n
                                            {"type2/legendre(type1/midpoint)", 2}};
   for (const TableMethod& method : methods) {
     RuleRow row{method.name, method.order, {}, {}};
-    for (const StepRule rule : rules) {
+    for (const StepRule& rule : rules) {
       const IntegratorOptions options{.method = method.name, .order = method.order, .constraint_rule = rule};
       row.measured.push_back(measure_order(registry, nonholonomic, options));
       row.expected.push_back(expected_order(registry.method(method.name).info, method.order, rule));
@@ -92,7 +92,7 @@ bool holds(const CircuitRow& row) { return agrees(row.measured, row.order); }
 
 std::string rule_table_markdown(const std::vector<RuleRow>& rows) {
   std::string text = rule_explanation;
-  for (const StepRule rule : rules) text += fmt::format(" {} |", name(rule));
+  for (const StepRule& rule : rules) text += fmt::format(" {} |", name(rule));
   text += "\n|---|---|---|---|---|---|\n";
   for (const RuleRow& row : rows) {
     text += fmt::format("| `{}` | {} |", row.method, row.order);

@@ -48,10 +48,10 @@ std::string as_text(const std::vector<PublishedCase>& cases) {
 
 void check_published_cases(bool json, Session& session) {
   std::vector<PublishedCase> cases;
-  for (const std::string& name : scene_names()) {
+  for (const std::string& name : scene_names(session)) {
     if (interrupted()) break;
     say(name);
-    for (PublishedCase& one : run_published_cases(make_scene(name), session.registry, session.solvers))
+    for (PublishedCase& one : run_published_cases(make_scene(session, name), session.registry, session.solvers))
       cases.push_back(std::move(one));
   }
   print(json ? as_json(cases) : as_text(cases));
