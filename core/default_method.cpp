@@ -33,7 +33,7 @@ DefaultMethod default_method(const Scene& scene, int order, std::optional<StepRu
   const std::string stages = std::to_string(p / 2);
   return {"type1/gl:" + stages, p,
           order > 0 ? "GL(" + stages + ") has the order asked for"
-                    : "GL(3): least time for errors from 1e-3 to 1e-8; order 8 for smaller ones"};
+                    : "GL(3): near the least time for errors of 1e-3; order 8 for small ones"};
 }
 
 }  // namespace diracstep
