@@ -23,8 +23,8 @@ DefaultMethod default_method(const Scene& scene, int order, std::optional<StepRu
     return {"type1/midpoint", order,
             std::string("the ") + name(*rule) + " rule was asked for; GL(s) has its own nodes for the rows"};
   if (order < 0 || order > highest_order || order % 2 != 0)
-    throw Misuse("order " + std::to_string(order) + " without a method: even orders up to " +
-                 std::to_string(highest_order) + " are allowed; type1/left and type2/euler are of order 1");
+    throw Misuse("order " + std::to_string(order) + " without a method: the orders are 2, 4, 6, 8, … " +
+                 std::to_string(highest_order) + "; type1/left and type2/euler are of order 1");
   const int p = order > 0 ? order : usual_order;
   const bool is_large = scene.dimension() + scene.rows() > large;
   if (is_large && p <= composition_orders.back() && explicit_at_the_ends(scene))
