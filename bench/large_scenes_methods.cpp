@@ -65,7 +65,6 @@ int main() {
                                   {"toda_200", 1000, 10.0, 0.4},
                                   {"hanging_chain", 16, 0.2, 0.01},
                                   {"hanging_chain", 64, 0.05, 0.0025},
-                                  {"hanging_chain", 256, 0.0125, 0.000625},
-                                  {"hanging_chain", 1000, 0.003125, 0.00015625}})
+                                  {"hanging_chain", 256, 0.0125, 0.000625}})
     compare(large);
 }

@@ -25,8 +25,8 @@ DefaultMethod default_method(const Scene& scene, int order, const std::optional<
             std::string("the ") + rule->description() +
                 " rule was asked for; GL(s) has its own nodes for the rows"};
   if (order < 0 || order > highest_order || order % 2 != 0)
-    throw Misuse("order " + std::to_string(order) + " without a method: even orders up to " +
-                 std::to_string(highest_order) + " are allowed; type1/left and type2/euler are of order 1");
+    throw Misuse("order " + std::to_string(order) + " without a method: the orders are 2, 4, 6, 8, … " +
+                 std::to_string(highest_order) + "; type1/left and type2/euler are of order 1");
   const int p = order > 0 ? order : usual_order;
   const bool is_large = scene.dimension() + scene.rows() > large;
   if (is_large && p <= composition_orders.back() && explicit_at_the_ends(scene))
@@ -35,7 +35,7 @@ DefaultMethod default_method(const Scene& scene, int order, const std::optional<
   const std::string stages = std::to_string(p / 2);
   return {"type1/gl:" + stages, p,
           order > 0 ? "GL(" + stages + ") has the order asked for"
-                    : "GL(3): least time for errors from 1e-3 to 1e-8; order 8 for smaller ones"};
+                    : "GL(3): near the least time for errors of 1e-3; order 8 for small ones"};
 }
 
 }  // namespace diracstep

@@ -22,12 +22,12 @@ struct DefaultMethod {
 ///   a rule for Δ^d_Q is given          type1/midpoint composed to p: rows inside the step know no such rule
 ///   more than `large` unknowns, no     type1/trapezoidal, explicit there, composed to p or 6: a fifth of the
 ///   rows, no force, L separable        time of GL(3) on Toda lattices of 200 and 1000 sites
-///   all others                         GL(p/2), or GL(3); below an error of 1e-8 GL(4), p = 8, takes less
-///                                      time (docs/at_error.md)
+///   all others                         GL(p/2), or GL(3), the lowest order that is near the least time
+///                                      for errors of 1e-3; small errors take p = 8 (docs/at_error.md)
 ///
-/// `large` is the integrator's dense_limit.  On chains of 16 to 1000 links and on lattices GL(3) through KLU
-/// takes less time than every composition of the midpoint step (bench/large_scenes_methods).  Throws Misuse
-/// for an order that is odd or above 40.
+/// `large` is the integrator's dense_limit.  Through KLU GL(3) takes less time than compositions of the
+/// midpoint step on lattices and on chains of 16 and 64 links at errors of 1e-6 and 1e-9, the same on 256
+/// links (bench/large_scenes_methods).  Throws Misuse for an order that is odd or above 40.
 DefaultMethod default_method(const Scene& scene, int order, const std::optional<ConstraintRule>& rule,
                              int large);
 

@@ -27,8 +27,7 @@ struct TableMethod {
 };
 
 /// Every method of the registry with its own order, the symmetric compositions of those of order 1,
-/// type1/midpoint composed to every order there is, and one example each of an explicit step, of a
-/// symmetrised pair and of GL(2) composed.
+/// type1/midpoint composed to 4, 6 and 8, and an explicit step and a symmetrised pair composed to 4.
 std::vector<TableMethod> table_methods(const Registry& registry);
 
 /// Measures a row.

@@ -36,7 +36,8 @@ PhasePoint end_of(StepProblem& problem, const PhasePoint& start, const Vector& v
 }
 
 TEST(GaussLobattoFunction, TheStepOfEveryTypeIsTheGaussLobattoStep) {
-  const Scene& scene = *testing::unconstrained();
+  const auto kept = testing::unconstrained();
+  const Scene& scene = *kept;
   const PhasePoint start{scene.start.q, start_momentum(scene)};
   for (const int s : {1, 2, 3, 4}) {
     const auto stages = Registry::with_built_ins().method("type1/gl:" + std::to_string(s)).step(scene, true);
@@ -63,7 +64,8 @@ Columns columns_of(GeneratingFunction& s, const PhasePoint& start, const PhasePo
 }
 
 TEST(GaussLobattoFunction, TypesTwoAndThreeAreTheLegendreTransformsOfTypeOne) {
-  const Scene& scene = *testing::unconstrained();
+  const auto kept = testing::unconstrained();
+  const Scene& scene = *kept;
   const PhasePoint start{scene.start.q, start_momentum(scene)};
   for (const int s : {1, 2, 3}) {
     const auto problem = Registry::with_built_ins().method("type1/gl:" + std::to_string(s)).step(scene, true);
@@ -79,7 +81,8 @@ TEST(GaussLobattoFunction, TypesTwoAndThreeAreTheLegendreTransformsOfTypeOne) {
 }
 
 TEST(GaussLobattoFunction, EveryStepIsAMemberOfTheDiscreteDiracStructure) {
-  const Scene& scene = *testing::unconstrained();
+  const auto kept = testing::unconstrained();
+  const Scene& scene = *kept;
   const PhasePoint start{scene.start.q, start_momentum(scene)};
   DiscreteDiracStructure structure(scene.constraints, 3, StepRule::midpoint);
   for (const int s : {2, 3}) {
