@@ -86,6 +86,11 @@ std::vector<OrderScene> order_scenes() {
   return scenes;
 }
 
+int claimed_order(const MethodInfo& method, const Scene& scene) {
+  const bool constrained = scene.rows() > 0 || scene.force;
+  return constrained && method.constrained_order > 0 ? method.constrained_order : method.order;
+}
+
 OrderMeasurement measure_order(const Registry& registry, const OrderScene& scene, IntegratorOptions options,
                                Momentum momentum) {
   const Vector expected = join(scene.reference.q, scene.reference.p);

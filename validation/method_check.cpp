@@ -191,8 +191,7 @@ Check check_order(const Subject& subject, const OrderScene& scene) {
   const MethodInfo& info = subject.method.info;
   if (scene.scene->force && info.type == GeneratingType::four)
     return not_applicable("type 4 takes no forces");
-  const bool constrained = scene.scene->rows() > 0 || scene.scene->force;
-  const int claimed = constrained && info.constrained_order > 0 ? info.constrained_order : info.order;
+  const int claimed = claimed_order(info, *scene.scene);
   const OrderMeasurement measured = measure_order(subject.registry, scene, subject.stepping());
   if (!measured.failure.empty()) return pass_if(false, measured.order, claimed, measured.failure);
   return pass_if(std::abs(measured.order - claimed) <= order_tolerance, measured.order, claimed,

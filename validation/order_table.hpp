@@ -17,6 +17,7 @@ struct OrderTableRow {
   double symplecticity_defect = 0.0;  ///< on the unconstrained scene, h = 0.05; NaN for a composition
   double membership_residual =
       0.0;  ///< largest over the constraint classes, 20 steps of h = 0.05; NaN where none is stated
+  std::vector<int> claimed = {};  ///< order on each class where it is not the same on all; else empty
 };
 
 /// One line of the table is one of these.
