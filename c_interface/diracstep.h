@@ -29,17 +29,17 @@ enum { DIRACSTEP_OK = 0, DIRACSTEP_FAILED = 1, DIRACSTEP_MISUSE = 2 };
 enum { DIRACSTEP_PLUS = 0, DIRACSTEP_MINUS = 1, DIRACSTEP_PROJECTED = 2 };
 
 typedef struct diracstep_options {
-  const char *method;         /* NULL: "type1/midpoint" */
-  int order;                  /* composed to this order; 0: the method's own */
-  double step;                /* step size, may be negative; 0: that of the scene */
-  const char *rule;           /* rule for nonholonomic rows; NULL: the method's own */
-  int project_start;          /* 1: an inconsistent start is moved onto the rows instead of refused */
-  int plugins;                /* how many shared objects are loaded first … */
-  const char *const *plugin;  /* … and their paths */
+  const char *method;        /* NULL: "type1/midpoint" */
+  int order;                 /* composed to this order; 0: the method's own */
+  double step;               /* step size, may be negative; 0: that of the scene */
+  const char *rule;          /* rule for nonholonomic rows; NULL: the method's own */
+  int project_start;         /* 1: an inconsistent start is moved onto the rows instead of refused */
+  int plugins;               /* how many shared objects are loaded first … */
+  const char *const *plugin; /* … and their paths */
 } diracstep_options;
 
-/* One point of the motion.  Columns of n numbers, lambda of as many as there are rows; those that are NULL are
- * not written. */
+/* One point of the motion.  Columns of n numbers, lambda of as many as there are rows; those that are NULL
+ * are not written. */
 typedef struct diracstep_state {
   double time;
   double energy;

@@ -41,8 +41,8 @@ enum {
   DIRACSTEP_SELF_ADJOINT = 1,      /* claims Φ_{−h} = Φ_h⁻¹ */
   DIRACSTEP_ALLOCATION_FREE = 2,   /* claims that its callbacks allocate no memory, create excepted */
   DIRACSTEP_NEEDS_HAMILTONIAN = 4, /* refuses scenes whose Hamiltonian does not exist */
-  DIRACSTEP_FULL_PATTERN = 8       /* second derivatives fill n×n; without it they lie on the pattern of L, or
-                                      of H and its diagonal where H is asked for */
+  DIRACSTEP_FULL_PATTERN = 8 /* second derivatives fill n×n; without it they lie on the pattern of L, or
+                                of H and its diagonal where H is asked for */
 };
 
 /* A generating function S over one step, action (energy·time).  Its type fixes its arguments and its graph:

@@ -94,6 +94,11 @@ OrderScene degenerate_order_scene() {
   return scene;
 }
 
+int claimed_order(const MethodInfo& method, const Scene& scene) {
+  const bool constrained = scene.rows() > 0 || scene.force;
+  return constrained && method.constrained_order > 0 ? method.constrained_order : method.order;
+}
+
 OrderMeasurement measure_order(const Registry& registry, const OrderScene& scene, IntegratorOptions options,
                                Momentum momentum) {
   const auto everything = [](const Sample& s) { return join(join(s.q, s.p), s.lambda); };

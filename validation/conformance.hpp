@@ -33,6 +33,10 @@ struct OrderMeasurement {
   std::string failure;  ///< empty, or why there is no order
 };
 
+/// The order that a method states for a scene: its constrained order where that has rows or a force and one
+/// is stated.
+int claimed_order(const MethodInfo& method, const Scene& scene);
+
 /// Order of q, of the momentum representative and of the forces Λ of the rows in the maximum norm at the end:
 /// the slope of log(error) over log(h) through the four finest of a ladder of steps, four to an octave, that
 /// lie above round-off: above 1e-12 and 1e-13 times the square root of the solves (it grows like a random

@@ -33,15 +33,22 @@ int tell(const CLI::App& app, const CLI::ParseError& error) {
   return misused;
 }
 
-/// --plugin for every verb; the plugins are there when the verb runs.
+/// --plugin before or after every verb; the plugins are there when the verb runs.
 void take_plugins(CLI::App& app, Session& session) {
+  const auto add = [](CLI::App& to, std::vector<std::string>& files) {
+    const char* const text =
+        "Load a plugin; may be repeated. Also taken: every *.so in the\ndirectories of DIRACSTEP_PLUGIN_PATH";
+    return to.add_option("--plugin", files, text)->type_name("FILE.so")->allow_extra_args(false);
+  };
+  const CLI::Option* const before = add(app, session.plugin_files);
   for (CLI::App* verb : app.get_subcommands({})) {
-    verb->add_option("--plugin", session.plugin_files,
-                     "Load a plugin; may be repeated. Also taken: every *.so in the\ndirectories of "
-                     "DIRACSTEP_PLUGIN_PATH")
-        ->type_name("FILE.so")
-        ->allow_extra_args(false);
-    verb->parse_complete_callback([&session] { load_plugins(session); });
+    add(*verb, session.plugin_files);
+    // Here the files after the verb are in the session, and those before it only in their option.
+    verb->parse_complete_callback([&session, before] {
+      const std::vector<std::string> files = before->results();
+      session.plugin_files.insert(session.plugin_files.begin(), files.begin(), files.end());
+      load_plugins(session);
+    });
   }
 }
 

@@ -66,6 +66,7 @@ OrderTableRow measure_row(const Registry& registry, const TableMethod& method,
     OrderMeasurement measured{std::nan(""), 0.0, 0.0, {}};
     if (takes(known, scene)) measured = measure_order(registry, scene, options);
     row.measured.push_back(measured);
+    if (!composed && info.constrained_order > 0) row.claimed.push_back(claimed_order(info, *scene.scene));
     if (composed || scene.scene->force || degenerate(scene)) continue;
     const double residual = membership(registry, known, scene, options);
     row.membership_residual = std::max(row.membership_residual, residual);
@@ -80,9 +81,12 @@ OrderTableRow measure_row(const Registry& registry, const TableMethod& method,
 }
 
 bool holds(const OrderTableRow& row) {
-  return std::ranges::all_of(row.measured, [&](const OrderMeasurement& m) {
-    return m.failure.empty() && (std::isnan(m.order) || std::abs(m.order - row.order) <= 0.2);
-  });
+  for (std::size_t k = 0; k < row.measured.size(); ++k) {
+    const OrderMeasurement& measured = row.measured[k];
+    const int claimed = row.claimed.empty() ? row.order : row.claimed[k];
+    if (!measured.failure.empty() || std::abs(measured.order - claimed) > 0.2) return false;
+  }
+  return true;
 }
 
 std::string order_table_markdown(const std::vector<OrderTableRow>& rows,

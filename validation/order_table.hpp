@@ -18,6 +18,7 @@ struct OrderTableRow {
   /// Largest over the constraint classes, 20 steps of h = 0.05; of GL(s) with rows in the stage space.  NaN
   /// where none is stated.
   double membership_residual = 0.0;
+  std::vector<int> claimed = {};  ///< order on each class where it is not the same on all; else empty
 };
 
 /// One line of the table is one of these.

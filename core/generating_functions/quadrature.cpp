@@ -68,7 +68,8 @@ class QuadratureLagrangian final : public GeneratingFunction {
     for (Vector* column : {&q_, &v_, &lq_, &lv_}) column->resize(n);
     for (Vector* values : {&lqq_, &lqv_, &lvv_}) values->resize(pattern().nonzeros());
     const PhaseStructure& structure = lagrangian_->structure();
-    const bool at_ends = std::ranges::all_of(rule_.nodes(), [](StepNode node) { return node.c == 0.0 || node.c == 1.0; });
+    const bool at_ends =
+        std::ranges::all_of(rule_.nodes(), [](StepNode node) { return node.c == 0.0 || node.c == 1.0; });
     if (!at_ends || !structure.separable || !structure.y_hessian_constant || !structure.y_hessian_diagonal)
       return;
     const Vector mass = SeparableEnds::mass_of(*lagrangian_);

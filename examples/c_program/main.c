@@ -42,7 +42,8 @@ int main(void) {
     if (k > 0) status = diracstep_step(integrator, 20);
     if (status == DIRACSTEP_OK) status = diracstep_read(integrator, DIRACSTEP_PROJECTED, &state);
     if (status == DIRACSTEP_OK)
-      printf("t = %4.1f  x = %.9f  y = %.9f  force across the blade = %+.6f\n", state.time, q[0], q[1], force);
+      printf("t = %4.1f  x = %.9f  y = %.9f  force across the blade = %+.6f\n", state.time, q[0], q[1],
+             force);
   }
   if (status != DIRACSTEP_OK) fprintf(stderr, "%s\n", diracstep_message(integrator));
   diracstep_destroy(integrator);

@@ -26,6 +26,8 @@ TEST_F(Plugins, AreListedWithWhatTheyBring) {
 }
 
 TEST_F(Plugins, WorkInEveryVerb) {
+  EXPECT_EQ(run(plugin("harmonic") + "run two_springs --end 1 --rule simpson" + plugin("galerkin")).status,
+            0);
   const std::string options = " --method type1/harmonic" + plugin("harmonic");
   EXPECT_EQ(run("plan two_springs" + options).status, 0);
   EXPECT_EQ(run("plan two_springs " + plugin("harmonic") + " --method type1/harmonic").status, 0);

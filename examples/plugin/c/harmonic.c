@@ -22,10 +22,10 @@ enum { RESONANT = 2 };
 /* Constants of one coordinate, and room for derivatives of L. */
 struct harmonic {
   int entries;
-  double *mass, *stiffness;     /* n each */
-  double *v, *lq, *lv;          /* n each */
-  double *lqq, *lqv, *lvv;      /* one for each entry of the pattern */
-  int *transposed;              /* the mirror entry of each entry */
+  double *mass, *stiffness; /* n each */
+  double *v, *lq, *lv;      /* n each */
+  double *lqq, *lqv, *lvv;  /* one for each entry of the pattern */
+  int *transposed;          /* the mirror entry of each entry */
   double numbers[];
 };
 
@@ -85,8 +85,8 @@ static int create(const void *data, const diracstep_system *system, void **self)
   *self = made;
   for (int i = 0; i < n; ++i) made->v[i] = 0.0;
   const diracstep_function *l = &system->lagrangian;
-  const int status = l->hessian(l->data, system->start_time, made->v, made->v, made->lqq, made->lqv,
-                                made->lvv);
+  const int status =
+      l->hessian(l->data, system->start_time, made->v, made->v, made->lqq, made->lqv, made->lvv);
   for (int i = 0; i < n; ++i) {
     const int e = find(&pattern, i, i);
     const int usable = e >= 0 && made->lvv[e] != 0.0 && isfinite(made->lqq[e] / made->lvv[e]);
@@ -99,14 +99,16 @@ static int create(const void *data, const diracstep_system *system, void **self)
   return 1;
 }
 
-static int value(void *self, const diracstep_system *system, diracstep_interval step, const double *y, double *s) {
+static int value(void *self, const diracstep_system *system, diracstep_interval step, const double *y,
+                 double *s) {
   struct harmonic *w = self;
   const diracstep_function *l = &system->lagrangian;
   const int n = system->dimension;
   const double h = step.size, *q0 = y, *q1 = y + n;
   double at_start, at_end;
   for (int i = 0; i < n; ++i) w->v[i] = (q1[i] - q0[i]) / h;
-  if (l->value(l->data, step.start, q0, w->v, &at_start) || l->value(l->data, step.start + h, q1, w->v, &at_end))
+  if (l->value(l->data, step.start, q0, w->v, &at_start) ||
+      l->value(l->data, step.start + h, q1, w->v, &at_end))
     return 1;
   *s = h / 2.0 * (at_start + at_end);
   for (int i = 0; i < n; ++i) {
@@ -118,7 +120,8 @@ static int value(void *self, const diracstep_system *system, diracstep_interval 
   return 0;
 }
 
-static int gradient(void *self, const diracstep_system *system, diracstep_interval step, const double *y, double *g) {
+static int gradient(void *self, const diracstep_system *system, diracstep_interval step, const double *y,
+                    double *g) {
   struct harmonic *w = self;
   const diracstep_function *l = &system->lagrangian;
   const int n = system->dimension;
@@ -178,7 +181,8 @@ static int hessian(void *self, const diracstep_system *system, diracstep_interva
 
 static const char *error_text(void *self, int status) {
   (void)self;
-  return status == RESONANT ? "the step is a multiple of half a period of the harmonic part" : "L failed or no memory";
+  return status == RESONANT ? "the step is a multiple of half a period of the harmonic part"
+                            : "L failed or no memory";
 }
 
 static const diracstep_method harmonic = {

@@ -2,7 +2,8 @@
 #include <diracstep/plugins/diracstep_plugin.h>
 #include <math.h>
 
-static int value(void *self, const diracstep_system *system, diracstep_interval step, const double *y, double *s) {
+static int value(void *self, const diracstep_system *system, diracstep_interval step, const double *y,
+                 double *s) {
   (void)self, (void)system, (void)step, (void)y;
 #if FAULT == 3 /* an error number */
   if (step.start > 0.1) return 42;
@@ -27,7 +28,11 @@ static const diracstep_method method = {
 #else
     .name = "type1/faulty",
 #endif
-    .type = 1, .order = 1, .constraint_rule = "left", .value = value, .error_text = text};
+    .type = 1,
+    .order = 1,
+    .constraint_rule = "left",
+    .value = value,
+    .error_text = text};
 static const diracstep_method *const methods[] = {&method};
 static const diracstep_plugin plugin = {
 #if FAULT == 1 /* another version */
@@ -35,7 +40,10 @@ static const diracstep_plugin plugin = {
 #else
     .version = DIRACSTEP_PLUGIN_VERSION,
 #endif
-    .size = sizeof(diracstep_plugin), .name = "faulty", .methods = 1, .method = methods};
+    .size = sizeof(diracstep_plugin),
+    .name = "faulty",
+    .methods = 1,
+    .method = methods};
 
 #if FAULT == 0 /* no entry */
 const diracstep_plugin *another_entry(void) { return &plugin; }
