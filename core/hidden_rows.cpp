@@ -69,7 +69,12 @@ Columns kernel(const Columns& matrix) {
   lu.compute(matrix);
   if (lu.dimensionOfKernel() == 0) return Columns(matrix.cols(), 0);
   Columns basis = lu.kernel();
-  for (Eigen::Index j = 0; j < basis.cols(); ++j) basis.col(j) /= max_norm(basis.col(j));
+  for (Eigen::Index j = 0; j < basis.cols(); ++j) {
+    basis.col(j) /= max_norm(basis.col(j));
+    Eigen::Index first = 0;
+    while (std::abs(basis(first, j)) < zero_tolerance) ++first;
+    if (basis(first, j) < 0.0) basis.col(j) *= -1.0;  // names begin without a sign
+  }
   return (basis.array().abs() < zero_tolerance).select(0.0, basis);
 }
 

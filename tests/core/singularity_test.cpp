@@ -23,24 +23,25 @@ StepReport first_failure(const Scene& scene, const IntegratorOptions& options, l
   return {};
 }
 
-/// On x y = 0 towards the crossing of its two branches, where the row vanishes.
+/// On x y = 0, one step before the crossing of its two branches, where the row vanishes; a force presses on
+/// it.
 Scene towards_the_crossing() {
   Scene scene;
   scene.name = "crossing";
   scene.coordinates = {"x", "y"};
-  scene.lagrangian =
-      lagrangian<2>([](const auto&, const auto& v) { return 0.5 * (v[0] * v[0] + v[1] * v[1]); });
+  scene.lagrangian = lagrangian<2>(
+      [](const auto& q, const auto& v) { return 0.5 * (v[0] * v[0] + v[1] * v[1]) - 0.3 * q[1]; });
   scene.constraints = {holonomic<2, 1>(
       []<class T>(const std::array<T, 2>& q) { return std::array<T, 1>{q[0] * q[1]}; }, {"branches"})};
-  scene.start = {0.0, Vector{{-0.25, 0.0}}, Vector{{1.0, 0.0}}};
+  scene.start = {0.0, Vector{{-0.125, 0.0}}, Vector{{1.0, 0.0}}};
   return scene;
 }
 
 TEST(Singularity, ABifurcationIsToldWithTheRowsThatMeetThere) {
   const StepReport report =
-      first_failure(towards_the_crossing(), {.method = "type1/trapezoidal", .step = 0.125}, 10);
+      first_failure(towards_the_crossing(), {.method = "type1/midpoint", .step = 0.125}, 1);
   ASSERT_FALSE(report.ok());
-  EXPECT_EQ(report.step, 1) << report.failure;
+  EXPECT_EQ(report.solve.status, SolveStatus::singular_jacobian);
   expect_parts(report.failure, {"singular", "row 'branches'"});
 }
 
@@ -73,7 +74,7 @@ TEST(Singularity, SlowConvergenceIsToldAsThat) {
 TEST(Singularity, ANullPointerAmongTheRowsIsRefused) {
   Scene scene = testing::particle("holey");
   scene.constraints = {nullptr};
-  expect_misuse([&] { first_failure(scene, {.step = 0.1}, 1); }, {"'holey'", "null"});
+  expect_misuse([&] { (void)first_failure(scene, {.step = 0.1}, 1); }, {"'holey'", "null"});
 }
 
 TEST(HiddenRows, RegularScenesHaveNone) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <diracstep/solvers/kinsol_solver.hpp>
+#include <diracstep/validation/ida_reference.hpp>
 #include <diracstep/validation/published_cases.hpp>
 #include <diracstep/validation/scene_catalogue.hpp>
 
@@ -60,6 +61,16 @@ TEST(PublishedCases, AWrongValueOrAWrongMotionFails) {
   entry.recommended.method = "type1/unknown";
   EXPECT_NE(run_published_cases(entry, Registry::with_built_ins(), kinsol()).front().failure.find("unknown"),
             std::string::npos);
+}
+
+TEST(DegenerateCircuit, IdaMeetsTheClosedFormToo) {
+  const CatalogueScene entry = make_scene("lc_circuit");
+  const IdaRun ida = integrate_with_ida(*entry.scene, 10.0, {.rtol = 1e-11});
+  ASSERT_TRUE(ida.ok()) << ida.failure;
+  const auto exact = entry.reference.at(10.0);
+  ASSERT_TRUE(exact.has_value());
+  EXPECT_LT((ida.end.q - exact->q).lpNorm<Eigen::Infinity>(), 1e-7);
+  EXPECT_LT((ida.end.v - exact->v).lpNorm<Eigen::Infinity>(), 1e-7);
 }
 
 TEST(CatalogueScenes, AllTwentySixCasesAreThere) { EXPECT_EQ(scene_names().size(), 26u); }
