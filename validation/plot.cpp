@@ -59,13 +59,6 @@ struct Curve {
   std::string data;  // lines "cpu error"
 };
 
-/// A gnuplot string that is taken as it stands.
-std::string gnuplot_text(std::string_view text) {
-  std::string all = "'";
-  for (const char c : text) all += c == '\'' ? std::string("''") : std::string(1, c);
-  return all + "'";
-}
-
 Curve curve(const Study& study, const std::string& method, int order, std::string label, std::string look) {
   Curve drawn{std::move(label), std::move(look), {}};
   for (const StudyRow& row : study.rows)
@@ -142,6 +135,26 @@ std::string file_name(std::string name) {
 
 }  // namespace
 
+std::string gnuplot_text(std::string_view text) {
+  std::string all = "'";
+  for (const char c : text) all += c == '\'' ? std::string("''") : std::string(1, c);
+  return all + "'";
+}
+
+std::string render(const std::string& picture, const std::string& stem, std::size_t width,
+                   std::size_t height) {
+  std::string script;
+  for (const auto& [ending, settings] : terminals)
+    script += fmt::format("reset\nset terminal {}\nset output {}\n{}unset output\n", settings(width, height),
+                          gnuplot_text(stem + ending), picture);
+  const std::string failure = run_gnuplot(script);
+  if (!failure.empty()) return failure;
+  for (const auto& [ending, settings] : terminals)
+    if (std::error_code error; !std::filesystem::file_size(stem + ending, error))
+      return fmt::format("gnuplot did not write {}{}", stem, ending);
+  return {};
+}
+
 std::string work_precision_script(const Study& study) {
   const std::vector<Curve> all = curves(study);
   std::string script(style);
@@ -164,18 +177,9 @@ std::string draw_work_precision(const Study& study, const std::filesystem::path&
   if (keys == 0) return study.scene + ": no run succeeded, so there is nothing to draw";
   const std::string stem = (directory / file_name(study.scene)).string();
   const std::string picture = work_precision_script(study);
-  std::string script;
   const std::size_t width = methods_of(study).size() > 1 ? 980 : 720;  // the key names the methods then
   const std::size_t height = std::max<std::size_t>(480, 90 + 28 * keys);
-  for (const auto& [ending, settings] : terminals)
-    script += fmt::format("reset\nset terminal {}\nset output {}\n{}unset output\n", settings(width, height),
-                          gnuplot_text(stem + ending), picture);
-  const std::string failure = run_gnuplot(script);
-  if (!failure.empty()) return failure;
-  for (const auto& [ending, settings] : terminals)
-    if (std::error_code error; !std::filesystem::file_size(stem + ending, error))
-      return fmt::format("gnuplot did not write {}{}", stem, ending);
-  return {};
+  return render(picture, stem, width, height);
 }
 
 }  // namespace diracstep

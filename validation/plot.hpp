@@ -3,6 +3,7 @@
 #include <diracstep/validation/convergence_study.hpp>
 #include <filesystem>
 #include <string>
+#include <string_view>
 
 namespace diracstep {
 
@@ -13,5 +14,13 @@ std::string work_precision_script(const Study& study);
 
 /// Writes DIRECTORY/SCENE.svg and SCENE.png with gnuplot.  Empty, or what went wrong.
 std::string draw_work_precision(const Study& study, const std::filesystem::path& directory);
+
+/// A gnuplot string that is taken as it stands.
+std::string gnuplot_text(std::string_view text);
+
+/// Writes STEM.svg and STEM.png of a script that sets neither terminal nor output; width and height in
+/// points. Empty, or what went wrong.
+std::string render(const std::string& picture, const std::string& stem, std::size_t width,
+                   std::size_t height);
 
 }  // namespace diracstep

@@ -2,11 +2,10 @@
 
 #include <CLI/App.hpp>
 #include <algorithm>
-#include <cerrno>
-#include <cstring>
 #include <diracstep/core/errors.hpp>
 #include <diracstep/validation/command/arguments.hpp>
 #include <diracstep/validation/command/interrupt.hpp>
+#include <diracstep/validation/command/output_file.hpp>
 #include <diracstep/validation/command/verbs.hpp>
 #include <diracstep/validation/plot.hpp>
 #include <diracstep/validation/progress.hpp>
@@ -37,25 +36,10 @@ struct Options {
   bool json = false;
 };
 
-/// Replaces a file; what went wrong, or empty.
-std::string write_file(const std::filesystem::path& path, const std::string& text) {
-  std::FILE* file = std::fopen(path.c_str(), "w");
-  if (file == nullptr) return fmt::format("'{}' cannot be written: {}", path.string(), std::strerror(errno));
-  const bool written =
-      std::fwrite(text.data(), 1, text.size(), file) == text.size() && std::fflush(file) == 0;
-  const int error = errno;
-  if (std::fclose(file) == 0 && written) return {};
-  return fmt::format("'{}' could not be written in full: {}", path.string(),
-                     std::strerror(written ? errno : error));
-}
-
 /// The directory of --out: study.csv, study.json and the pictures, renewed after each scene.
 class OutputDirectory {
  public:
-  explicit OutputDirectory(const std::string& path) : path_(path) {
-    std::error_code error;
-    std::filesystem::create_directories(path_, error);
-    if (error) throw Misuse(fmt::format("--out: '{}' cannot be made: {}", path, error.message()));
+  explicit OutputDirectory(const std::string& path) : path_(output_directory(path)) {
     if (const auto failure = write_tables({}); !failure.empty()) throw Misuse("--out: " + failure);
   }
 
