@@ -79,6 +79,7 @@ class GaussLobattoStep final : public StepProblem {
   void guess(const Vector& v0, VectorRef x) override {
     for (int i = 0; i < s_; ++i) x.segment(n_ * i, n_) = v0;
     x.tail(m_ * s_).setZero();
+    if (lqq_.col(0).isZero(0.0)) sample_start(v0);
   }
 
   void residual(ConstVectorRef x, VectorRef f) override {
@@ -273,6 +274,13 @@ class GaussLobattoStep final : public StepProblem {
   void add(VectorRef values, int layout, double factor, const double* block) const {
     const auto& places = layout_.positions(layout);
     for (std::size_t k = 0; k < places.size(); ++k) values[places[k]] += factor * block[k];
+  }
+
+  /// Before the first solve: the derivatives at the start, for the round-off scales.
+  void sample_start(const Vector& v0) {
+    lagrangian_->gradient(step_.start, q0_, v0, lq_.col(0), lv_.col(0));
+    lagrangian_->hessian(step_.start, q0_, v0, lqq_.col(0), lqv_.col(0), lvv_.col(0));
+    update_scales();
   }
 
   /// Terms of the momentum rows are momenta; a velocity of size |q|/h loses ε|q|/h to round-off.

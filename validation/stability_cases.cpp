@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <diracstep/core/errors.hpp>
+#include <diracstep/validation/energy_doubt.hpp>
 #include <diracstep/validation/scaled_rows.hpp>
 #include <diracstep/validation/stability_cases.hpp>
 #include <memory>
@@ -226,19 +226,6 @@ void add_long_runs(Cases& cases) {
     cases.push_back(
         over_steps(name + ", steps", 1e7, name + " 1e7 steps", entry, energy_scale(entry), 1.0, 10'000'000));
   }
-}
-
-/// Whether E is a constant of the motion: no force, no time in L, no driven rows (as far as the start shows).
-bool keeps_energy(const Scene& scene) {
-  const Start& start = scene.start;
-  if (scene.force || scene.lagrangian->value(start.time, start.q, start.v) !=
-                         scene.lagrangian->value(start.time + 1.0, start.q, start.v))
-    return false;
-  return std::ranges::none_of(scene.constraints, [&](const auto& rows) {
-    Vector a(rows->pattern().nonzeros()), b(rows->rows());
-    rows->coefficients(start.time, start.q, a, b);
-    return (b.array() != 0.0).any();
-  });
 }
 
 }  // namespace

@@ -32,7 +32,8 @@ set key outside right center Left reverse samplen 2.4 spacing 1.3 width 1 noenha
 
 struct Curve {
   std::string label;
-  std::string data;  // lines "x y"
+  std::string data = {};  // lines "x y"
+  int others = 0;         // methods with the same data
 
   void add(double x, double y) {
     if (x > 0.0 && std::isfinite(y) && y <= largest_drawn)
@@ -51,6 +52,10 @@ std::string look(std::size_t k) {
                      colours[k % colours.size()]);
 }
 
+std::string key(const Curve& curve) {
+  return curve.others == 0 ? curve.label : fmt::format("{} and {} like it", curve.label, curve.others);
+}
+
 std::string script(const Picture& picture) {
   std::string text(style);
   text += fmt::format(
@@ -60,7 +65,7 @@ std::string script(const Picture& picture) {
     text += fmt::format("$curve{} << EOD\n{}EOD\n", k, picture.curves[k].data);
   for (std::size_t k = 0; k < picture.curves.size(); ++k)
     text += fmt::format("{}$curve{} with linespoints {} title {}", k == 0 ? "plot " : ", \\\n     ", k,
-                        look(k), gnuplot_text(picture.curves[k].label));
+                        look(k), gnuplot_text(key(picture.curves[k])));
   return text + "\n";
 }
 
@@ -69,8 +74,8 @@ std::string draw(Picture picture, const std::filesystem::path& directory, std::s
   if (picture.curves.empty()) return {};
   std::ranges::replace_if(
       file, [](char c) { return c == '/' || c == '\\' || c == ' ' || c == ','; }, '_');
-  const std::size_t height = std::max<std::size_t>(480, 90 + 28 * picture.curves.size());
-  return render(script(picture), (directory / file).string(), 980, height);
+  const std::size_t height = std::max<std::size_t>(480, 140 + 30 * picture.curves.size());
+  return render(script(picture), (directory / file).string(), 1100, height);
 }
 
 std::string label(const std::string& method, int order) { return fmt::format("{}, order {}", method, order); }
@@ -82,8 +87,8 @@ void merge_equal(std::vector<Curve>& curves) {
     const auto same = std::ranges::find(merged, curve.data, &Curve::data);
     if (same == merged.end())
       merged.push_back(std::move(curve));
-    else if (same->label.find('\n') == std::string::npos && same->label.size() < 60)
-      same->label += "; " + curve.label;
+    else
+      ++same->others;
   }
   curves = std::move(merged);
 }
@@ -97,7 +102,7 @@ std::vector<Curve> growth_curves(const std::vector<LinearStability>& linear,
                                  const std::function<double(const GrowthPoint&)>& value) {
   std::vector<Curve> curves;
   for (const LinearStability& stability : linear) {
-    curves.push_back({label(stability.method, stability.order), {}});
+    curves.push_back({label(stability.method, stability.order)});
     for (const GrowthPoint& point : stability.growth) curves.back().add(point.step, rounded(value(point)));
   }
   merge_equal(curves);
@@ -120,7 +125,7 @@ Picture group_picture(const std::string& group, const std::vector<const Stabilit
   std::map<std::string, std::size_t> places;
   const auto curve = [&](const std::string& name) -> Curve& {
     const auto [place, added] = places.emplace(name, picture.curves.size());
-    if (added) picture.curves.push_back({name, {}});
+    if (added) picture.curves.push_back({name});
     return picture.curves[place->second];
   };
   for (const StabilityResult* result : results) {

@@ -113,6 +113,8 @@ std::string letter(const StabilityRow& row) {
       return "**A**";
     case StabilityOutcome::bounded:
       return "B";
+    case StabilityOutcome::doubted:
+      return "d";
     case StabilityOutcome::stopped:
       return "s";
     case StabilityOutcome::refused:

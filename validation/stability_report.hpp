@@ -19,7 +19,8 @@ std::string stability_table(const StabilityResult& result);
 ///   linear[]  method, order, oscillator_limit (hω), damping_limit (hγ), growth[]: step, oscillator, damping
 ///   cases[]   group, value, case, scene, parameters{}, step, t_end, accuracy, reference (how it is known, or
 ///             null), rows[], ida[]
-///     rows[]  method, order, outcome ("accurate", "bounded", "stopped", "refused", "wrong"), message, steps,
+///     rows[]  method, order, outcome ("accurate", "bounded", "doubted", "stopped", "refused", "wrong"),
+///     message, steps,
 ///             t_reached, watches[]: name, band, drift, drift_half_width, bounded_until; constraint, error,
 ///             failed_solves, newton_iterations, cpu_seconds, ida (as in ida[], at this cost, or null)
 ///     ida[]   rtol, status, error, deviation, constraint, cpu_seconds

@@ -6,6 +6,7 @@
 #include <ctime>
 #include <diracstep/core/errors.hpp>
 #include <diracstep/core/run.hpp>
+#include <diracstep/validation/energy_doubt.hpp>
 #include <diracstep/validation/ida_reference.hpp>
 #include <diracstep/validation/stability_study.hpp>
 #include <diracstep/validation/study_run.hpp>
@@ -96,9 +97,10 @@ class Watching {
   WatchResult result_;
 };
 
-/// The reference at the end, where the case has one; missing without it: IDA is no judge of stiff motions.
+/// The reference at the end, where the case has one; IDA is asked only where nothing else can be watched.
 Truth truth_of(const StabilityCase& that) {
-  if (that.scene.reference.at && that.scene.reference.at(that.t_end)) return true_end(that.scene, that.t_end);
+  if (that.watches.empty() || (that.scene.reference.at && that.scene.reference.at(that.t_end)))
+    return true_end(that.scene, that.t_end);
   return {.kind = {}, .how = {}, .missing = "no reference", .q = {}, .p = {}};
 }
 
@@ -132,7 +134,7 @@ class CaseRun {
   }
 
  private:
-  static constexpr Truth* none = nullptr;
+  static constexpr double unwatched_bound = 0.5;  ///< of the error, where there is no watch
 
   bool see(const Sample& sample) {
     for (Watching& watching : watching_) watching.see(sample);
@@ -147,9 +149,12 @@ class CaseRun {
     if (!finished) return StabilityOutcome::stopped;
     if (truth_.missing.empty()) row_.error = judged(integrator_.scene(), end_, truth_).error();
     if (row_.error <= case_.accuracy) return StabilityOutcome::accurate;
-    const bool bounded =
-        !watching_.empty() && std::ranges::all_of(watching_, [](const Watching& w) { return w.within(); });
-    return bounded ? StabilityOutcome::bounded : StabilityOutcome::wrong;
+    const bool bounded = watching_.empty()
+                             ? row_.error <= unwatched_bound
+                             : std::ranges::all_of(watching_, [](const Watching& w) { return w.within(); });
+    if (bounded) return StabilityOutcome::bounded;
+    row_.message = energy_doubt(integrator_.scene(), end_);
+    return row_.message.empty() ? StabilityOutcome::wrong : StabilityOutcome::doubted;
   }
 
   const StabilityCase& case_;
@@ -233,6 +238,8 @@ const char* name(StabilityOutcome outcome) {
       return "accurate";
     case StabilityOutcome::bounded:
       return "bounded";
+    case StabilityOutcome::doubted:
+      return "doubted";
     case StabilityOutcome::stopped:
       return "stopped";
     case StabilityOutcome::refused:

@@ -38,9 +38,10 @@ struct StabilityCase {
 enum class StabilityOutcome {
   accurate,  ///< at the end, and right there to the case's accuracy
   bounded,   ///< at the end, every watch within its bound
+  doubted,   ///< at the end, the energy too far off to believe it, and told so: energy_doubt()
   stopped,   ///< a step or the reading of a point failed and said so
   refused,   ///< not begun: the library threw Misuse, or the method does not take the scene
-  wrong      ///< at the end without a word, and neither accurate nor bounded
+  wrong      ///< at the end without a word, and none of the above
 };
 const char* name(StabilityOutcome outcome);
 
@@ -73,7 +74,7 @@ struct StabilityRow {
   std::string method;
   int order = 0;
   StabilityOutcome outcome = StabilityOutcome::refused;
-  std::string message = {};  ///< what the library said, where it said something
+  std::string message = {};  ///< what was said
   long steps = 0;
   double t_reached = std::nan("");
   std::vector<WatchResult> watches = {};

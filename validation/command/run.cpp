@@ -117,6 +117,7 @@ void run(const Options& options, Session& session) {
     print(run_json(result, entry, integrator.options()));
   else if (!file)
     print(run_text(result, entry, integrator.options()));
+  if (!result.doubt.empty()) say(result.doubt);
   if (result.failure.empty()) return;
   say(result.failure);
   session.exit_status = failed;

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <diracstep/validation/command/run_report.hpp>
 #include <diracstep/validation/convergence_study.hpp>
+#include <diracstep/validation/energy_doubt.hpp>
 #include <diracstep/validation/report.hpp>
 #include <nlohmann/json.hpp>
 
@@ -51,6 +52,7 @@ void compare_with_reference(RunResult& result, const CatalogueScene& entry, cons
   Truth truth{.kind = {}, .how = {}, .missing = "no reference", .q = {}, .p = {}};
   if (known) truth = true_end(entry, result.end.time);
   judge(result.check, scene, result.end, truth);
+  result.doubt = energy_doubt(scene, result.end);
 }
 
 std::string run_text(const RunResult& result, const CatalogueScene& entry, const IntegratorOptions& options) {
@@ -81,6 +83,7 @@ std::string run_json(const RunResult& result, const CatalogueScene& entry, const
             {"step", options.step},
             {"status", result.failure.empty() ? "ok" : result.failure}};
   for (const auto& [key, value] : entry.parameters) json["parameters"][key] = number(value);
+  json["doubt"] = result.doubt.empty() ? Json(nullptr) : Json(result.doubt);
   json["end"] = end_json(result, *entry.scene);
   json["error_q"] = number(check.error_q);
   json["error_p"] = number(check.error_p);
