@@ -8,8 +8,6 @@ namespace diracstep {
 
 namespace {
 
-constexpr double doubtful_change = 0.1;
-
 bool depends_on_time(const Scene& scene) {
   const auto& [t, q, v, p] = scene.start;
   return scene.lagrangian->value(t, q, v) != scene.lagrangian->value(t + 1.0, q, v);
@@ -21,17 +19,6 @@ bool is_driven(const ConstraintRows& rows, const Start& start) {
   return (b.array() != 0.0).any();
 }
 
-/// The kinetic energy |p·v|/2 and |q|∞ |∂L/∂q|∞, two energies at play at a point.
-struct Sizes {
-  double kinetic, work;
-};
-
-Sizes sizes(const Scene& scene, double t, ConstVectorRef q, ConstVectorRef v) {
-  Vector force(q.size()), momentum(q.size());
-  scene.lagrangian->gradient(t, q, v, force, momentum);
-  return {0.5 * std::abs(momentum.dot(v)), q.lpNorm<Eigen::Infinity>() * force.lpNorm<Eigen::Infinity>()};
-}
-
 }  // namespace
 
 bool keeps_energy(const Scene& scene) {
@@ -40,20 +27,33 @@ bool keeps_energy(const Scene& scene) {
                               [&](const auto& rows) { return is_driven(*rows, scene.start); });
 }
 
-std::string energy_doubt(const Scene& scene, const Sample& end) {
-  if (!keeps_energy(scene)) return {};
-  const auto& [t, q, v, p] = scene.start;
-  const double start = scene.energy(t, q, v);
-  const Sizes before = sizes(scene, t, q, v), after = sizes(scene, end.time, end.q, end.v);
+EnergyDoubt::EnergyDoubt(const Scene& scene)
+    : scene_(scene),
+      keeps_energy_(keeps_energy(scene)),
+      force_(Vector::Zero(scene.dimension())),
+      momentum_(force_),
+      start_energy_(scene.energy(scene.start.time, scene.start.q, scene.start.v)),
+      start_sizes_(sizes(scene.start.time, scene.start.q, scene.start.v)) {}
+
+EnergyDoubt::Sizes EnergyDoubt::sizes(double t, ConstVectorRef q, ConstVectorRef v) {
+  scene_.lagrangian->gradient(t, q, v, force_, momentum_);
+  return {0.5 * std::abs(momentum_.dot(v)), q.lpNorm<Eigen::Infinity>() * force_.lpNorm<Eigen::Infinity>()};
+}
+
+void EnergyDoubt::see(const Sample& point) {
+  if (!keeps_energy_) return;
+  const Sizes now = sizes(point.time, point.q, point.v);
   // The smaller of two: a run that blows up is not measured by its own size.
-  double size =
-      std::max({std::abs(start), std::min(before.kinetic, after.kinetic), std::min(before.work, after.work)});
-  if (size == 0.0) size = std::max(after.kinetic, after.work);
-  if (std::abs(end.energy - start) <= doubtful_change * size) return {};  // false where one is not a number
-  return fmt::format(
-      "the energy, which this scene keeps, went from {:g} to {:g}: the step is too large to believe the "
-      "result",
-      start, end.energy);
+  double size = std::max({std::abs(start_energy_), std::min(start_sizes_.kinetic, now.kinetic),
+                          std::min(start_sizes_.work, now.work)});
+  if (size == 0.0) size = std::max(now.kinetic, now.work);
+  const double change = std::abs(point.energy - start_energy_);
+  if (change <= worst_ * size) return;  // false where one is not a number
+  worst_ = change / size;
+  text_ = fmt::format(
+      "the energy, which this scene keeps, went from {:g} to {:g} at t = {:g}: the step is too large to "
+      "believe the result",
+      start_energy_, point.energy, point.time);
 }
 
 }  // namespace diracstep

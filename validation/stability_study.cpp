@@ -114,7 +114,7 @@ StudyRow judged(const Scene& scene, const Sample& sample, const Truth& truth) {
 class CaseRun {
  public:
   CaseRun(const StabilityCase& that, Integrator& integrator, StabilityRow& row)
-      : case_(that), integrator_(integrator), row_(row), truth_(truth_of(that)) {
+      : case_(that), integrator_(integrator), row_(row), truth_(truth_of(that)), doubt_(integrator.scene()) {
     for (const Watch& watch : that.watches) watching_.emplace_back(watch, integrator.scene().start);
   }
 
@@ -138,6 +138,7 @@ class CaseRun {
 
   bool see(const Sample& sample) {
     for (Watching& watching : watching_) watching.see(sample);
+    doubt_.see(sample);
     end_ = sample;
     const StudyRow here = judged(integrator_.scene(), sample, nothing_);
     row_.constraint =
@@ -153,7 +154,7 @@ class CaseRun {
                              ? row_.error <= unwatched_bound
                              : std::ranges::all_of(watching_, [](const Watching& w) { return w.within(); });
     if (bounded) return StabilityOutcome::bounded;
-    row_.message = energy_doubt(integrator_.scene(), end_);
+    row_.message = doubt_.text();
     return row_.message.empty() ? StabilityOutcome::wrong : StabilityOutcome::doubted;
   }
 
@@ -162,6 +163,7 @@ class CaseRun {
   StabilityRow& row_;
   Truth truth_;
   Truth nothing_{.kind = {}, .how = {}, .missing = "not asked", .q = {}, .p = {}};
+  EnergyDoubt doubt_;
   std::vector<Watching> watching_;
   Sample end_;
 };

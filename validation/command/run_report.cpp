@@ -3,7 +3,6 @@
 #include <cmath>
 #include <diracstep/validation/command/run_report.hpp>
 #include <diracstep/validation/convergence_study.hpp>
-#include <diracstep/validation/energy_doubt.hpp>
 #include <diracstep/validation/report.hpp>
 #include <nlohmann/json.hpp>
 
@@ -52,7 +51,6 @@ void compare_with_reference(RunResult& result, const CatalogueScene& entry, cons
   Truth truth{.kind = {}, .how = {}, .missing = "no reference", .q = {}, .p = {}};
   if (known) truth = true_end(entry, result.end.time);
   judge(result.check, scene, result.end, truth);
-  result.doubt = energy_doubt(scene, result.end);
 }
 
 std::string run_text(const RunResult& result, const CatalogueScene& entry, const IntegratorOptions& options) {

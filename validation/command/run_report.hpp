@@ -12,7 +12,7 @@ struct RunResult {
   Sample end;  ///< the last point that could be read; empty columns where there is none
   Work work;
   StudyRow check;     ///< errors against the reference at that time, rows and energy
-  std::string doubt;  ///< empty, or why the end is not to be believed
+  std::string doubt;  ///< empty, or why the points are not to be believed
   std::string out;    ///< the file written, if any
   long lines = 0;     ///< points in it
 
