@@ -49,19 +49,25 @@ StabilityCase over_steps(const std::string& group, double value, std::string nam
   return that;
 }
 
+/// From 1e8 on the reference is the rigid pendulum.
+CatalogueScene spring_pendulum(int decade) {
+  CatalogueScene entry = make_scene("stiff_spring_pendulum", {{"k", std::pow(10.0, decade)}});
+  if (decade < 8) return entry;
+  entry.reference = make_scene("pendulum_cartesian", {{"g", 9.81}}).reference;
+  entry.reference.how = "the rigid pendulum, approached as g/k";
+  entry.reference.self_error = 9.81 / std::pow(10.0, decade);
+  return entry;
+}
+
 void add_stiff_springs(Cases& cases, bool full) {
-  const CatalogueScene rigid = make_scene("pendulum_cartesian", {{"g", 9.81}});
-  for (int decade = 2; decade <= 12; decade += full ? 1 : 2) {
-    const double k = std::pow(10.0, decade);
-    CatalogueScene entry = make_scene("stiff_spring_pendulum", {{"k", k}});
-    if (decade >= 8) {
-      entry.reference = rigid.reference;
-      entry.reference.how = "the rigid pendulum, approached as g/k";
-      entry.reference.self_error = 9.81 / k;
-    }
-    cases.push_back(over_steps("stiff_spring_pendulum, k", k,
-                               fmt::format("stiff_spring_pendulum k=1e{}", decade), entry, 9.81, 1.0, 1000));
-  }
+  for (int decade = 2; decade <= 12; decade += full ? 1 : 2)
+    cases.push_back(over_steps("stiff_spring_pendulum, k", std::pow(10.0, decade),
+                               fmt::format("stiff_spring_pendulum k=1e{}", decade), spring_pendulum(decade),
+                               9.81, 1.0, 1000));
+  for (const int decade : {8, 10, 12})
+    cases.push_back(over_steps("stiff_spring_pendulum at a fifth of its step, k", std::pow(10.0, decade),
+                               fmt::format("stiff_spring_pendulum k=1e{} h/5", decade),
+                               spring_pendulum(decade), 9.81, 0.2, 5000));
 }
 
 void add_fput(Cases& cases, bool full) {

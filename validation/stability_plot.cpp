@@ -74,8 +74,8 @@ std::string draw(Picture picture, const std::filesystem::path& directory, std::s
   if (picture.curves.empty()) return {};
   std::ranges::replace_if(
       file, [](char c) { return c == '/' || c == '\\' || c == ' ' || c == ','; }, '_');
-  const std::size_t height = std::max<std::size_t>(480, 140 + 30 * picture.curves.size());
-  return render(script(picture), (directory / file).string(), 1100, height);
+  const std::size_t height = std::max<std::size_t>(480, 140 + 36 * picture.curves.size());
+  return render(script(picture), (directory / file).string(), 1300, height);
 }
 
 std::string label(const std::string& method, int order) { return fmt::format("{}, order {}", method, order); }
@@ -111,10 +111,11 @@ std::vector<Curve> growth_curves(const std::vector<LinearStability>& linear,
 
 /// One curve for each method and one for the best IDA at the dearest cost.
 Picture group_picture(const std::string& group, const std::vector<const StabilityResult*>& results) {
-  const bool errors = std::ranges::any_of(results, [](const StabilityResult* result) {
+  const auto with_errors = std::ranges::count_if(results, [](const StabilityResult* result) {
     return std::ranges::any_of(result->rows,
                                [](const StabilityRow& row) { return std::isfinite(row.error); });
   });
+  const bool errors = with_errors > 1;
   const auto& watches = results.front()->that.watches;
   Picture picture{group,
                   group.substr(group.rfind(", ") == std::string::npos ? 0 : group.rfind(", ") + 2),

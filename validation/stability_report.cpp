@@ -179,7 +179,7 @@ const StabilityRow* best(const StabilityResult& result) {
 
 std::vector<Cells> best_cells(const std::vector<StabilityResult>& results) {
   std::vector<Cells> rows{{"case", "method", "error", "energy band", "drift per unit time", "constraint",
-                           "CPU s", "IDA: rtol", "error", "energy", "constraint"}};
+                           "CPU s", "IDA: rtol", "error", "deviation", "constraint"}};
   for (const StabilityResult& result : results) {
     const StabilityRow* row = best(result);
     if (row == nullptr) continue;

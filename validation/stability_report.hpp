@@ -28,7 +28,7 @@ std::string stability_json(const std::vector<LinearStability>& linear,
                            const std::vector<StabilityResult>& results);
 
 /// Three Markdown tables: the linear limits; every outcome, a line for a case and a column for a method; and
-/// the numbers of the first two methods that got through, with IDA at their cost.
+/// the numbers of the best method of each case, with IDA at its cost.
 std::string stability_markdown(const std::vector<LinearStability>& linear,
                                const std::vector<StabilityResult>& results);
 

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <ctime>
+#include <diracstep/core/consistent_start.hpp>
 #include <diracstep/core/errors.hpp>
 #include <diracstep/core/run.hpp>
 #include <diracstep/validation/energy_doubt.hpp>
@@ -171,7 +172,10 @@ class CaseRun {
 IdaBeside run_ida_beside(const StabilityCase& that, const Truth& truth, double rtol) {
   IdaBeside beside{.rtol = rtol};
   try {
-    const Scene& scene = *that.scene.scene;
+    const auto given = completed(that.scene.scene);
+    const auto without =
+        that.drop_dependent_rows ? without_rows(*given, dependent_rows(*given, given->start)) : given;
+    const Scene& scene = *without;
     const IdaRun run = integrate_with_ida(scene, that.t_end, {.rtol = rtol, .max_steps = ida_most_steps});
     beside.cpu_seconds = run.cpu_seconds;
     if (!run.ok()) {
