@@ -114,8 +114,14 @@ StudyRow judged(const Scene& scene, const Sample& sample, const Truth& truth) {
 
 class CaseRun {
  public:
-  CaseRun(const StabilityCase& that, Integrator& integrator, StabilityRow& row)
-      : case_(that), integrator_(integrator), row_(row), truth_(truth_of(that)), doubt_(integrator.scene()) {
+  CaseRun(const StabilityCase& that, Integrator& integrator, StabilityRow& row,
+          const std::function<bool()>& going_on)
+      : case_(that),
+        integrator_(integrator),
+        row_(row),
+        going_on_(going_on),
+        truth_(truth_of(that)),
+        doubt_(integrator.scene()) {
     for (const Watch& watch : that.watches) watching_.emplace_back(watch, integrator.scene().start);
   }
 
@@ -144,7 +150,7 @@ class CaseRun {
     const StudyRow here = judged(integrator_.scene(), sample, nothing_);
     row_.constraint =
         std::isnan(row_.constraint) ? here.constraint : std::max(row_.constraint, here.constraint);
-    return true;
+    return !going_on_ || going_on_();
   }
 
   StabilityOutcome outcome(bool finished) {
@@ -162,6 +168,7 @@ class CaseRun {
   const StabilityCase& case_;
   Integrator& integrator_;
   StabilityRow& row_;
+  const std::function<bool()>& going_on_;
   Truth truth_;
   Truth nothing_{.kind = {}, .how = {}, .missing = "not asked", .q = {}, .p = {}};
   EnergyDoubt doubt_;
@@ -225,8 +232,11 @@ StabilityResult run_case(const StabilityCase& that, const Registry& registry, co
   StabilityResult result{that, {}, {}};
   double dearest = 0.0;
   for (const StabilityMethod& method : methods) {
-    if (!look(that.name + ": " + method.name)) return result;
-    result.rows.push_back(run_stability_case(that, registry, solvers, method));
+    const auto going_on = [&] { return look(that.name + ": " + method.name); };
+    if (!going_on()) return result;
+    StabilityRow row = run_stability_case(that, registry, solvers, method, going_on);
+    if (!going_on()) return result;
+    result.rows.push_back(std::move(row));
     if (result.rows.back().cpu_seconds > dearest) dearest = result.rows.back().cpu_seconds;
   }
   if (!with_ida || !look(that.name + ": IDA")) return result;
@@ -257,7 +267,8 @@ const char* name(StabilityOutcome outcome) {
 }
 
 StabilityRow run_stability_case(const StabilityCase& that, const Registry& registry,
-                                const SolverFactory& solvers, const StabilityMethod& method) {
+                                const SolverFactory& solvers, const StabilityMethod& method,
+                                const std::function<bool()>& going_on) {
   StabilityRow row{.method = method.name, .order = method.order};
   try {
     const StepGrid grid = fit_steps(that.scene.scene->start.time, that.t_end, that.step);
@@ -267,7 +278,7 @@ StabilityRow run_stability_case(const StabilityCase& that, const Registry& regis
                            .step = grid.step,
                            .drop_dependent_rows = that.drop_dependent_rows});
     row.order = integrator.options().order;
-    CaseRun(that, integrator, row).run(grid.steps);
+    CaseRun(that, integrator, row, going_on).run(grid.steps);
   } catch (const Misuse& misuse) {
     row.message = misuse.what();
   }

@@ -98,15 +98,18 @@ struct StabilityMethod {
   int order = 0;
 };
 
-/// Called before each run with the part done, 0 to 1, and what comes next; false ends the study.
+/// Called before and within each run with the part done, 0 to 1, and what is run; false ends the study, the
+/// run at hand being left out.
 using StabilityObserver = std::function<bool(double part, const std::string& what)>;
 
-/// Runs one method on one case; the points read are about 400, evenly spread.
+/// Runs one method on one case; the points read are about 400, evenly spread.  `going_on` is asked at each
+/// and ends the run there by false.
 StabilityRow run_stability_case(const StabilityCase& that, const Registry& registry,
-                                const SolverFactory& solvers, const StabilityMethod& method);
+                                const SolverFactory& solvers, const StabilityMethod& method,
+                                const std::function<bool()>& going_on = {});
 
 /// Every method on every case, and IDA at tolerances 1e-3, 1e-4, … as long as a run costs no more than the
-/// dearest of ours.  `done` receives each case as it is finished.
+/// dearest of ours.
 std::vector<StabilityResult> stability_study(const std::vector<StabilityCase>& cases,
                                              const Registry& registry, const SolverFactory& solvers,
                                              const std::vector<StabilityMethod>& methods, bool with_ida,

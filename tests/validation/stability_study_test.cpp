@@ -140,12 +140,17 @@ TEST(StabilityStudy, IdaStandsBesideEveryRowAtItsCost) {
 }
 
 TEST(StabilityStudy, EndsWhereTheObserverSaysSo) {
-  int looks = 0;
+  const auto going_on = [](double, const std::string& what) {
+    return what.find("gl:2") == std::string::npos;  // the first run goes through, the second is not begun
+  };
   const auto results = stability_study({knife_edge(10), knife_edge(10)}, Registry::with_built_ins(), kinsol(),
-                                       {{"type1/midpoint", 2}, {"type1/gl:2", 4}}, false,
-                                       [&](double, const std::string&) { return ++looks < 2; });
+                                       {{"type1/midpoint", 2}, {"type1/gl:2", 4}}, false, going_on);
   ASSERT_EQ(results.size(), 1u);
   EXPECT_EQ(results[0].rows.size(), 1u);
+  int looks = 0;
+  const StabilityRow row = run_stability_case(knife_edge(400), Registry::with_built_ins(), kinsol(),
+                                              {"type1/midpoint", 2}, [&] { return ++looks < 11; });
+  EXPECT_EQ(row.steps, 10);
 }
 
 TEST(ScaledRows, AreTheSameConstraintInOtherUnits) {
