@@ -32,10 +32,20 @@ Watch energy_watch(const std::shared_ptr<const Scene>& scene, double scale) {
           .scale = scale};
 }
 
+/// The size of the energies at the start: |E|, |p·v|/2, and at rest at E = 0 the work |q|∞ |∂L/∂q|∞.
+double energy_size(const Scene& scene) {
+  const auto& [t, q, v, p] = scene.start;
+  Vector force(q.size()), momentum(q.size());
+  scene.lagrangian->gradient(t, q, v, force, momentum);
+  double size = std::max(std::abs(start_energy(scene)), 0.5 * std::abs(momentum.dot(v)));
+  if (size == 0.0) size = q.lpNorm<Eigen::Infinity>() * force.lpNorm<Eigen::Infinity>();
+  return size > 0.0 ? size : 1.0;
+}
+
 Watch invariant_watch(const Invariant& invariant, const Start& start) {
-  return {.name = invariant.name,
-          .at = invariant.at,
-          .scale = std::max(std::abs(invariant.at(start.time, start.q, start.v)), 1e-3)};
+  constexpr double zero = 1e-12;  // an invariant of about zero has no size of its own
+  const double size = std::abs(invariant.at(start.time, start.q, start.v));
+  return {.name = invariant.name, .at = invariant.at, .scale = size > zero ? size : 1.0};
 }
 
 /// A case on a scene over `steps` natural steps times `factor`, watched for the energy.
@@ -266,8 +276,7 @@ StabilityCase stability_case(const CatalogueScene& entry) {
   StabilityCase that{.group = scene->name, .value = 1.0, .name = scene->name, .scene = entry};
   that.step = entry.natural_step;
   that.t_end = entry.t_end;
-  if (keeps_energy(*scene))
-    that.watches.push_back(energy_watch(scene, std::max(std::abs(start_energy(*scene)), 1.0)));
+  if (keeps_energy(*scene)) that.watches.push_back(energy_watch(scene, energy_size(*scene)));
   for (const Invariant& invariant : entry.invariants)
     if (invariant.name != "energy") that.watches.push_back(invariant_watch(invariant, scene->start));
   return that;
