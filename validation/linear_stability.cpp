@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <diracstep/core/integrator.hpp>
@@ -11,8 +12,9 @@ namespace diracstep {
 namespace {
 
 constexpr double smallest_tested_step = 1e-2;
-constexpr int tested_per_decade = 40, kept_per_decade = 4, decades = 8;
+constexpr int tested_per_decade = 40, kept_per_decade = 20, decades = 8;
 constexpr int bisections = 30;
+constexpr double visible_peak = 1e-3;  // smaller ones are round-off
 
 Scene line(const std::string& name) {
   Scene scene;
@@ -58,20 +60,42 @@ double spectral_radius(const Column& first, const Column& second) {
 /// One of the two test equations: its growth over a step.
 using Growth = std::function<double(double step)>;
 
+bool stable(double growth) { return growth <= 1.0 + growth_tolerance; }  // false for NaN
+
+/// Halves [below, above], stable and not, to the limit.
+double limit_between(const Growth& growth, double below, double above) {
+  for (int i = 0; i < bisections; ++i) {
+    const double middle = 0.5 * (below + above);
+    (stable(growth(middle)) ? below : above) = middle;
+  }
+  return below;
+}
+
+/// Where growth is largest between the neighbours of a peak, by golden section; ends at the first unstable
+/// step.
+double climb(const Growth& growth, double left, double right) {
+  constexpr double golden = 0.6180339887498949;
+  for (int i = 0; i < bisections; ++i) {
+    const double a = right - golden * (right - left), b = left + golden * (right - left);
+    const double at_a = growth(a), at_b = growth(b);
+    if (!stable(at_a)) return a;
+    if (!stable(at_b)) return b;
+    (at_a > at_b ? right : left) = at_a > at_b ? b : a;
+  }
+  return 0.5 * (left + right);
+}
+
 double first_limit(const Growth& growth) {
-  const auto stable = [&](double step) { return growth(step) <= 1.0 + growth_tolerance; };  // false for NaN
-  double below = 0.0;
+  std::array<double, 3> steps{}, values{};  // the last three; a peak in the middle may hide a pole
   for (int k = 0; k <= decades * tested_per_decade; ++k) {
-    double above = smallest_tested_step * std::pow(10.0, static_cast<double>(k) / tested_per_decade);
-    if (stable(above)) {
-      below = above;
-      continue;
+    const double step = smallest_tested_step * std::pow(10.0, static_cast<double>(k) / tested_per_decade);
+    steps = {steps[1], steps[2], step};
+    values = {values[1], values[2], growth(step)};
+    if (k > 1 && values[1] > (1.0 + visible_peak) * std::max(values[0], values[2])) {
+      const double top = climb(growth, steps[0], steps[2]);
+      if (!stable(growth(top))) return limit_between(growth, steps[0], top);
     }
-    for (int i = 0; i < bisections; ++i) {
-      const double middle = 0.5 * (below + above);
-      (stable(middle) ? below : above) = middle;
-    }
-    return below;
+    if (!stable(values[2])) return limit_between(growth, steps[1], step);
   }
   return largest_tested_step;
 }

@@ -19,6 +19,7 @@ constexpr std::array<int, 5> markers{7, 5, 9, 13, 11};
 constexpr std::array<std::string_view, 3> dashes{"solid", "(9,5)", "(2,4)"};
 constexpr std::size_t fewest_cases = 3;
 constexpr double smallest_drawn = 1e-17, largest_drawn = 1e12;
+constexpr double smallest_growth = 1e-6;
 
 constexpr std::string_view style = R"(set encoding utf8
 set logscale xy
@@ -44,6 +45,7 @@ struct Curve {
 struct Picture {
   std::string title, x_label, y_label;
   std::vector<Curve> curves;
+  int marked = 1;  // each which point
 };
 
 std::string look(std::size_t k) {
@@ -64,8 +66,9 @@ std::string script(const Picture& picture) {
   for (std::size_t k = 0; k < picture.curves.size(); ++k)
     text += fmt::format("$curve{} << EOD\n{}EOD\n", k, picture.curves[k].data);
   for (std::size_t k = 0; k < picture.curves.size(); ++k)
-    text += fmt::format("{}$curve{} with linespoints {} title {}", k == 0 ? "plot " : ", \\\n     ", k,
-                        look(k), gnuplot_text(key(picture.curves[k])));
+    text += fmt::format("{}$curve{} with linespoints {} pointinterval {} title {}",
+                        k == 0 ? "plot " : ", \\\n     ", k, look(k), picture.marked,
+                        gnuplot_text(key(picture.curves[k])));
   return text + "\n";
 }
 
@@ -103,7 +106,8 @@ std::vector<Curve> growth_curves(const std::vector<LinearStability>& linear,
   std::vector<Curve> curves;
   for (const LinearStability& stability : linear) {
     curves.push_back({label(stability.method, stability.order)});
-    for (const GrowthPoint& point : stability.growth) curves.back().add(point.step, rounded(value(point)));
+    for (const GrowthPoint& point : stability.growth)
+      curves.back().add(point.step, std::max(rounded(value(point)), smallest_growth));
   }
   merge_equal(curves);
   return curves;
@@ -150,11 +154,11 @@ std::string draw_linear_stability(const std::vector<LinearStability>& linear,
                                   const std::filesystem::path& directory) {
   const std::string failure =
       draw({"oscillator", "hω", "spectral radius of a step",
-            growth_curves(linear, [](const GrowthPoint& point) { return point.oscillator; })},
+            growth_curves(linear, [](const GrowthPoint& point) { return point.oscillator; }), 20},
            directory, "growth_oscillator");
   if (!failure.empty()) return failure;
   return draw({"damped mass", "hγ", "|p1/p0|",
-               growth_curves(linear, [](const GrowthPoint& point) { return point.damping; })},
+               growth_curves(linear, [](const GrowthPoint& point) { return point.damping; }), 20},
               directory, "growth_damping");
 }
 

@@ -139,7 +139,7 @@ std::string markdown(const std::vector<Cells>& rows) {
 
 std::vector<Cells> linear_cells(const std::vector<LinearStability>& linear) {
   std::vector<Cells> rows{
-      {"method", "order", "hω up to", "radius at hω = 1e6", "hγ up to", "|R| at hγ = 1e6"}};
+      {"method", "order", "hω up to", "radius at hω = 1e6", "hγ up to", "damping at hγ = 1e6"}};
   for (const LinearStability& stability : linear) {
     const GrowthPoint& last = stability.growth.back();
     const auto radius = [](double value) {

@@ -53,10 +53,14 @@ TEST(LinearStability, GrowthHasItsClosedForm) {
 }
 
 TEST(LinearStability, ACompositionWithNegativeStepsMeetsItsPoleUnderDamping) {
-  const LinearStability stability = linear("type1/midpoint", 8);
-  EXPECT_EQ(stability.oscillator_limit, largest_tested_step);
-  EXPECT_GT(stability.damping_limit, 1.0);
-  EXPECT_LT(stability.damping_limit, 10.0);
+  // Suzuki's five steps: the middle one of -0.6579… h makes the midpoint rule divide by 1 - 0.3289… hγ.
+  const double middle = 1.0 - 4.0 / (4.0 - std::cbrt(4.0));
+  const LinearStability four = linear("type1/midpoint", 4);
+  EXPECT_EQ(four.oscillator_limit, largest_tested_step);
+  EXPECT_NEAR(four.damping_limit, -2.0 / middle, 0.01 * four.damping_limit);
+  const LinearStability eight = linear("type1/midpoint", 8);
+  EXPECT_EQ(eight.oscillator_limit, largest_tested_step);
+  EXPECT_LT(eight.damping_limit, 10.0);
 }
 
 TEST(LinearStability, AMethodWithoutForcesHasNoDampingLimit) {
