@@ -8,8 +8,8 @@ namespace diracstep {
 
 /// The stiff and extreme cases, group by group:
 ///
-///   stiff_spring_pendulum  k = 1e2 … 1e12 at the natural step, hω = 0.1 … 1e4, and at a fifth of it; from 1e8
-///                          on the reference is the rigid pendulum, which the motion approaches as g/k
+///   stiff_spring_pendulum  k = 1e2 … 1e12 at the natural step, hω = 0.1 … 1e4, and at a fifth of it;
+///                          from 1e8 on the reference is the rigid pendulum, approached as g/k
 ///   fput                   ω = 50 … 5e4; watched for the energy and its adiabatic invariant, the energy of
 ///   the
 ///                          stiff springs Σ (v_z² + ω² z²)/2
