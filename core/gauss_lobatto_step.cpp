@@ -98,6 +98,7 @@ class GaussLobattoStep final : public StepProblem {
   void guess(const Vector& v0, VectorRef x) override {
     for (int i = 0; i < s_; ++i) x.segment(n_ * i, n_) = v0;
     x.tail(m_ * s_).setZero();
+    if (lqq_.col(0).isZero(0.0)) sample_start(v0);
   }
 
   void residual(ConstVectorRef x, VectorRef f) override {
@@ -339,8 +340,8 @@ class GaussLobattoStep final : public StepProblem {
     for (const Rows& rows : rows_) {
       const auto places = rows.block->pattern().row_indices();
       for (int j = 0; j < s_; ++j) {
-        const double *const a = rows.at_lobatto.col(0).data(),
-                            *const lambda = x.data() + row_of(j) + rows.first;
+        const double *const a = rows.at_lobatto.col(0).data(), *const lambda =
+                                                                   x.data() + row_of(j) + rows.first;
         for (std::size_t k = 0; k < places.size(); ++k)
           largest = std::max(largest, std::abs(a[k] * lambda[places[k]]));
       }
@@ -348,7 +349,16 @@ class GaussLobattoStep final : public StepProblem {
     return largest + row_curvature_ * max_norm(q0_);
   }
 
-  /// Terms of the momentum rows are momenta, those of the last step where this one is not solved yet; a velocity of size |q|/h loses ε|q|/h to round-off.
+  /// Before the first solve: the derivatives at the start, for the round-off scales.
+  void sample_start(const Vector& v0) {
+    lagrangian_->gradient(step_.start, q0_, v0, lq_.col(0), lv_.col(0));
+    lagrangian_->hessian(step_.start, q0_, v0, lqq_.col(0), lqv_.col(0), lvv_.col(0));
+    curvature_ = std::max(curvature_, max_norm(lqq_.col(0)));
+    update_scales();
+  }
+
+  /// Terms of the momentum rows are momenta, those of the last step where this one is not solved yet; a
+  /// velocity of size |q|/h loses ε|q|/h to round-off.
   void update_scales() {
     const double h = std::abs(step_.size);
     const double size = max_norm(q0_), velocity = size / h;
@@ -381,8 +391,8 @@ class GaussLobattoStep final : public StepProblem {
   Columns impulses_;       ///< A(Q~_j)ᵀ λ_j
   Columns lqq_, lqv_, lvv_, fq_, fv_;
   double one_forms_ = 0.0, row_curvature_ = 0.0;  ///< of A(q0) and of ∂(Aᵀλ)/∂q
-  double curvature_ = 0.0;  ///< largest second derivative ∂²L/∂q² met
-  std::optional<StageSplitting> splitting_;  ///< small scenes with rows of one kind
+  double curvature_ = 0.0;                        ///< largest second derivative ∂²L/∂q² met
+  std::optional<StageSplitting> splitting_;       ///< small scenes with rows of one kind
   bool splitting_known_ = false, mass_known_ = false;
   bool affine_ = false;  ///< the residual is affine in the unknowns
   bool hessians_known_ = false, rows_at_gauss_known_ = false;

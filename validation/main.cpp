@@ -88,6 +88,7 @@ int main(int count, char** arguments) {
   add_orders(app, session);
   add_plan(app, session);
   add_run(app, session);
+  add_stability(app, session);
   add_study(app, session);
   take_plugins(app, session);
   return execute(app, session, count, arguments);

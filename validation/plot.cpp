@@ -59,13 +59,6 @@ struct Curve {
   std::string data;  // lines "cpu error"
 };
 
-/// A gnuplot string that is taken as it stands.
-std::string gnuplot_text(std::string_view text) {
-  std::string all = "'";
-  for (const char c : text) all += c == '\'' ? std::string("''") : std::string(1, c);
-  return all + "'";
-}
-
 Curve curve(const Study& study, const std::string& method, int order, std::string label, std::string look) {
   Curve drawn{std::move(label), std::move(look), {}};
   for (const StudyRow& row : study.rows)
@@ -138,6 +131,26 @@ std::string run_gnuplot(const std::string& script) {
 
 }  // namespace
 
+std::string gnuplot_text(std::string_view text) {
+  std::string all = "'";
+  for (const char c : text) all += c == '\'' ? std::string("''") : std::string(1, c);
+  return all + "'";
+}
+
+std::string render(const std::string& picture, const std::string& stem, std::size_t width,
+                   std::size_t height) {
+  std::string script;
+  for (const auto& [ending, settings] : terminals)
+    script += fmt::format("reset\nset terminal {}\nset output {}\n{}unset output\n", settings(width, height),
+                          gnuplot_text(stem + ending), picture);
+  const std::string failure = run_gnuplot(script);
+  if (!failure.empty()) return failure;
+  for (const auto& [ending, settings] : terminals)
+    if (std::error_code error; !std::filesystem::file_size(stem + ending, error))
+      return fmt::format("gnuplot did not write {}{}", stem, ending);
+  return {};
+}
+
 std::string work_precision_script(const Study& study) {
   const std::vector<Curve> all = curves(study);
   std::string script(style);
@@ -162,20 +175,6 @@ std::string file_name(std::string scene) {
 }
 
 namespace {
-
-/// Writes STEM.svg and STEM.png; empty, or what went wrong.
-std::string draw(const std::string& picture, const std::string& stem, std::size_t width, std::size_t height) {
-  std::string script;
-  for (const auto& [ending, settings] : terminals)
-    script += fmt::format("reset\nset terminal {}\nset output {}\n{}unset output\n", settings(width, height),
-                          gnuplot_text(stem + ending), picture);
-  const std::string failure = run_gnuplot(script);
-  if (!failure.empty()) return failure;
-  for (const auto& [ending, settings] : terminals)
-    if (std::error_code error; !std::filesystem::file_size(stem + ending, error))
-      return fmt::format("gnuplot did not write {}{}", stem, ending);
-  return {};
-}
 
 std::string block(std::size_t number, const std::vector<double>& x, const std::vector<double>& y) {
   std::string data = fmt::format("$curve{} << EOD\n", number);
@@ -234,14 +233,14 @@ std::string draw_work_precision(const Study& study, const std::filesystem::path&
   if (keys == 0) return study.scene + ": no run succeeded, so there is nothing to draw";
   const std::size_t width = methods_of(study).size() > 1 ? 980 : 720;  // the key names the methods then
   const std::size_t height = std::max<std::size_t>(480, 90 + 28 * keys);
-  return draw(work_precision_script(study), (directory / file_name(study.scene)).string(), width, height);
+  return render(work_precision_script(study), (directory / file_name(study.scene)).string(), width, height);
 }
 
 std::string draw_history(const History& history, const std::string& scene,
                          const std::filesystem::path& directory) {
   const std::string stem = (directory / file_name(scene)).string();
-  const std::string failure = draw(history_script(history, scene), stem + "-history", 760, 420);
-  return failure.empty() ? draw(motion_script(history, scene), stem + "-motion", 520, 420) : failure;
+  const std::string failure = render(history_script(history, scene), stem + "-history", 760, 420);
+  return failure.empty() ? render(motion_script(history, scene), stem + "-motion", 520, 420) : failure;
 }
 
 std::string draw_summary(const std::vector<Study>& studies, const std::filesystem::path& directory) {
@@ -271,7 +270,7 @@ std::string draw_summary(const std::vector<Study>& studies, const std::filesyste
       "plot $ida with points pointtype 5 pointsize 1.2 linecolor '#000000' title 'IDA', $erk with points "
       "pointtype 9 "
       "pointsize 1.3 linecolor '#D55E00' title 'explicit RK 8'\n";
-  return draw(script, (directory / "summary").string(), 860, std::max<std::size_t>(260, 120 + 34 * place));
+  return render(script, (directory / "summary").string(), 860, std::max<std::size_t>(260, 120 + 34 * place));
 }
 
 }  // namespace diracstep

@@ -3,6 +3,7 @@
 #include <diracstep/validation/history.hpp>
 #include <filesystem>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace diracstep {
@@ -27,5 +28,12 @@ std::string draw_summary(const std::vector<Study>& studies, const std::filesyste
 
 /// The stem of a scene's files in a directory.
 std::string file_name(std::string scene);
+/// A gnuplot string that is taken as it stands.
+std::string gnuplot_text(std::string_view text);
+
+/// Writes STEM.svg and STEM.png of a script that sets neither terminal nor output; width and height in
+/// points. Empty, or what went wrong.
+std::string render(const std::string& picture, const std::string& stem, std::size_t width,
+                   std::size_t height);
 
 }  // namespace diracstep

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <CLI/App.hpp>
+#include <algorithm>
 #include <cmath>
 #include <diracstep/core/errors.hpp>
 #include <diracstep/core/run.hpp>
@@ -9,6 +10,7 @@
 #include <diracstep/validation/command/run_report.hpp>
 #include <diracstep/validation/command/trajectory_file.hpp>
 #include <diracstep/validation/command/verbs.hpp>
+#include <diracstep/validation/energy_doubt.hpp>
 #include <diracstep/validation/progress.hpp>
 #include <memory>
 #include <optional>
@@ -35,9 +37,15 @@ struct Options {
 class Trajectory {
  public:
   Trajectory(Integrator& integrator, Momentum momentum, long every, TrajectoryFile* file, RunResult& result)
-      : integrator_(integrator), momentum_(momentum), every_(every), file_(file), result_(result) {}
+      : integrator_(integrator),
+        momentum_(momentum),
+        every_(every),
+        file_(file),
+        result_(result),
+        doubt_(integrator.scene()) {}
 
   void run(long steps) {
+    const long every_look = std::max(1L, steps / points_looked_at);
     keep();
     for (long k = 1; k <= steps && result_.failure.empty() && !interrupted(); ++k) {
       const StepReport report = integrator_.step();
@@ -45,16 +53,20 @@ class Trajectory {
         result_.failure = report.failure;
       else if (k == steps || (file_ != nullptr && k % every_ == 0))
         keep();
-      if (k % steps_between_looks == 0) show(k, steps);
+      else if (k % every_look == 0)
+        look();
+      if (k % steps_between_shows == 0) show(k, steps);
     }
     if (result_.failure.empty() && interrupted() && integrator_.work().steps < steps)
       result_.failure = fmt::format("interrupted at t = {:.17g}", integrator_.time());
     if (integrator_.time() != kept_time_) keep();
     result_.work = integrator_.work();
+    result_.doubt = doubt_.text();
   }
 
  private:
-  static constexpr long steps_between_looks = 256;
+  static constexpr long steps_between_shows = 256;
+  static constexpr long points_looked_at = 400;
 
   void keep() {
     Sample sample;
@@ -66,8 +78,14 @@ class Trajectory {
       return;
     }
     kept_time_ = integrator_.time();
+    doubt_.see(sample);
     if (file_ != nullptr) file_->write(sample);
     result_.end = std::move(sample);
+  }
+
+  /// At the energy only; a point that cannot be read is told of where it is kept.
+  void look() {
+    if (integrator_.sample(Momentum::projected, looked_at_).ok()) doubt_.see(looked_at_);
   }
 
   void show(long k, long steps) {
@@ -80,6 +98,8 @@ class Trajectory {
   long every_;
   TrajectoryFile* file_;
   RunResult& result_;
+  EnergyDoubt doubt_;
+  Sample looked_at_;
   double kept_time_ = std::nan("");
   Progress progress_;
 };
@@ -118,6 +138,7 @@ void run(const Options& options, Session& session) {
     print(run_json(result, entry, integrator.options()));
   else if (!file)
     print(run_text(result, entry, integrator.options()));
+  if (!result.doubt.empty()) say(result.doubt);
   if (result.failure.empty()) return;
   say(result.failure);
   session.exit_status = failed;

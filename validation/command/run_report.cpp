@@ -81,6 +81,7 @@ std::string run_json(const RunResult& result, const CatalogueScene& entry, const
             {"step", options.step},
             {"status", result.failure.empty() ? "ok" : result.failure}};
   for (const auto& [key, value] : entry.parameters) json["parameters"][key] = number(value);
+  json["doubt"] = result.doubt.empty() ? Json(nullptr) : Json(result.doubt);
   json["end"] = end_json(result, *entry.scene);
   json["error_q"] = number(check.error_q);
   json["error_p"] = number(check.error_p);

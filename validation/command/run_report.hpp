@@ -11,9 +11,10 @@ struct RunResult {
   Momentum momentum = Momentum::projected;
   Sample end;  ///< the last point that could be read; empty columns where there is none
   Work work;
-  StudyRow check;   ///< errors against the reference at that time, rows and energy
-  std::string out;  ///< the file written, if any
-  long lines = 0;   ///< points in it
+  StudyRow check;     ///< errors against the reference at that time, rows and energy
+  std::string doubt;  ///< empty, or why the points are not to be believed
+  std::string out;    ///< the file written, if any
+  long lines = 0;     ///< points in it
 
   bool has_end() const { return end.q.size() > 0; }
 };

@@ -2,12 +2,11 @@
 
 #include <CLI/App.hpp>
 #include <algorithm>
-#include <cerrno>
-#include <cstring>
 #include <diracstep/core/errors.hpp>
 #include <diracstep/validation/build_facts.hpp>
 #include <diracstep/validation/command/arguments.hpp>
 #include <diracstep/validation/command/interrupt.hpp>
+#include <diracstep/validation/command/output_file.hpp>
 #include <diracstep/validation/command/scene_selection.hpp>
 #include <diracstep/validation/command/verbs.hpp>
 #include <diracstep/validation/plot.hpp>
@@ -49,18 +48,6 @@ struct Options {
 /// Where a study of no named scenes leaves its report.
 const std::string default_directory = "diracstep-study";
 
-/// Replaces a file; what went wrong, or empty.
-std::string write_file(const std::filesystem::path& path, const std::string& text) {
-  std::FILE* file = std::fopen(path.c_str(), "w");
-  if (file == nullptr) return fmt::format("'{}' cannot be written: {}", path.string(), std::strerror(errno));
-  const bool written =
-      std::fwrite(text.data(), 1, text.size(), file) == text.size() && std::fflush(file) == 0;
-  const int error = errno;
-  if (std::fclose(file) == 0 && written) return {};
-  return fmt::format("'{}' could not be written in full: {}", path.string(),
-                     std::strerror(written ? errno : error));
-}
-
 constexpr const char* explanation =
     "# CPU time to an error\n\n"
     "Written by `diracstep study SCENE... --methods A,B,... --table FILE`: the thread's CPU time at which "
@@ -81,10 +68,7 @@ std::string tables(const std::vector<Study>& studies) {
 /// The directory of --out: study.csv, study.json, the pictures and report.html, renewed after each scene.
 class OutputDirectory {
  public:
-  explicit OutputDirectory(const std::string& path) : path_(path) {
-    std::error_code error;
-    std::filesystem::create_directories(path_, error);
-    if (error) throw Misuse(fmt::format("--out: '{}' cannot be made: {}", path, error.message()));
+  explicit OutputDirectory(const std::string& path) : path_(output_directory(path)) {
     if (const auto failure = write_tables({}); !failure.empty()) throw Misuse("--out: " + failure);
   }
 
@@ -197,7 +181,7 @@ PageEntry page_entry(const Study& study, const CatalogueScene& scene, const Sess
 }
 
 /// Where the report goes: --out, or a default where no scenes are named.
-std::optional<OutputDirectory> output_directory(const Options& options) {
+std::optional<OutputDirectory> report_directory(const Options& options) {
   const bool nothing_named = options.scenes.empty() && options.more_scenes.empty();
   if (!options.out.empty()) return OutputDirectory(options.out);
   if (nothing_named) return OutputDirectory(default_directory);
@@ -208,7 +192,7 @@ void study(const Options& options, Session& session) {
   const std::vector<CatalogueScene> scenes = chosen_scenes(options, session);
   const StudyOptions chosen = study_options(options);
   const std::string before = options.compare.empty() ? "" : read_file(options.compare);
-  const std::optional<OutputDirectory> out = output_directory(options);
+  const std::optional<OutputDirectory> out = report_directory(options);
   for (const auto& [name, value] : build_facts()) say(name + ": " + value);
   std::vector<Study> studies;
   std::vector<PageEntry> page;
