@@ -36,8 +36,7 @@ void compare(const char* scene, const char* method, int sites, double step) {
 int main() {
   std::printf("%-14s%-15s%6s%10s%10s%8s\n", "scene", "method", "n+m", "full, ns", "KLU, ns", "ratio");
   for (const char* method : {"type1/midpoint", "type1/gl:3"}) {
-    for (const int links : {2, 4, 6, 8, 12, 16, 24, 32})
-      compare("hanging_chain", method, links, 0.1 / links);
+    for (const int links : {2, 4, 6, 8, 12, 16, 24, 32}) compare("hanging_chain", method, links, 0.1 / links);
     for (const int sites : {4, 8, 12, 16, 24, 32, 48, 64}) compare("toda_200", method, sites, 0.05);
   }
 }

@@ -45,10 +45,12 @@ int main() {
     for (int round = 0; round < 3; ++round) {
       const auto before = std::chrono::steady_clock::now();
       auto found = ends(entry, starts, threads);
-      fewest = std::min(fewest,
-                        std::chrono::duration<double>(std::chrono::steady_clock::now() - before).count());
-      if (threads == 1) serial = std::move(found);
-      else same = same && same_bits(found, serial);
+      fewest =
+          std::min(fewest, std::chrono::duration<double>(std::chrono::steady_clock::now() - before).count());
+      if (threads == 1)
+        serial = std::move(found);
+      else
+        same = same && same_bits(found, serial);
     }
     if (threads == 1) alone = fewest;
     std::printf("%8d%12.3f%10.2f%12s\n", threads, fewest, alone / fewest, same ? "yes" : "NO");

@@ -339,8 +339,8 @@ class GaussLobattoStep final : public StepProblem {
     for (const Rows& rows : rows_) {
       const auto places = rows.block->pattern().row_indices();
       for (int j = 0; j < s_; ++j) {
-        const double *const a = rows.at_lobatto.col(0).data(),
-                            *const lambda = x.data() + row_of(j) + rows.first;
+        const double *const a = rows.at_lobatto.col(0).data(), *const lambda =
+                                                                   x.data() + row_of(j) + rows.first;
         for (std::size_t k = 0; k < places.size(); ++k)
           largest = std::max(largest, std::abs(a[k] * lambda[places[k]]));
       }
@@ -348,7 +348,8 @@ class GaussLobattoStep final : public StepProblem {
     return largest + row_curvature_ * max_norm(q0_);
   }
 
-  /// Terms of the momentum rows are momenta, those of the last step where this one is not solved yet; a velocity of size |q|/h loses ε|q|/h to round-off.
+  /// Terms of the momentum rows are momenta, those of the last step where this one is not solved yet; a
+  /// velocity of size |q|/h loses ε|q|/h to round-off.
   void update_scales() {
     const double h = std::abs(step_.size);
     const double size = max_norm(q0_), velocity = size / h;
@@ -381,8 +382,8 @@ class GaussLobattoStep final : public StepProblem {
   Columns impulses_;       ///< A(Q~_j)ᵀ λ_j
   Columns lqq_, lqv_, lvv_, fq_, fv_;
   double one_forms_ = 0.0, row_curvature_ = 0.0;  ///< of A(q0) and of ∂(Aᵀλ)/∂q
-  double curvature_ = 0.0;  ///< largest second derivative ∂²L/∂q² met
-  std::optional<StageSplitting> splitting_;  ///< small scenes with rows of one kind
+  double curvature_ = 0.0;                        ///< largest second derivative ∂²L/∂q² met
+  std::optional<StageSplitting> splitting_;       ///< small scenes with rows of one kind
   bool splitting_known_ = false, mass_known_ = false;
   bool affine_ = false;  ///< the residual is affine in the unknowns
   bool hessians_known_ = false, rows_at_gauss_known_ = false;

@@ -29,10 +29,10 @@ constexpr double linear_step_tolerance = 1e-14;
 /// solves, once there is a history to guess from.
 constexpr int quick = 6, solves_to_judge = 12;
 
-/// KINSOL around our own direct linear solver.  KINSOL believes that it gets a new Jacobian in each iteration;
-/// JacobianFactors decides what it does get.  The SUNMatrix that KINSOL carries around is an empty shell.
-/// Unlike the linear solvers that come with SUNDIALS, ours keeps its symbolic work from one call of KINSol to
-/// the next.
+/// KINSOL around our own direct linear solver.  KINSOL believes that it gets a new Jacobian in each
+/// iteration; JacobianFactors decides what it does get.  The SUNMatrix that KINSOL carries around is an empty
+/// shell. Unlike the linear solvers that come with SUNDIALS, ours keeps its symbolic work from one call of
+/// KINSol to the next.
 class KinsolSolver final : public NonlinearSolver {
  public:
   KinsolSolver(NonlinearProblem& problem, KinsolOptions options)
@@ -230,8 +230,8 @@ class KinsolSolver final : public NonlinearSolver {
     });
   }
 
-  /// g = x − P⁻¹F(x); x = g as well, which ends the iteration, where the residual is round-off; a failure where it
-  /// grows.
+  /// g = x − P⁻¹F(x); x = g as well, which ends the iteration, where the residual is round-off; a failure
+  /// where it grows.
   int contract(Eigen::Map<Vector> x, Eigen::Map<Vector> g) {
     const double norm = scaled_norm();
     const bool stagnates = norm > smallest_norm_ / 2.0;
@@ -309,7 +309,7 @@ class KinsolSolver final : public NonlinearSolver {
   std::exception_ptr exception_;
   int strategy_ = KIN_NONE;
   int judged_solves_ = 0, judged_iterations_ = 0;
-  bool given_up_ = false;  ///< the fixed-point iteration was slow
+  bool given_up_ = false;            ///< the fixed-point iteration was slow
   double smallest_norm_ = HUGE_VAL;  ///< of the fixed-point iteration so far
   bool singular_ = false;
   bool not_finite_ = false;
