@@ -1,6 +1,7 @@
 /// Large scenes: processor time of a step and resident memory, for each unknown, from a thousand to a million
 /// unknowns; beside it the bare KLU work and evaluations of such a step.
-///   large_scenes [LARGEST]   default 1e6 unknowns, some minutes; memory is read from /proc and left out elsewhere
+///   large_scenes [LARGEST]   default 1e6 unknowns, some minutes; memory is read from /proc and left out
+///   elsewhere
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -44,11 +45,10 @@ void measure(const char* scene, const char* method, int unknowns, int rows_of_ea
                                      steps, 3);
   const Work end = integrator.work();
   const auto each = [&](long from, long to) { return double(to - from) / double(end.steps - start.steps); };
-  std::printf("%-14s%-17s%10d%12.1f%12.2f%12.2f%12.2f%12.3f\n", scene, method, unknowns, ns[0] / unknowns,
-              each(start.iterations, end.iterations),
-              each(start.residual_evaluations, end.residual_evaluations),
-              each(start.jacobian_evaluations, end.jacobian_evaluations),
-              (resident_kilobytes() - before) / unknowns);
+  std::printf(
+      "%-14s%-17s%10d%12.1f%12.2f%12.2f%12.2f%12.3f\n", scene, method, unknowns, ns[0] / unknowns,
+      each(start.iterations, end.iterations), each(start.residual_evaluations, end.residual_evaluations),
+      each(start.jacobian_evaluations, end.jacobian_evaluations), (resident_kilobytes() - before) / unknowns);
 }
 
 constexpr const char* usage = "large_scenes [LARGEST | SCENE METHOD UNKNOWNS]\n";

@@ -47,7 +47,8 @@ class EigenNewton final : public NonlinearSolver {
       double largest = 0.0;
       Eigen::Index row = 0;
       for (const ResidualBlock& block : problem_.blocks()) {
-        largest = std::max(largest, f_.segment(row, block.rows).template lpNorm<Eigen::Infinity>() / block.scale);
+        largest =
+            std::max(largest, f_.segment(row, block.rows).template lpNorm<Eigen::Infinity>() / block.scale);
         row += block.rows;
       }
       return largest;
@@ -300,9 +301,10 @@ void compare(const char* name) {
   };
   const auto ns = fewest_nanoseconds({run(library), run(newton), run(hand), run(jets)}, steps, rounds);
   const auto each = [](long iterations) { return static_cast<double>(iterations) / (rounds * steps); };
-  std::printf("%-12s%9d%8.0f%8.0f%8.0f%9.0f%10.2f%9.2f%10.2f%8.2f%9.2f%9.0e\n", name, S::n + S::m, ns[0], ns[3], ns[1], ns[2],
-              ns[0] / ns[1], ns[0] / ns[2], each(library.work().iterations), each(newton.work().iterations),
-              each(hand.iterations), (library.position() - hand.position()).norm());
+  std::printf("%-12s%9d%8.0f%8.0f%8.0f%9.0f%10.2f%9.2f%10.2f%8.2f%9.2f%9.0e\n", name, S::n + S::m, ns[0],
+              ns[3], ns[1], ns[2], ns[0] / ns[1], ns[0] / ns[2], each(library.work().iterations),
+              each(newton.work().iterations), each(hand.iterations),
+              (library.position() - hand.position()).norm());
 }
 
 }  // namespace

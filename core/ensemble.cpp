@@ -68,8 +68,7 @@ std::vector<EnsembleMember> run_ensemble(const std::shared_ptr<const Scene>& sce
   };
   {
     std::vector<std::jthread> pool;
-    for (std::size_t k = 1; k < integrators.size(); ++k)
-      pool.emplace_back([&, k] { work(*integrators[k]); });
+    for (std::size_t k = 1; k < integrators.size(); ++k) pool.emplace_back([&, k] { work(*integrators[k]); });
     if (!integrators.empty()) work(*integrators.front());
   }
   exception.rethrow();

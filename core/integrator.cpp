@@ -259,6 +259,7 @@ SolveReport Integrator::solve_velocity(double t, Vector& v) {
   if (phase_space_velocity_problem_) {
     phase_space_velocity_problem_->begin(t, q_);
     v = v_;
+    velocity_solver_->reset();
     return velocity_solver_->solve(v);
   }
   velocity_problem_.begin(t, q_, p_);

@@ -334,11 +334,8 @@ class ImplicitStep final : public StepProblem {
         graph_.starts_from_position ? std::abs(data_.step.size) * max_norm(data_.p0) : max_norm(data_.q0);
     // The impulse, as large as it was in the last step.
     const double impulse =
-        graph_.starts_from_position && m_ > 0
-            ? data_.impulse_scale(last_x_.segment(n_, m_))
-            : 0.0;
-    blocks_[0].scale =
-        usable_scale(std::max({own, impulse, std::abs(row_factor()) * cancelling_terms(0)}));
+        graph_.starts_from_position && m_ > 0 ? data_.impulse_scale(last_x_.segment(n_, m_)) : 0.0;
+    blocks_[0].scale = usable_scale(std::max({own, impulse, std::abs(row_factor()) * cancelling_terms(0)}));
     if (m_ > 0) blocks_[1].scale = data_.constraint_scale();
     if (inner_ == 0) return;
     double largest = 0.0;

@@ -25,17 +25,21 @@ constexpr double round_off = 16.0;
 /// correction has to be this small.
 constexpr double linear_step_tolerance = 1e-14;
 
-/// KINSOL around our own direct linear solver.  KINSOL believes that it gets a new Jacobian in each iteration;
-/// JacobianFactors decides what it does get.  The SUNMatrix that KINSOL carries around is an empty shell.
-/// Unlike the linear solvers that come with SUNDIALS, ours keeps its symbolic work from one call of KINSol to
-/// the next.
+/// A fixed-point iteration of so many iterations costs what Newton's method does.  It is judged by its first
+/// solves, once there is a history to guess from.
+constexpr int quick = 6, solves_to_judge = 12;
+
+/// KINSOL around our own direct linear solver.  KINSOL believes that it gets a new Jacobian in each
+/// iteration; JacobianFactors decides what it does get.  The SUNMatrix that KINSOL carries around is an empty
+/// shell. Unlike the linear solvers that come with SUNDIALS, ours keeps its symbolic work from one call of
+/// KINSol to the next.
 class KinsolSolver final : public NonlinearSolver {
  public:
   KinsolSolver(NonlinearProblem& problem, KinsolOptions options)
       : problem_(problem),
         options_(options),
         factors_(problem, options.jacobian),
-        fixed_point_(options.iteration == Iteration::fixed_point && problem.has_splitting()) {
+        fixed_point_(options.iteration != Iteration::newton && problem.has_splitting()) {
     if (problem.blocks().size() > report_.residual_norms.size())
       throw Misuse("a problem with " + std::to_string(problem.blocks().size()) +
                    " residual blocks; at most 4 are reported");
@@ -67,25 +71,41 @@ class KinsolSolver final : public NonlinearSolver {
     guess_ = x;
     set_scales();
     report_.status = SolveStatus::no_convergence;
-    if (fixed_point_) attempt(KIN_FP);
+    if (fixed_point_ && !given_up_) attempt(KIN_FP);
+    if (options_.iteration == Iteration::automatic && fixed_point_) judge_fixed_point();
     if (!report_.ok()) attempt(KIN_NONE);
     if (!report_.ok()) attempt(KIN_LINESEARCH);
     x = unknowns();
     return report_;
   }
 
-  void reset() override { factors_.reset(); }
+  void reset() override {
+    factors_.reset();
+    judged_solves_ = judged_iterations_ = 0;
+    given_up_ = false;
+  }
 
   std::string description() const override { return std::string("KINSOL, ") + factors_.name(); }
   std::string strategy() const override {
     const std::string newton = "Newton's method, " + factors_.policy();
-    return fixed_point_ ? "fixed-point iteration; where it fails " + newton : newton;
+    if (!fixed_point_) return newton;
+    const bool measured = options_.iteration == Iteration::automatic;
+    return (measured ? "fixed-point iteration while it is quick; otherwise "
+                     : "fixed-point iteration; where it fails ") +
+           newton;
   }
 
  private:
   void* memory() const { return kinsol_.get(); }
 
   Eigen::Map<Vector> unknowns() const { return {data_of(x_.get()), guess_.size()}; }
+
+  /// Newton's method from now on, where the fixed-point iteration has turned out to be slow.
+  void judge_fixed_point() {
+    if (given_up_ || judged_solves_ == solves_to_judge) return;
+    judged_iterations_ += report_.ok() ? report_.iterations : options_.max_iterations;
+    given_up_ = ++judged_solves_ == solves_to_judge && judged_iterations_ > quick * solves_to_judge;
+  }
 
   /// From the guess to a status.
   void attempt(int strategy) {
@@ -213,8 +233,8 @@ class KinsolSolver final : public NonlinearSolver {
     });
   }
 
-  /// g = x − P⁻¹F(x); x = g as well, which ends the iteration, where the residual is round-off; a failure where it
-  /// grows.
+  /// g = x − P⁻¹F(x); x = g as well, which ends the iteration, where the residual is round-off; a failure
+  /// where it grows.
   int contract(Eigen::Map<Vector> x, Eigen::Map<Vector> g) {
     const double norm = scaled_norm();
     const bool stagnates = norm > smallest_norm_ / 2.0;
@@ -291,6 +311,8 @@ class KinsolSolver final : public NonlinearSolver {
   SolveReport report_;
   std::exception_ptr exception_;
   int strategy_ = KIN_NONE;
+  int judged_solves_ = 0, judged_iterations_ = 0;
+  bool given_up_ = false;            ///< the fixed-point iteration was slow
   double smallest_norm_ = HUGE_VAL;  ///< of the fixed-point iteration so far
   bool singular_ = false;
   bool not_finite_ = false;
@@ -312,8 +334,10 @@ constexpr std::array<std::pair<const char*, JacobianPolicy>, 4> policies{
      {"fresh", JacobianPolicy::fresh},
      {"per-step", JacobianPolicy::per_step},
      {"kept", JacobianPolicy::kept}}};
-constexpr std::array<std::pair<const char*, Iteration>, 2> iterations{
-    {{"newton", Iteration::newton}, {"fixed-point", Iteration::fixed_point}}};
+constexpr std::array<std::pair<const char*, Iteration>, 3> iterations{
+    {{"newton", Iteration::newton},
+     {"fixed-point", Iteration::fixed_point},
+     {"automatic", Iteration::automatic}}};
 
 }  // namespace
 

@@ -17,6 +17,8 @@ enum class Iteration {
   newton,
   fixed_point,  ///< x ← x − P⁻¹F(x) by KINSOL's fixed-point solver with the problem's splitting P; Newton's
                 ///< method where there is none or it does not converge
+  automatic,  ///< fixed-point while a solve takes no more than six iterations, which is what two of
+              ///< Newton's method cost, then Newton's method
 };
 
 /// Settings of the iteration; the defaults solve a step to round-off.

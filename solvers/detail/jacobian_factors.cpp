@@ -13,8 +13,10 @@ constexpr int patience = 6;
 constexpr double done = 1e-14;
 /// Where an old Jacobian fails, so many solves do without one before it is tried again.
 constexpr int fresh_starts_after_failure = 16;
-/// So many different step sizes keep factors of their own: those of a symmetric composition of 31 stages.
-constexpr std::size_t most_parameters = 16;
+/// So many different step sizes keep factors of their own: those of a symmetric composition of 31 stages, and
+/// of Suzuki's composition where factors take much memory.
+constexpr std::size_t most_parameters = 16, most_parameters_of_large = 2;
+constexpr int large = 10000;
 
 constexpr double none = std::numeric_limits<double>::quiet_NaN();
 
@@ -52,8 +54,8 @@ bool JacobianFactors::select(double parameter) {
       return true;
     }
   const bool first = std::isnan(factors_.front().parameter);
-  if (!first && factors_.size() < most_parameters)
-    factors_.push_back({none, make_linear_solver(problem_.pattern())});
+  const std::size_t most = problem_.size() < large ? most_parameters : most_parameters_of_large;
+  if (!first && factors_.size() < most) factors_.push_back({none, make_linear_solver(problem_.pattern())});
   factors_.back().parameter = parameter;
   current_ = factors_.back().solver.get();
   return false;

@@ -21,7 +21,7 @@ struct Operations {
   /// z_i = entry(i).
   template <class Entry>
   static void fill(N_Vector z, Entry entry) {
-    double* const to = data_of(z);
+    double *const to = data_of(z);
     const long n = length(z);
     for (long i = 0; i < n; ++i) to[i] = entry(i);
   }
@@ -30,7 +30,7 @@ struct Operations {
     fill(z, [c](long) { return c; });
   }
   static void scale(sunrealtype c, N_Vector x, N_Vector z) {
-    const double* const a = data_of(x);
+    const double *const a = data_of(x);
     fill(z, [=](long i) { return c * a[i]; });
   }
   static void linear_sum(sunrealtype c, N_Vector x, sunrealtype d, N_Vector y, N_Vector z) {
@@ -46,22 +46,22 @@ struct Operations {
     fill(z, [=](long i) { return a[i] / b[i]; });
   }
   static void absolute(N_Vector x, N_Vector z) {
-    const double* const a = data_of(x);
+    const double *const a = data_of(x);
     fill(z, [=](long i) { return std::abs(a[i]); });
   }
   static void inverse(N_Vector x, N_Vector z) {
-    const double* const a = data_of(x);
+    const double *const a = data_of(x);
     fill(z, [=](long i) { return 1.0 / a[i]; });
   }
   static sunrealtype max_norm(N_Vector x) {
-    const double* const a = data_of(x);
+    const double *const a = data_of(x);
     const long n = length(x);
     double largest = 0.0;
     for (long i = 0; i < n; ++i) largest = std::max(largest, std::abs(a[i]));
     return largest;
   }
   static sunrealtype minimum(N_Vector x) {
-    const double* const a = data_of(x);
+    const double *const a = data_of(x);
     return *std::min_element(a, a + length(x));
   }
   static sunrealtype dot(N_Vector x, N_Vector y) {
@@ -79,7 +79,7 @@ struct Operations {
     return std::sqrt(sum);
   }
 
-  static void install(_generic_N_Vector_Ops& ops) {
+  static void install(_generic_N_Vector_Ops &ops) {
     ops.nvconst = constant;
     ops.nvscale = scale;
     ops.nvlinearsum = linear_sum;

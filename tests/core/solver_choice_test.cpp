@@ -48,8 +48,8 @@ TEST(ConstantJacobian, QuadraticLagrangianWithConstantRowsFactorsOnceForARun) {
     for (const int limit : {40, 0}) {
       const auto scene = linear_scene(blocks);
       for (const char* method : {"type1/midpoint", "type1/gl:2", "type1/gl:4"})
-        EXPECT_EQ(
-            work_of(scene, {.method = method, .step = 0.1, .dense_limit = limit}).jacobian_evaluations, 1)
+        EXPECT_EQ(work_of(scene, {.method = method, .step = 0.1, .dense_limit = limit}).jacobian_evaluations,
+                  1)
             << method;
       // Suzuki's composition has two different fractions.
       EXPECT_EQ(work_of(scene, {.method = "type1/midpoint", .order = 4, .step = 0.1, .dense_limit = limit})
@@ -71,12 +71,11 @@ TEST(ConstantJacobian, IsNotSeenWhereSomethingVaries) {
   const auto pushed = affine<3, 1>(
       Flat{}, []<class T>(const std::array<T, 3>&, const T& t) { return std::array<T, 1>{t * t}; });
   EXPECT_TRUE(pushed->constant());
-  const auto bent = affine<3, 1>(
-      Flat{}, []<class T>(const std::array<T, 3>& q) { return std::array<T, 1>{0.1 * q[1]}; });
+  const auto bent =
+      affine<3, 1>(Flat{}, []<class T>(const std::array<T, 3>& q) { return std::array<T, 1>{0.1 * q[1]}; });
   EXPECT_FALSE(bent->constant());
-  const auto turning = holonomic<3, 1>([]<class T>(const std::array<T, 3>& q, const T& t) {
-    return std::array<T, 1>{q[0] + t * q[2]};
-  });
+  const auto turning = holonomic<3, 1>(
+      []<class T>(const std::array<T, 3>& q, const T& t) { return std::array<T, 1>{q[0] + t * q[2]}; });
   EXPECT_FALSE(turning->constant());
 }
 

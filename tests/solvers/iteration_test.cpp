@@ -142,6 +142,21 @@ TEST(FixedPoint, GivesWayToNewtonWhereItDiverges) {
   EXPECT_LT(problem.residual_norm(x), 1e-14);
 }
 
+TEST(FixedPoint, AutomaticKeepsItOnlyWhereItIsQuick) {
+  Ring near(6, 1e-5), far(6, 0.05);
+  for (Ring* problem : {&near, &far}) {
+    const auto solver = kinsol({.iteration = Iteration::automatic})(*problem);
+    Vector x = Vector::Zero(6);
+    for (int k = 0; k < 30; ++k) {
+      problem->turn(0.2 * k);
+      EXPECT_TRUE(solver->solve(x).ok());
+      EXPECT_LT(problem->residual_norm(x), 2e-14);
+    }
+  }
+  EXPECT_EQ(near.jacobians, 0);
+  EXPECT_GT(far.jacobians, 15);
+}
+
 TEST(Names, AreReadAndUnknownOnesRefusedWithTheAllowedOnes) {
   EXPECT_EQ(jacobian_policy("per-step"), JacobianPolicy::per_step);
   EXPECT_STREQ(name(JacobianPolicy::kept), "kept");

@@ -173,19 +173,21 @@ class Catalogue : public ::testing::TestWithParam<Bounds> {};
 
 TEST_P(Catalogue, ErrorFallsWithTheTolerance) {
   const CatalogueScene entry = make_scene(GetParam().scene);
-  double previous = infinite, rtol = 1e-6;
+  double first = infinite, last = infinite, rtol = 1e-6;
   for (const double bound : GetParam().error) {
     const ReferenceRun run = integrate_with_ida(*entry.scene, entry.t_end, at(rtol));
     ASSERT_TRUE(run.ok()) << run.failure;
     EXPECT_EQ(run.end.time, entry.t_end);
     const double reached = error(entry, run.end);
     EXPECT_LT(reached, bound) << "rtol " << rtol;
-    EXPECT_LT(reached, 0.5 * previous) << "rtol " << rtol;
     // The rows are equations of the system: only the Newton iteration's tolerance is left in them.
     EXPECT_LT(row_residual(*entry.scene, run.end), rtol) << "rtol " << rtol;
-    previous = reached;
+    if (first == infinite) first = reached;
+    last = reached;
     rtol *= 1e-2;
   }
+  // A single tolerance may be lucky: the round-off of the start alone moves its error tenfold.
+  EXPECT_LT(last, 1e-2 * first);
 }
 
 TEST_P(Catalogue, EveryToleranceCompletes) {

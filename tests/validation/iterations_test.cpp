@@ -24,13 +24,12 @@ class Iterations : public ::testing::TestWithParam<Case> {};
 TEST_P(Iterations, OfComposedMidpointStepsAreThoseOfAGoodPredictor) {
   const Case& c = GetParam();
   const CatalogueScene entry = make_scene(c.scene, c.parameters);
-  Integrator integrator(
-      entry.scene, Registry::with_built_ins(),
-      kinsol({.tolerance = 1e-13, .accept = 1e-12, .jacobian = JacobianPolicy::fresh}),
-      {.method = "type1/midpoint", .order = c.order, .step = c.step});
+  Integrator integrator(entry.scene, Registry::with_built_ins(),
+                        kinsol({.tolerance = 1e-13, .accept = 1e-12, .jacobian = JacobianPolicy::fresh}),
+                        {.method = "type1/midpoint", .order = c.order, .step = c.step});
   ASSERT_TRUE(run(integrator, 400, Momentum::plus, 400, nullptr).ok());
-  const double mean = static_cast<double>(integrator.work().iterations) /
-                      static_cast<double>(integrator.work().solves);
+  const double mean =
+      static_cast<double>(integrator.work().iterations) / static_cast<double>(integrator.work().solves);
   RecordProperty("iterations", std::to_string(mean));
   EXPECT_LE(mean, c.iterations + 0.3);
 }
@@ -62,8 +61,8 @@ TEST(LargeScenes, HangingChainOfManyLinksTakesFewIterations) {
                           {.method = c.method, .step = c.step});
     const RunReport report = run(integrator, 20, Momentum::plus, 20, nullptr);
     ASSERT_TRUE(report.ok()) << c.method << ": " << report.last.failure;
-    const double mean = static_cast<double>(integrator.work().iterations) /
-                        static_cast<double>(integrator.work().solves);
+    const double mean =
+        static_cast<double>(integrator.work().iterations) / static_cast<double>(integrator.work().solves);
     EXPECT_LE(mean, c.iterations) << c.method;
   }
 }

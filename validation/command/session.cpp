@@ -25,7 +25,7 @@ void add_solver_options(CLI::App& verb, Session& session) {
         session.solver_options.iteration = iteration(name);
         session.solvers = kinsol(session.solver_options);
       },
-      "How a step is solved: newton, or fixed-point where the step has a splitting");
+      "How a step is solved: newton; fixed-point where the step has a splitting; automatic");
   verb.add_option_function<std::string>(
       "--jacobian",
       [&session](const std::string& name) {
