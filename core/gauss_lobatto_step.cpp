@@ -1,9 +1,11 @@
 #include <algorithm>
 #include <cmath>
+#include <diracstep/core/compensated_sums.hpp>
 #include <diracstep/core/constraint_distribution.hpp>
 #include <diracstep/core/gauss_lobatto_step.hpp>
 #include <diracstep/core/gauss_lobatto_tableau.hpp>
 #include <diracstep/core/scales.hpp>
+#include <optional>
 
 namespace diracstep {
 
@@ -55,8 +57,14 @@ class GaussLobattoStep final : public StepProblem {
     return true;
   }
 
+  bool compensate() override {
+    sums_.emplace(s_, n_);
+    return true;
+  }
+
   void reset() override {
     for (Columns* columns : {&lq_, &lqq_}) columns->setZero();
+    if (sums_) sums_->forget();
   }
   const SparsityPattern& pattern() const override { return pattern_; }
   std::span<const ResidualBlock> blocks() const override { return blocks_; }
@@ -69,6 +77,7 @@ class GaussLobattoStep final : public StepProblem {
 
   void begin(Interval step, const Vector& q0, const Vector& p0) override {
     step_ = step;
+    if (sums_) sums_->begin(q0, p0, q0_, p0_);
     q0_ = q0;
     p0_ = p0;
     last_x_[0] = std::nan("");
@@ -86,6 +95,10 @@ class GaussLobattoStep final : public StepProblem {
     const double h = step_.size;
     for (int i = 0; i < s_; ++i) {
       auto momentum = f.segment(n_ * i, n_);
+      if (sums_) {
+        sums_->momentum_row(i, h, lv_.col(i), p0_, lq_, impulses_, momentum);
+        continue;
+      }
       momentum = lv_.col(i) - p0_;
       for (int j = 0; j < s_; ++j) momentum -= h * table_.a_hat(i, j) * lq_.col(j);
       if (m_ > 0)
@@ -119,11 +132,15 @@ class GaussLobattoStep final : public StepProblem {
 
   void finish(ConstVectorRef x, Vector& q1, Vector& p1, Vector& impulse) override {
     evaluate(x);
-    q1 = lobatto_q_.col(s_);
-    p1 = p0_;
-    for (int j = 0; j < s_; ++j) {
-      p1 += step_.size * table_.b[j] * lq_.col(j);
-      if (m_ > 0) p1 += table_.lobatto_b[j] * impulses_.col(j);
+    if (sums_) {
+      sums_->end(step_.size, q0_, p0_, x.head(n_ * s_).reshaped(n_, s_), lq_, impulses_, q1, p1);
+    } else {
+      q1 = lobatto_q_.col(s_);
+      p1 = p0_;
+      for (int j = 0; j < s_; ++j) {
+        p1 += step_.size * table_.b[j] * lq_.col(j);
+        if (m_ > 0) p1 += table_.lobatto_b[j] * impulses_.col(j);
+      }
     }
     // The impulse at q0 is that part of λ_0 which enters there.
     impulse = table_.lobatto_b[0] * x.segment(n_ * s_, m_);
@@ -173,9 +190,13 @@ class GaussLobattoStep final : public StepProblem {
     const double h = step_.size;
     const auto v = x.head(n_ * s_).reshaped(n_, s_);
     for (int i = 0; i < s_; ++i) {
-      q_.col(i) = h * table_.a(i, 0) * v.col(0);
-      for (int k = 1; k < s_; ++k) q_.col(i) += h * table_.a(i, k) * v.col(k);
-      q_.col(i) += q0_;
+      if (sums_) {
+        sums_->position(h, sums_->table.a.row(i), q0_, v, q_.col(i));
+      } else {
+        q_.col(i) = h * table_.a(i, 0) * v.col(0);
+        for (int k = 1; k < s_; ++k) q_.col(i) += h * table_.a(i, k) * v.col(k);
+        q_.col(i) += q0_;
+      }
       lagrangian_->gradient(gauss_time(i), q_.col(i), v.col(i), lq_.col(i), lv_.col(i));
       if (force_) {
         force_->value(gauss_time(i), q_.col(i), v.col(i), f_);
@@ -184,6 +205,10 @@ class GaussLobattoStep final : public StepProblem {
     }
     lobatto_q_.col(0) = q0_;
     for (int j = m_ > 0 ? 1 : s_; j <= s_; ++j) {
+      if (sums_) {
+        sums_->position(h, sums_->table.lobatto_a.row(j), q0_, v, lobatto_q_.col(j));
+        continue;
+      }
       lobatto_q_.col(j) = h * table_.lobatto_a(j, 0) * v.col(0);
       for (int k = 1; k < s_; ++k) lobatto_q_.col(j) += h * table_.lobatto_a(j, k) * v.col(k);
       lobatto_q_.col(j) += q0_;
@@ -297,6 +322,8 @@ class GaussLobattoStep final : public StepProblem {
   int blocks_per_stage_ = 1;
   std::vector<int> force_places_;
   std::vector<ResidualBlock> blocks_;
+
+  std::optional<CompensatedSums> sums_;
 
   Interval step_{0.0, 1.0};
   Vector q0_, p0_;
