@@ -4,6 +4,7 @@
 #include <cmath>
 #include <diracstep/core/integrator.hpp>
 #include <diracstep/validation/command/arguments.hpp>
+#include <diracstep/validation/command/variable_steps.hpp>
 #include <diracstep/validation/command/verbs.hpp>
 #include <diracstep/validation/report.hpp>
 #include <diracstep/validation/scene_catalogue.hpp>
@@ -22,20 +23,20 @@ struct Options {
   bool json = false;
 };
 
-std::string as_json(const Integrator& integrator) {
+std::string as_json(const Integrator& integrator, const std::vector<PlanLine>& lines) {
   nlohmann::ordered_json json;
   json["scene"] = integrator.scene().name;
   json["method"] = integrator.options().method;
   json["order"] = integrator.options().order;
   json["plan"] = nlohmann::ordered_json::array();
-  for (const PlanLine& line : integrator.plan())
+  for (const PlanLine& line : lines)
     json["plan"].push_back({{"item", line.item}, {"decision", line.decision}, {"reason", line.reason}});
   return json.dump(2) + '\n';
 }
 
-std::string as_text(const Integrator& integrator) {
+std::string as_text(const Integrator& integrator, const std::vector<PlanLine>& lines) {
   std::vector<std::vector<std::string>> rows{{"item", "decision", "reason"}};
-  for (const PlanLine& line : integrator.plan()) rows.push_back({line.item, line.decision, line.reason});
+  for (const PlanLine& line : lines) rows.push_back({line.item, line.decision, line.reason});
   return fmt::format("{} with {}, order {}\n\n{}", integrator.scene().name, integrator.options().method,
                      integrator.options().order, aligned(rows));
 }
@@ -44,7 +45,9 @@ void plan(const Options& options, Session& session) {
   const CatalogueScene entry = make_scene(options.scene, parameters(options.set));
   const Integrator integrator(entry.scene, session.registry, session.solvers,
                               {options.method, options.order, entry.natural_step, {}});
-  print(options.json ? as_json(integrator) : as_text(integrator));
+  std::vector<PlanLine> lines = integrator.plan();
+  lines.push_back(pace_line(*entry.scene, session.solvers, entry.t_end));
+  print(options.json ? as_json(integrator, lines) : as_text(integrator, lines));
 }
 
 }  // namespace
