@@ -114,8 +114,9 @@ bool AdaptiveIntegrator::start_control() {
   if (!measure(growth)) return false;
   z_ = pace_.rate + 0.5 * sign_ * adaptive_.eps * pace_.growth;
   next_size_ = sign_ * adaptive_.eps / (growth && z_ > 0.0 ? z_ : pace_.rate);
-  last_sizes_.assign(fractions_.size(), 0.0);
-  for (std::size_t i = 0; i < fractions_.size(); ++i) last_sizes_[i] = fractions_[i] * next_size_;
+  last_sizes_.clear();
+  for (const double fraction : fractions_)
+    last_sizes_.push_back({fraction * next_size_, fraction * next_size_});
   return true;
 }
 
@@ -140,9 +141,12 @@ StepReport AdaptiveIntegrator::step() {
     double whole = 0.0;
     for (std::size_t part = 0; part < fractions_.size(); ++part) {
       double size = 0.0;
-      report = solve_size(sign_ * fractions_[part] * adaptive_.eps, last_sizes_[part], size);
+      Sizes& last = last_sizes_[part];
+      // Sizes change by about the same factor from step to step.
+      const double guess = last.newest * std::clamp(last.newest / last.older, 0.5, 2.0);
+      report = solve_size(sign_ * fractions_[part] * adaptive_.eps, guess, size);
       if (!report.ok()) return report;
-      last_sizes_[part] = size;
+      last = {size, last.newest};
       whole += size;
     }
     next_size_ = whole;
@@ -169,7 +173,7 @@ StepReport AdaptiveIntegrator::control_step(double size) {
   report_.lowest_ratio = std::min(report_.lowest_ratio, ratio);
   report_.highest_ratio = std::max(report_.highest_ratio, ratio);
   z_ += change;
-  if (!(ratio >= lowest_ratio && ratio <= highest_ratio)) {
+  if (!(ratio >= lowest_ratio && ratio <= highest_ratio) || !(z_ > 0.25 * pace_.rate)) {
     z_ = std::max(pace_.rate + 0.5 * change, 0.5 * pace_.rate);
     ++report_.resets;
   }
@@ -195,7 +199,7 @@ StepReport AdaptiveIntegrator::solve_size(double eps, double guess, double& size
     const double change = slope > 0.0 ? -f / slope : 0.5 * (eps / rate0 - h);
     last_h = h;
     last_f = f;
-    h += std::clamp(change, -0.5 * std::abs(h), std::abs(h));
+    h *= 1.0 + std::clamp(change / h, -0.5, 1.0);
   }
   return failed("no size of the step satisfies the equation for it; take a smaller eps");
 }

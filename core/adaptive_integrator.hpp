@@ -2,6 +2,7 @@
 
 #include <diracstep/core/integrator.hpp>
 #include <diracstep/core/monitor.hpp>
+#include <diracstep/core/pace_survey.hpp>
 #include <diracstep/core/run.hpp>
 #include <optional>
 #include <span>
@@ -102,7 +103,10 @@ class AdaptiveIntegrator {
   bool started_ = false;
   double z_ = 0.0;
   double next_size_ = 0.0;
-  std::vector<double> last_sizes_;  ///< of each part
+  struct Sizes {
+    double newest, older;
+  };
+  std::vector<Sizes> last_sizes_;  ///< of each part
 };
 
 /// Steps to `end` and shows the start, every `every`-th node and the end itself, which a side step reaches.

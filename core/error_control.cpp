@@ -103,7 +103,7 @@ class Search {
       AdaptiveIntegrator integrator(scene_, registry_, solvers_, integrator_options(sign * h),
                                     {.eps = h, .monitor = options_.monitor, .scales = scales, .end = end_});
       const RunReport done = diracstep::run(integrator, end_, Momentum::projected, most_steps, keep);
-      note(now, done, integrator.work(), integrator.side_work().solves, integrator.options().order);
+      note(now, done, integrator.work(), integrator.side_work(), integrator.options().order);
       if (integrator.control().resets * 1000 > integrator.work().steps)
         report_.warning = "the step controller was reset " + std::to_string(integrator.control().resets) +
                           " times in " + std::to_string(integrator.work().steps) + " steps";
@@ -114,7 +114,7 @@ class Search {
       Integrator integrator(scene_, registry_, solvers_, integrator_options(grid.step));
       now.step = std::abs(grid.step);
       const RunReport done = diracstep::run(integrator, grid.steps, Momentum::projected, grid.steps, keep);
-      note(now, done, integrator.work(), 0, integrator.options().order);
+      note(now, done, integrator.work(), {}, integrator.options().order);
     }
     if (now.failure.empty() && !(last.q.allFinite() && last.p.allFinite()))
       now.failure = "the end is not finite";
@@ -127,12 +127,21 @@ class Search {
     return true;
   }
 
-  void note(ErrorControlRun& now, const RunReport& done, const Work& work, long side_solves, int order) {
+  void note(ErrorControlRun& now, const RunReport& done, const Work& work, const Work& side, int order) {
     now.steps = work.steps;
-    now.solves = work.solves + side_solves;
+    now.solves = work.solves + side.solves;
     now.failure = done.last.failure;
     report_.order = order;
-    report_.solves += now.solves;
+    for (const Work* part : {&work, &side}) add(*part);
+  }
+
+  void add(const Work& part) {
+    Work& all = report_.work;
+    all.steps += part.steps;
+    all.solves += part.solves;
+    all.iterations += part.iterations;
+    all.residual_evaluations += part.residual_evaluations;
+    all.jacobian_evaluations += part.jacobian_evaluations;
   }
 
   /// Estimate and observed order of the last run.
@@ -182,7 +191,7 @@ class Search {
   bool stopped(double h) {
     const ErrorControlRun& last = report_.runs.back();
     const double expected =
-        static_cast<double>(report_.solves) + static_cast<double>(last.solves) * last.step / h;
+        static_cast<double>(report_.work.solves) + static_cast<double>(last.solves) * last.step / h;
     if (options_.go_on && !options_.go_on())
       refuse("interrupted");
     else if (expected > static_cast<double>(options_.most_solves))
@@ -262,7 +271,8 @@ ErrorControlReport solve_to_error(const std::shared_ptr<const Scene>& given, con
   PaceSurvey survey;
   if (accelerates) survey = survey_pace(*scene, solvers, end, survey_steps);
   if (accelerates) report.adaptive = choose_adaptive(options, survey, report.reason);
-  report.compensated_sums = options.method.empty() && accelerates && options.error < 1e-8;
+  report.compensated_sums =
+      options.compensated_sums.value_or(options.method.empty() && accelerates && options.error < 1e-8);
   const double eps = std::clamp(4.0 * std::pow(options.error, 1.0 / order), 0.02, 1.0);
   const double span = std::abs(end - scene->start.time);
   double step = options.first_step > 0.0 ? options.first_step : span / 20.0;

@@ -13,11 +13,13 @@ struct ErrorControlOptions {
   double error = 0.0;       ///< asked for at the end of the motion, see ErrorControlReport::estimate
   std::string method = {};  ///< empty: chosen by the size of the scene and the error
   int order = 0;            ///< composes a given method to this order
-  std::optional<bool> adaptive = {};  ///< empty: where a survey finds max ω > 5 min ω
-  Monitor monitor = {};               ///< for variable steps; empty: the generic one
-  double first_step = 0.0;            ///< of a fixed step, without sign; 0: from the survey
-  long most_solves = 3'000'000;       ///< nonlinear systems in all
-  std::function<bool()> go_on = {};   ///< asked after each run; false ends the search
+  std::optional<bool> adaptive = {};          ///< empty: where a survey finds max ω > 5 min ω
+  Monitor monitor = {};                       ///< for variable steps; empty: the generic one
+  double first_step = 0.0;                    ///< of a fixed step, without sign; 0: from the survey
+  std::optional<bool> compensated_sums = {};  ///< empty: where the library chooses the method and the error
+                                              ///< is below 1e-8
+  long most_solves = 3'000'000;      ///< nonlinear systems in all
+  std::function<bool()> go_on = {};  ///< asked after each run; false ends the search
 };
 
 /// One run of the search.
@@ -45,7 +47,7 @@ struct ErrorControlReport {
   /// zero.
   double estimate = std::numeric_limits<double>::quiet_NaN();
   double observed_order = std::numeric_limits<double>::quiet_NaN();
-  long solves = 0;  ///< of all runs
+  Work work;  ///< of all runs, output included
   std::vector<ErrorControlRun> runs;
 
   bool ok() const { return refusal.empty(); }

@@ -107,6 +107,11 @@ bool PaceMeter::accelerations(double t, ConstVectorRef q, ConstVectorRef v, doub
     const double tau = (place - 2) * delta;
     q_ = q + tau * v + (0.5 * tau * tau) * a_.col(2);
     v_ = v + tau * a_.col(2);
+    if (place == 0 || place == 4) {  // ȧ of the inner three: without it d(ln ω)/dt lacks what a owes to v
+      const double factor = tau * tau / (4.0 * delta);
+      v_ += factor * (a_.col(3) - a_.col(1));
+      q_ += (factor * tau / 3.0) * (a_.col(3) - a_.col(1));
+    }
     last_ = motion_->acceleration(t + tau, q_, v_, a_.col(place));
   }
   return last_.ok();
@@ -168,129 +173,6 @@ Pace PaceMeter::rate_and_growth(double t, ConstVectorRef q, ConstVectorRef v, do
     pace.failure = message.str();
   }
   return pace;
-}
-
-namespace {
-
-/// A quantity over time, for its median.
-class TimeSeries {
- public:
-  void add(double value, double duration) {
-    if (std::isfinite(value)) values_.emplace_back(value, duration);
-  }
-  double median() {
-    std::ranges::sort(values_);
-    double all = 0.0, sum = 0.0;
-    for (const auto& [value, duration] : values_) all += duration;
-    for (const auto& [value, duration] : values_)
-      if ((sum += duration) >= 0.5 * all) return value;
-    return 0.0;
-  }
-  double lowest() const { return values_.empty() ? 0.0 : std::ranges::min(values_).first; }
-  double highest() const { return values_.empty() ? 0.0 : std::ranges::max(values_).first; }
-
- private:
-  std::vector<std::pair<double, double>> values_;
-};
-
-/// One pass of the survey, with the steps that ω at a given ω0 asks for.
-class SurveyRun {
- public:
-  SurveyRun(PointwiseMotion& motion, const Scene& scene, double end, double typical)
-      : motion_(motion),
-        t_(scene.start.time),
-        end_(end),
-        typical_(typical),
-        q_(scene.start.q),
-        v_(scene.start.v) {
-    for (Vector& k : a_) k.setZero(q_.size());
-    next_ = a_[0];
-  }
-
-  std::string go(long most_steps) {
-    const double span = std::abs(end_ - t_), sign = end_ > t_ ? 1.0 : -1.0, start = t_;
-    if (!motion_.acceleration(t_, q_, v_, a_[0]).ok()) return "no acceleration at the start";
-    double h = first_step(span);
-    for (long k = 0; k < most_steps && std::abs(end_ - t_) > 1e-12 * span; ++k) {
-      h = std::min(h, std::abs(end_ - t_));
-      Vector q, v;
-      if (!runge_kutta(sign * h, q, v) || !motion_.acceleration(t_ + sign * h, q, v, next_).ok() ||
-          !next_.allFinite())
-        return "the coarse run failed";
-      const double rate = rate_between(v, h);
-      if (h * rate > 0.9 && h > 1e-12 * span) {  // too coarse: once more, shorter
-        h *= std::max(0.1, 0.3 / (h * rate));
-        continue;
-      }
-      pace.add(rate, h);
-      ratio.add(v.norm() > 0.0 ? next_.norm() / v.norm() : HUGE_VAL, h);
-      t_ += sign * h;
-      q_.swap(q);
-      v_.swap(v);
-      a_[0].swap(next_);
-      covered = std::abs(t_ - start);
-      h *= rate > 0.0 ? std::clamp(0.3 / (h * rate), 0.2, 1.5) : 1.5;
-    }
-    return {};
-  }
-
-  TimeSeries pace, ratio;
-  double covered = 0.0;
-
- private:
-  double first_step(double span) const {
-    const double a = a_[0].norm(), v = v_.norm();
-    const double by_rate = v > 0.0 && a > 0.0 ? 0.1 * v / a : span;
-    return std::min({1e-3 * span, by_rate});
-  }
-
-  /// ω halfway: with mean squares of v and a, and ȧ from their difference.
-  double rate_between(const Vector& v, double h) const {
-    const double w2 = typical_ * typical_;
-    const double v2 = 0.5 * (v_.squaredNorm() + v.squaredNorm());
-    const double a2 = 0.5 * (a_[0].squaredNorm() + next_.squaredNorm());
-    const double jerk2 = (next_ - a_[0]).squaredNorm() / (h * h), below = w2 * v2 + a2;
-    return below > 0.0 ? std::sqrt((w2 * a2 + jerk2) / below) : 0.0;
-  }
-
-  bool runge_kutta(double h, Vector& q, Vector& v) {
-    const Vector v2 = v_ + 0.5 * h * a_[0];
-    if (!motion_.acceleration(t_ + 0.5 * h, q_ + 0.5 * h * v_, v2, a_[1]).ok()) return false;
-    const Vector v3 = v_ + 0.5 * h * a_[1];
-    if (!motion_.acceleration(t_ + 0.5 * h, q_ + 0.5 * h * v2, v3, a_[2]).ok()) return false;
-    const Vector v4 = v_ + h * a_[2];
-    if (!motion_.acceleration(t_ + h, q_ + h * v3, v4, a_[3]).ok()) return false;
-    q = q_ + h / 6.0 * (v_ + 2.0 * v2 + 2.0 * v3 + v4);
-    v = v_ + h / 6.0 * (a_[0] + 2.0 * a_[1] + 2.0 * a_[2] + a_[3]);
-    return q.allFinite() && v.allFinite();
-  }
-
-  PointwiseMotion& motion_;
-  double t_, end_, typical_;
-  Vector q_, v_, next_;
-  std::array<Vector, 4> a_;
-};
-
-}  // namespace
-
-PaceSurvey survey_pace(const Scene& scene, const SolverFactory& solvers, double end, long most_steps) {
-  PointwiseMotion motion(scene, solvers);
-  const double span = std::abs(end - scene.start.time);
-  if (!(span > 0.0) || !std::isfinite(span))
-    throw Misuse("survey of the pace: the end is the start or not finite");
-  // ω0 is not known beforehand; a first pass by |ȧ|/|a| alone, with ω0 = 0, finds it.
-  SurveyRun first(motion, scene, end, 0.0);
-  PaceSurvey survey;
-  survey.failure = first.go(most_steps / 2);
-  survey.scales.typical = first.ratio.median();
-  SurveyRun second(motion, scene, end, survey.scales.typical);
-  survey.failure = second.go(most_steps - most_steps / 2);
-  survey.slowest = second.pace.lowest();
-  survey.fastest = second.pace.highest();
-  survey.covered = second.covered;
-  survey.scales.lowest = std::max(0.3 * second.pace.median(), 0.3 / span);
-  survey.accelerations = motion.accelerations();
-  return survey;
 }
 
 }  // namespace diracstep

@@ -67,8 +67,8 @@ struct MonitorScales {
 ///   ω² = (ω0² |a|² + |ȧ|²) / (ω0² |v|² + |a|²) + ω_min²,
 ///
 /// the relative rate of change of the field (v, a).  ȧ and d(ln ω)/dt are central differences over points of
-/// the parabola q + τv + τ²a/2, v + τa; an odd function of τ stays odd under v → −v whatever its truncation
-/// error, and that is all that reversibility needs.
+/// the Taylor polynomial q + τv + τ²a/2 + τ³ȧ/6, v + τa + τ²ȧ/2; an odd function of τ stays odd under v → −v
+/// whatever its truncation error, and that is all that reversibility needs.
 class PaceMeter {
  public:
   PaceMeter(const Scene& scene, const SolverFactory& solvers, Monitor monitor, MonitorScales scales);
@@ -96,23 +96,5 @@ class PaceMeter {
   Columns a_;  ///< accelerations, one column a place
   Vector q_, v_;
 };
-
-/// What a coarse run over the first part of a motion finds: Runge and Kutta's classical method on the
-/// underlying ordinary differential equation, 0.3 radians a step, constraints left to drift.
-struct PaceSurvey {
-  MonitorScales scales;  ///< ω0: median over time of |a|/|v|; ω_min: 0.3 of the median of ω, 0.3 radians over
-                         ///< the span where nothing changes at all
-  double slowest = 0.0;  ///< smallest and largest ω met, ω_min left out
-  double fastest = 0.0;
-  double covered = 0.0;  ///< time surveyed
-  long accelerations = 0;
-  std::string failure = {};  ///< empty, or why the survey ended early
-
-  /// max ω / min ω: above 5 variable steps pay.
-  double ratio() const { return fastest / std::max(slowest, scales.lowest); }
-};
-
-/// Surveys from the start towards `end`, at most `most_steps` steps.
-PaceSurvey survey_pace(const Scene& scene, const SolverFactory& solvers, double end, long most_steps);
 
 }  // namespace diracstep

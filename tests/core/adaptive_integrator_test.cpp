@@ -83,13 +83,27 @@ TEST(AdaptiveIntegrator, EquationInTheStepIsReversible) {
   }
 }
 
+/// Over several times, so that no chance zero of the error counts; the reference has steps of 0.05.
+double largest_error(AdaptiveIntegrator integrator, const std::vector<Sample>& reference) {
+  const std::vector<std::size_t> places{20, 34, 45, 60, 72};
+  std::vector<double> times;
+  for (const std::size_t place : places) times.push_back(reference[place].time);
+  double largest = 0.0;
+  std::size_t k = 0;
+  const RunReport report = run_at(integrator, times, Momentum::projected, [&](const Sample& sample) {
+    largest = std::max(largest, distance(sample, reference[places[k++]]));
+    return true;
+  });
+  EXPECT_TRUE(report.ok()) << report.last.failure;
+  return largest;
+}
+
 TEST(AdaptiveIntegrator, KeepsTheOrderOnEveryConstraintClass) {
   for (const auto& scene : testing::every_constraint_class()) {
-    const Sample reference = samples_of(scene, {.method = "type1/gl:6", .step = 3.6 / 96}, 96).back();
+    const auto reference = samples_of(scene, {.method = "type1/gl:6", .step = 0.05}, 72);
     const auto error = [&](const std::string& method, int order, StepControl control, double eps) {
-      return distance(
-          end_of(adaptive(scene, method, {.eps = eps, .control = control, .scales = {1.0, 0.3}}, order), 3.6),
-          reference);
+      const AdaptiveOptions options{.eps = eps, .control = control, .scales = {1.0, 0.3}};
+      return largest_error(adaptive(scene, method, options, order), reference);
     };
     struct Case {
       const char* method;
@@ -98,16 +112,16 @@ TEST(AdaptiveIntegrator, KeepsTheOrderOnEveryConstraintClass) {
       double eps;
     };
     for (const Case& c : {Case{"type1/gl:2", 0, 4, StepControl::integrating, 0.1},
-                          Case{"type1/gl:3", 0, 6, StepControl::integrating, 0.25},
-                          Case{"type1/gl:3", 0, 6, StepControl::in_step, 0.25},
+                          Case{"type1/gl:3", 0, 6, StepControl::integrating, 0.5},
+                          Case{"type1/gl:2", 0, 4, StepControl::in_step, 0.2},
                           Case{"type1/midpoint", 4, 4, StepControl::integrating, 0.1},
                           Case{"type1/midpoint", 4, 4, StepControl::in_step, 0.1},
                           Case{"type2/euler", 2, 2, StepControl::integrating, 0.02}}) {
       if (c.order == 2 && scene->rows() > 0) continue;  // measured elsewhere
       const double coarse = error(c.method, c.order, c.control, c.eps);
-      const double fine = error(c.method, c.order, c.control, 0.5 * c.eps);
+      const double fine = error(c.method, c.order, c.control, 0.25 * c.eps);
       EXPECT_GT(fine, 1e-13) << "at round-off, nothing is measured";
-      EXPECT_NEAR(std::log2(coarse / fine), c.measured, 0.5)
+      EXPECT_NEAR(0.5 * std::log2(coarse / fine), c.measured, 0.5)
           << scene->name << ' ' << c.method << " control " << static_cast<int>(c.control) << ": " << coarse
           << ' ' << fine;
     }
@@ -152,10 +166,11 @@ double energy_error(AdaptiveIntegrator& integrator, double end) {
 TEST(AdaptiveIntegrator, EnergyDoesNotDriftOverManyOrbitsAndDoesWithoutReversibility) {
   const auto scene = kepler(0.9);
   const auto growth = [&](StepControl control) {
-    const AdaptiveOptions options{.eps = 0.35, .control = control, .monitor = {circular_rate, false}};
+    const AdaptiveOptions options{.eps = 0.2, .control = control, .monitor = {circular_rate, false}};
     AdaptiveIntegrator few = adaptive(scene, "type1/gl:2", options),
                        many = adaptive(scene, "type1/gl:2", options);
-    return energy_error(many, 600.0) / energy_error(few, 60.0);
+    const double late = energy_error(many, 600.0), early = energy_error(few, 60.0);
+    return late / early;
   };
   EXPECT_LT(growth(StepControl::integrating), 1.5);
   EXPECT_LT(growth(StepControl::in_step), 1.5);
@@ -255,6 +270,7 @@ TEST(AdaptiveIntegrator, RefusesWhatWouldNotBeReversible) {
 
 TEST(PaceSurvey, FindsTheFrequencyOfAnOscillatorAndTheRangeOfAnOrbit) {
   Scene spring = *kepler(0.5);
+  spring.start.v *= 4.5 / spring.start.v.norm();  // a circle: |a|/|v| = 3 all along
   spring.lagrangian = lagrangian<2>([](const auto& q, const auto& v) {
     return 0.5 * (v[0] * v[0] + v[1] * v[1]) - 4.5 * (q[0] * q[0] + q[1] * q[1]);
   });

@@ -39,7 +39,7 @@ TEST(ErrorControl, DeliversTheErrorAskedForAndEstimatesIt) {
           EXPECT_LT(truth, 5.0 * report.estimate) << scene->name << " at " << error;
         }
         EXPECT_GE(report.runs.size(), 3u);
-        EXPECT_GT(report.solves, 0);
+        EXPECT_GT(report.work.solves, 0);
       }
 }
 
@@ -67,7 +67,7 @@ TEST(ErrorControl, RefusesWhereTheWorkIsUsedUp) {
             {.error = 1e-9, .method = "type1/midpoint", .adaptive = false, .most_solves = 2000});
   EXPECT_FALSE(report.ok());
   testing::expect_parts(report.refusal, {"1e-09", "nonlinear systems", "estimate"});
-  EXPECT_LE(report.solves, 2000);
+  EXPECT_LE(report.work.solves, 2000);
 }
 
 TEST(ErrorControl, FindsAFirstStepWhereCoarseOnesFail) {

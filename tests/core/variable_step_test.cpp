@@ -78,7 +78,7 @@ TEST(VariableStep, RestartGoesOnFromAnyPoint) {
   here.restart(there.time(), there.position(), there.momentum(), there.rough_velocity());
   ASSERT_TRUE(there.step().ok());
   ASSERT_TRUE(here.step().ok());
-  EXPECT_EQ(here.time(), there.time());
+  EXPECT_DOUBLE_EQ(here.time(), there.time());
   EXPECT_LT((here.position() - there.position()).lpNorm<Eigen::Infinity>(), 1e-14);
 }
 
@@ -133,8 +133,8 @@ double energy_drift(bool compensated, long steps) {
 }
 
 TEST(CompensatedSums, EnergyDriftsLessThanWithPlainSums_slow) {
-  const double plain = energy_drift(false, 200'000), compensated = energy_drift(true, 200'000);
-  EXPECT_LT(compensated, 3e-15);
+  const double plain = energy_drift(false, 1'000'000), compensated = energy_drift(true, 1'000'000);
+  EXPECT_LT(compensated, 1e-14);
   EXPECT_GT(plain, 5.0 * compensated);
 }
 

@@ -216,7 +216,7 @@ void run(const Options& given, Session& session) {
   } else {
     result.failure = result.search->refusal;
     result.end = result.search->end;
-    result.work.solves = result.search->solves;
+    result.work = result.search->work;
     result.work.steps = result.search->runs.back().steps;
     used.order = result.search->order;
   }

@@ -47,7 +47,7 @@ std::string search_text(const ErrorControlReport& search) {
   std::string text = search_table(search);
   if (search.ok())
     text += fmt::format("estimated error {:.2e}, observed order {:.1f}, {} solves in all\n", search.estimate,
-                        search.observed_order, search.solves);
+                        search.observed_order, search.work.solves);
   return text + (search.warning.empty() ? "" : "warning: " + search.warning + "\n") + "\n";
 }
 
@@ -71,7 +71,7 @@ Json search_json(const ErrorControlReport& search) {
             {"observed_order", number(search.observed_order)},
             {"warning", search.warning.empty() ? Json(nullptr) : Json(search.warning)},
             {"refusal", search.refusal.empty() ? Json(nullptr) : Json(search.refusal)},
-            {"solves", search.solves},
+            {"solves", search.work.solves},
             {"runs", Json::array()}};
   for (const ErrorControlRun& run : search.runs)
     json["runs"].push_back({{"step", run.step},
