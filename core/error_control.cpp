@@ -159,22 +159,27 @@ class Search {
       now.estimate = now.difference / (std::pow(before.step / now.step, usable) - 1.0);
   }
 
-  bool order_confirmed() const { return report_.runs[good_.back()].observed_order > report_.order - 1.0; }
+  bool order_confirmed() const {
+    return std::abs(report_.runs[good_.back()].observed_order - report_.order) <= 1.0;
+  }
 
   bool accepted() const {
     if (good_.size() < 3) return false;
     const ErrorControlRun& now = report_.runs[good_.back()];
     const ErrorControlRun& before = report_.runs[good_[good_.size() - 2]];
-    const bool settled =
-        safety * before.difference <= options_.error && 10.0 * now.difference <= options_.error;
-    return settled || (order_confirmed() && safety * now.estimate <= options_.error);
+    if (order_confirmed()) return safety * now.estimate <= options_.error;
+    // A higher order than the stated one shows steps that are still coarse: there the difference itself has
+    // to do. A lower one comes with round-off.
+    const bool high = now.observed_order > report_.order;
+    const double before_allowed = high ? HUGE_VAL : options_.error / safety;
+    return before.difference <= before_allowed && safety * now.difference <= options_.error;
   }
 
   void accept() {
     const ErrorControlRun& now = report_.runs[good_.back()];
     report_.estimate = now.estimate;
     report_.observed_order = now.observed_order;
-    if (!order_confirmed() && now.difference > 1e-12)
+    if (now.observed_order < report_.order - 1.0 && now.difference > 1e-12)
       report_.warning = "the observed order is " + text(now.observed_order) + ", the stated one " +
                         std::to_string(report_.order) + "; the estimate assumes the lower one";
   }
@@ -273,10 +278,13 @@ ErrorControlReport solve_to_error(const std::shared_ptr<const Scene>& given, con
   if (accelerates) report.adaptive = choose_adaptive(options, survey, report.reason);
   report.compensated_sums =
       options.compensated_sums.value_or(options.method.empty() && accelerates && options.error < 1e-8);
-  const double eps = std::clamp(4.0 * std::pow(options.error, 1.0 / order), 0.02, 1.0);
+  // Radians of the first step: coarse, since the runs that follow are finer by 2 and more.
+  const double accuracy = std::pow(options.error, 1.0 / order);
+  const double eps = std::clamp(5.0 * accuracy, 0.02, 1.2);
   const double span = std::abs(end - scene->start.time);
   double step = options.first_step > 0.0 ? options.first_step : span / 20.0;
-  if (options.first_step <= 0.0 && survey.fastest > 0.0) step = std::min(step, eps / survey.fastest);
+  if (options.first_step <= 0.0 && survey.fastest > 0.0)
+    step = std::min(step, std::clamp(12.0 * accuracy, 0.05, 4.0) / survey.fastest);
 
   const auto search = [&](double first) {
     Search repeated(scene, registry, solvers, end, options, report);

@@ -18,8 +18,8 @@ struct ErrorControlOptions {
   double first_step = 0.0;                    ///< of a fixed step, without sign; 0: from the survey
   std::optional<bool> compensated_sums = {};  ///< empty: where the library chooses the method and the error
                                               ///< is below 1e-8
-  long most_solves = 3'000'000;      ///< nonlinear systems in all
-  std::function<bool()> go_on = {};  ///< asked after each run; false ends the search
+  long most_solves = 3'000'000;               ///< nonlinear systems in all
+  std::function<bool()> go_on = {};           ///< asked after each run; false ends the search
 };
 
 /// One run of the search.
