@@ -207,13 +207,13 @@ class Search {
     return true;
   }
 
-  /// Two refinements in a row that did not bring the runs closer, coarse runs of any motion aside.
+  /// Three refinements in a row that did not bring the runs closer, coarse runs of any motion aside.
   bool stagnates() {
     const ErrorControlRun& now = report_.runs[good_.back()];
     const ErrorControlRun& before = report_.runs[good_[good_.size() - 2]];
     const bool fell = !(now.difference > 0.5 * before.difference) || now.difference > 1e-4;
     stagnant_ = fell ? 0 : stagnant_ + 1;
-    return stagnant_ >= 2;
+    return stagnant_ >= 3;
   }
 
   double next_factor() const {

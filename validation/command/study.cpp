@@ -28,6 +28,7 @@ struct Options {
   std::optional<std::string> methods;
   std::optional<std::string> orders, steps, rtols;
   bool without_ida = false;
+  bool adaptive = false;
   int repeat = 5;
   double budget = 1.0;
   std::optional<double> end;
@@ -87,6 +88,7 @@ StudyOptions study_options(const Options& options) {
   if (options.steps) study.steps = numbers("--steps", *options.steps);
   if (options.rtols) study.rtols = numbers("--rtols", *options.rtols);
   if (options.without_ida) study.rtols.clear();
+  study.adaptive = options.adaptive;
   study.repeats = options.repeat;
   study.run_budget = options.budget;
   study.t_end = options.end;
@@ -174,6 +176,8 @@ void add_study(CLI::App& app, Session& session) {
   verb->add_option("--orders", options->orders, "Orders, 2,4,…; without it all that fit");
   verb->add_option("--steps", options->steps, "Step sizes, H1,H2,…; a ladder without it");
   verb->add_option("--rtols", options->rtols, "Tolerances of IDA; 1e-4,1e-5,…,1e-12 without it");
+  verb->add_flag("--adaptive", options->adaptive,
+                 "Also reversible variable steps, with a ladder of eps (in the column of the steps)");
   verb->add_flag("--without-ida", options->without_ida, "No runs of IDA");
   verb->add_option("--repeat", options->repeat, "Timed runs of each row")->capture_default_str();
   verb->add_option("--budget", options->budget, "CPU seconds that a run of a ladder may take")
