@@ -218,7 +218,7 @@ class Search {
 
   double next_factor() const {
     const double estimate = report_.runs[good_.back()].estimate;
-    if (!(estimate > 0.0)) return 0.7;
+    if (!(estimate > 0.0) || stagnant_ > 0) return 0.7;
     return std::clamp(std::pow(aimed * options_.error / estimate, 1.0 / report_.order), 0.35, 0.7);
   }
 

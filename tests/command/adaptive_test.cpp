@@ -58,6 +58,17 @@ TEST_F(AdaptiveCommand, RefusesAnErrorOutOfReachAndSaysWhy) {
   EXPECT_NE(Json::parse(outcome.out)["status"].get<std::string>().find("1e-18"), std::string::npos);
 }
 
+TEST_F(AdaptiveCommand, StudyShowsVariableStepsBesideFixedOnes) {
+  const Outcome outcome =
+      run("study kepler_e06 --methods type1/gl:3 --adaptive --without-ida --end 10 --budget 0.02 --json");
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  const Json study = Json::parse(outcome.out)["studies"][0];
+  for (const Json& measured : study["measured_order"])
+    EXPECT_NEAR(measured["slope"].get<double>(), 6.0, 0.5) << measured;
+  EXPECT_EQ(study["measured_order"].size(), 2u);
+  EXPECT_EQ(study["measured_order"][1]["method"], "type1/gl:3 adaptive");
+}
+
 TEST_F(AdaptiveCommand, PlanSaysWhetherVariableStepsPay) {
   EXPECT_NE(run("plan kepler_e099").out.find("pay: --adaptive"), std::string::npos);
   const Outcome steady = run("plan contact_oscillator");
