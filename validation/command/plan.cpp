@@ -19,6 +19,8 @@ struct Options {
   std::string scene;
   std::string method = "type1/midpoint";
   int order = 0;
+  bool adaptive = false;
+  double eps = 0.2;
   std::vector<std::string> set;
   bool json = false;
 };
@@ -46,6 +48,13 @@ void plan(const Options& options, Session& session) {
   const Integrator integrator(entry.scene, session.registry, session.solvers,
                               {options.method, options.order, entry.natural_step, {}});
   std::vector<PlanLine> lines = integrator.plan();
+  if (options.adaptive) {
+    const IntegratorOptions used{
+        .method = options.method, .order = options.order, .step = entry.natural_step};
+    lines = AdaptiveIntegrator(entry.scene, session.registry, session.solvers, used,
+                               {.eps = options.eps, .end = entry.t_end})
+                .plan();
+  }
   lines.push_back(pace_line(*entry.scene, session.solvers, entry.t_end));
   print(options.json ? as_json(integrator, lines) : as_text(integrator, lines));
 }
@@ -60,6 +69,8 @@ void add_plan(CLI::App& app, Session& session) {
       ->capture_default_str();
   verb->add_option("--order", options->order, "Compose to this order; 0 keeps the method's own")
       ->capture_default_str();
+  verb->add_flag("--adaptive", options->adaptive, "The plan of reversible steps of varying size");
+  verb->add_option("--eps", options->eps, "Radians of a step of varying size")->capture_default_str();
   verb->add_option("--set", options->set, "Set a parameter of the scene; may be repeated")
       ->type_name("NAME=VALUE")
       ->allow_extra_args(false);
