@@ -85,6 +85,7 @@ Integrator::Integrator(Preparation preparation, const Registry& registry, const 
     acceleration_solver_ = solvers(acceleration_problem_);
   }
   plan_stages(registry, solvers);
+  if (options_.compensated_sums) compensate();
   velocity_unknowns_.setZero(velocity_problem_.size());
   acceleration_unknowns_.setZero(acceleration_problem_.size());
   reset(scene_->start);
@@ -152,11 +153,19 @@ void Integrator::plan_stages(const Registry& registry, const SolverFactory& solv
   }
 }
 
+void Integrator::compensate() {
+  for (Part& part : parts_)
+    if (!part.problem->compensate())
+      throw Misuse("method '" + method_.info.name + "' on scene '" + scene_->name +
+                   "' has no compensated sums; type1/midpoint and typeN/gl:S have");
+}
+
 void Integrator::reset() { reset(scene_->start); }
 
 void Integrator::reset(const Start& start) {
   require_consistent(*scene_, start);
-  start_time_ = start.time;
+  clock_ = {start.time, 0.0, 0};
+  size_ = options_.step;
   q_ = start.q;
   v_ = start.v;
   p_.setZero(q_.size());
@@ -164,13 +173,31 @@ void Integrator::reset(const Start& start) {
   scene_->lagrangian->gradient(start.time, q_, v_, lq, p_);
   if (!p_.allFinite())
     throw Misuse("scene '" + scene_->name + "': the momentum ∂L/∂v is not finite at the start");
-  first_stage_solved_ = false;
+  forget();
+  work_ = {};
+}
+
+void Integrator::restart(double time, ConstVectorRef q, ConstVectorRef p, ConstVectorRef v) {
+  require_size("restart: q", q.size(), q_.size());
+  require_size("restart: p", p.size(), q_.size());
+  require_size("restart: v", v.size(), q_.size());
+  if (!std::isfinite(time) || !q.allFinite() || !p.allFinite() || !v.allFinite())
+    throw Misuse("restart: the time, q, p or v is not finite");
+  clock_ = {time, 0.0, 0};
+  q_ = q;
+  p_ = p;
+  v_ = v;
+  forget();
+}
+
+/// Nothing of the steps so far shows in the next ones.
+void Integrator::forget() {
+  first_stage_solved_ = retryable_ = unlearned_ = false;
   for (Stage& stage : stages_) stage.predictor.reset();
   for (Part& part : parts_) {
     part.problem->reset();
     if (part.solver) part.solver->reset();
   }
-  work_ = {};
 }
 
 void Integrator::count(const SolveReport& report) {
@@ -180,15 +207,17 @@ void Integrator::count(const SolveReport& report) {
   work_.jacobian_evaluations += report.jacobian_evaluations;
 }
 
-SolveReport Integrator::solve_stage(std::size_t number, double t, const Vector& q, const Vector& p) {
+SolveReport Integrator::solve_stage(std::size_t number, double t, const Vector& q, const Vector& p,
+                                    Guess guess) {
   Stage& stage = stages_[number];
   Part& part = parts_[stage.part];
-  part.problem->begin({t, stage.fraction * options_.step}, q, p);
+  part.problem->begin({t, stage.fraction * size_}, q, p);
   if (!part.solver) return {};
-  const bool predicted = stage.predictor.ready();
-  if (predicted)
+  const bool repeated = guess == Guess::last_solution;
+  const bool predicted = repeated || stage.predictor.ready();
+  if (predicted && !repeated)
     stage.predictor.predict(stage.solution);
-  else
+  else if (!predicted)
     part.problem->guess(v_, stage.solution);
   SolveReport report = part.solver->solve(stage.solution);
   count(report);
@@ -213,8 +242,49 @@ StepReport Integrator::failed(const SolveReport& report, const StepProblem& prob
   return {report, work_.steps, time, message.str()};
 }
 
-StepReport Integrator::step() {
+StepReport Integrator::step(double h) {
+  require_step(h);
+  if (h != size_) first_stage_solved_ = false;
+  learn();
+  return take(h, Guess::predicted);
+}
+
+StepReport Integrator::retry(double h) {
+  require_step(h);
+  if (!retryable_) throw Misuse("retry: no step was taken just before");
+  clock_ = before_.clock;
+  q_ = before_.q;
+  p_ = before_.p;
+  v_ = before_.v;
+  first_stage_solved_ = unlearned_ = false;
+  --work_.steps;
+  return take(h, Guess::last_solution);
+}
+
+/// Shows the last step to the predictors: not at once, since it may be taken again.
+void Integrator::learn() {
+  if (unlearned_)
+    for (Stage& stage : stages_) stage.predictor.learn(stage.solution);
+  unlearned_ = false;
+}
+
+void Integrator::advance_clock(double h) {
+  if (h == options_.step) {
+    ++clock_.steps;
+    return;
+  }
+  const double now = time(), change = h + clock_.rest, next = now + change;
+  clock_ = {next, change - (next - now), 0};
+}
+
+StepReport Integrator::take(double size, Guess guess) {
   const double start = time();
+  size_ = size;
+  before_.clock = clock_;
+  before_.q = q_;
+  before_.p = p_;
+  before_.v = v_;
+  retryable_ = false;
   double t = start;
   SolveReport total;
   q_stage_ = q_;
@@ -222,9 +292,9 @@ StepReport Integrator::step() {
   for (std::size_t k = 0; k < stages_.size(); ++k) {
     Stage& stage = stages_[k];
     StepProblem& problem = *parts_[stage.part].problem;
-    const double h = stage.fraction * options_.step;
+    const double h = stage.fraction * size;
     if (k > 0 || !first_stage_solved_) {
-      const SolveReport report = solve_stage(k, t, q_stage_, p_stage_);
+      const SolveReport report = solve_stage(k, t, q_stage_, p_stage_, guess);
       if (!report.ok()) {
         StepReport failure = failed(report, problem, start);
         failure.failure += describe_singularity(problem, stage.solution, *scene_);
@@ -247,8 +317,9 @@ StepReport Integrator::step() {
   }
   std::swap(q_, q_stage_);
   std::swap(p_, p_stage_);
-  for (Stage& stage : stages_) stage.predictor.learn(stage.solution);
+  advance_clock(size);
   first_stage_solved_ = false;
+  retryable_ = unlearned_ = true;
   return {total, work_.steps++, start, {}};
 }
 
@@ -292,7 +363,9 @@ SolveReport Integrator::sample(Momentum momentum, Sample& sample) {
     scene_->lagrangian->gradient(t, q_, sample.v, q_next_, sample.p);
   } else if (momentum == Momentum::minus && m > 0) {
     if (!first_stage_solved_) {
-      report = solve_stage(0, t, q_, p_);
+      learn();
+      retryable_ = false;
+      report = solve_stage(0, t, q_, p_, Guess::predicted);
       if (!report.ok()) return report;
       first_stage_solved_ = true;
     }

@@ -34,7 +34,10 @@ struct IntegratorOptions {
   bool force_degenerate = false;  ///< use a method on a degenerate scene that is known to be unstable there
   bool project_start = false;     ///< move an inconsistent start onto the constraints instead of refusing it
   bool drop_dependent_rows =
-      false;  ///< leave out rows that depend on others at the start instead of refusing
+      false;                      ///< leave out rows that depend on others at the start instead of refusing
+  bool compensated_sums = false;  ///< sums of a step in extended precision, what rounding drops carried on:
+                                  ///< round-off in the energy then grows like a random walk, see
+                                  ///< StepProblem::compensate.  Pays over very many steps
 };
 
 /// What one step did.  A failed step leaves the state as it was.
@@ -92,10 +95,25 @@ class Integrator {
   void reset(const Start& start);
 
   /// One step, of the size in the options.
-  StepReport step();
+  StepReport step() { return step(options_.step); }
 
-  double time() const { return start_time_ + static_cast<double>(work_.steps) * options_.step; }
+  /// One step of size h, which may change from step to step and be negative.  Throws Misuse for a step that
+  /// is zero or not finite.
+  StepReport step(double h);
+
+  /// Takes the last step again from where it started, now with size h; its solution is the guess.  A failure
+  /// leaves the state there.  Throws Misuse where the last call was no successful step.
+  StepReport retry(double h);
+
+  /// Goes on from another point of a motion: p is any momentum of its class, v a rough velocity that serves
+  /// as a guess.  That q fulfils the constraints is not checked.  The counts of work go on.
+  void restart(double time, ConstVectorRef q, ConstVectorRef p, ConstVectorRef v);
+
+  double time() const { return clock_.base + static_cast<double>(clock_.steps) * options_.step; }
   const Vector& position() const { return q_; }
+  /// A momentum of the class at the current point, and a rough velocity there.
+  const Vector& momentum() const { return p_; }
+  const Vector& rough_velocity() const { return v_; }
   const Work& work() const { return work_; }
   const Scene& scene() const { return *scene_; }
   const IntegratorOptions& options() const { return options_; }
@@ -133,10 +151,23 @@ class Integrator {
 
   Method choose_method(const Registry& registry);
   Sequence composed(const MethodInfo& info) const;
+  /// The time: `base`, where the step size last changed, and steps of the options' size from there on. `rest`
+  /// is what rounding has dropped from the base.
+  struct Clock {
+    double base = 0.0, rest = 0.0;
+    long steps = 0;
+  };
+  enum class Guess { predicted, last_solution };
+
   Part make_part(const Method& method, bool mirror_rule, const SolverFactory& solvers) const;
   void plan_stages(const Registry& registry, const SolverFactory& solvers);
   SolveReport solve_velocity(double t, Vector& v);
-  SolveReport solve_stage(std::size_t stage, double t, const Vector& q, const Vector& p);
+  void forget();
+  void compensate();
+  void learn();
+  StepReport take(double h, Guess guess);
+  void advance_clock(double h);
+  SolveReport solve_stage(std::size_t stage, double t, const Vector& q, const Vector& p, Guess guess);
   void count(const SolveReport& report);
   StepReport failed(const SolveReport& report, const StepProblem& problem, double time);
 
@@ -154,11 +185,18 @@ class Integrator {
   std::unique_ptr<NonlinearSolver> velocity_solver_;
   std::unique_ptr<NonlinearSolver> acceleration_solver_;
 
-  double start_time_ = 0.0;
+  Clock clock_;
+  double size_ = 0.0;  ///< of the step under way, or of the last one
   Vector q_, p_;
   Vector v_;  ///< the velocity, roughly: a guess only
   Vector q_next_, p_next_, q_stage_, p_stage_, impulse_;
   Vector velocity_unknowns_, acceleration_unknowns_;
+  struct {
+    Clock clock;
+    Vector q, p, v;
+  } before_;                         ///< where the last step started
+  bool retryable_ = false;           ///< before_ is known
+  bool unlearned_ = false;           ///< the predictors have not seen the last step yet
   bool first_stage_solved_ = false;  ///< the first stage of the next step is solved already
   Work work_;
 };

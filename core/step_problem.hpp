@@ -33,6 +33,12 @@ class StepProblem : public NonlinearProblem {
   /// How many unknowns come before the multipliers, whose guess hardly matters.
   virtual int leading_unknowns() const { return size(); }
 
+  /// From now on, sums over the stages in extended precision with coefficients to match, and q1, p1 with what
+  /// rounding drops from them carried into the step that starts there (compensated addition).  Plain sums
+  /// with rounded coefficients are a step that is not quite self-adjoint, whose energy drifts linearly by
+  /// round-off (Hairer, McLachlan, Razakarivony, BIT 48, 2008).  False where the step has no such form.
+  virtual bool compensate() { return false; }
+
   /// Forgets all that earlier steps left behind, so that a run repeats bit by bit.
   virtual void reset() {}
 

@@ -21,6 +21,7 @@ constexpr int plateau_length = 2;         // refinements in vain that end a ladd
 constexpr double usual_ladder = 12.0;     // rows, for the progress only
 constexpr std::size_t longest_ladder = 40;
 constexpr double fewest_steps = 2.0;
+constexpr double natural_eps = 1.0;       // radians of the coarsest variable step
 constexpr double smallest_error = 1e-17;  // an error of zero has no logarithm
 
 struct Interrupted {};
@@ -40,7 +41,10 @@ class StudyInProgress {
     natural_step_ = std::copysign(scene.natural_step, study_.t_end - study_.t_start);
     require_options();
     for (const auto& method : options_.methods)
-      for (const int order : orders_of(method)) series_.push_back(chosen(method, order));
+      for (const int order : orders_of(method)) {
+        series_.push_back(chosen(method, order));
+        if (options.adaptive) series_.push_back(series_.back().with_variable_steps());
+      }
     require_one_that_fits();
   }
 
@@ -63,7 +67,14 @@ class StudyInProgress {
   }
 
  private:
-  using Series = std::pair<std::string, int>;
+  struct Series {
+    std::string method;
+    int order;
+    bool variable;
+
+    std::string name() const { return method + (variable ? variable_steps : ""); }
+    Series with_variable_steps() const { return {method, order, true}; }
+  };
 
   void require_options() const {
     if (options_.methods.empty()) throw Misuse("a study needs at least one method");
@@ -80,10 +91,10 @@ class StudyInProgress {
   }
 
   Series chosen(const std::string& method, int order) const {
-    if (method != automatic_method) return {method, order};
+    if (method != automatic_method) return {method, order, false};
     const DefaultMethod choice =
         default_method(*entry_.scene, order, options_.constraint_rule, IntegratorOptions{}.dense_limit);
-    return {choice.method, choice.order};
+    return {choice.method, choice.order, false};
   }
 
   std::vector<int> orders_of(const std::string& method) const {
@@ -106,8 +117,12 @@ class StudyInProgress {
     throw Misuse(reason);
   }
 
+  IntegratorOptions integrator_options(const Series& series, double step) const {
+    return {series.method, series.order, step, options_.constraint_rule};
+  }
+
   Integrator integrator(const Series& series, double step) const {
-    return {entry_.scene, registry_, solvers_, {series.first, series.second, step, options_.constraint_rule}};
+    return {entry_.scene, registry_, solvers_, integrator_options(series, step)};
   }
 
   void look(double part_of_series, const std::string& what) const {
@@ -118,8 +133,9 @@ class StudyInProgress {
   }
 
   const StudyRow& run_row(const Series& series, double step, double part) {
+    if (series.variable) return run_variable_row(series, step, part);
     const StepGrid grid = fit_steps(study_.t_start, study_.t_end, step);
-    const std::string what = fmt::format("{} order {}, step {:.3g}", series.first, series.second, grid.step);
+    const std::string what = fmt::format("{} order {}, step {:.3g}", series.method, series.order, grid.step);
     const auto look_around = [&] { look(part, what); };
     look_around();
     Integrator ours = integrator(series, grid.step);
@@ -127,20 +143,30 @@ class StudyInProgress {
         run_ours(ours, grid.steps, options_.momentum, options_.repeats, truth_, look_around));
   }
 
+  const StudyRow& run_variable_row(const Series& series, double eps, double part) {
+    const std::string what = fmt::format("{} order {}, eps {:.3g}", series.name(), series.order, eps);
+    const auto look_around = [&] { look(part, what); };
+    look_around();
+    AdaptiveIntegrator ours(entry_.scene, registry_, solvers_, integrator_options(series, natural_step_),
+                            {.eps = eps, .end = study_.t_end});
+    return study_.rows.emplace_back(
+        run_variable(ours, study_.t_end, options_.momentum, options_.repeats, truth_, look_around));
+  }
+
   void run_series(const Series& series) {
     const std::size_t first = study_.rows.size();
-    study_.measured_orders.push_back({series.first, series.second, {}, 0, {}});
+    study_.measured_orders.push_back({series.name(), series.order, {}, 0, {}});
     try {
-      if (options_.steps.empty())
+      if (options_.steps.empty() || series.variable)
         study_.measured_orders.back().ladder_end = climb(series);
       else
         for (std::size_t i = 0; i < options_.steps.size(); ++i)
           run_row(series, options_.steps[i],
                   static_cast<double>(i) / static_cast<double>(options_.steps.size()));
     } catch (const Misuse& misuse) {
-      study_.rows.push_back({.method = series.first, .order = series.second, .status = misuse.what()});
+      study_.rows.push_back({.method = series.name(), .order = series.order, .status = misuse.what()});
     } catch (const CallbackError& error) {
-      study_.rows.push_back({.method = series.first, .order = series.second, .status = error.what()});
+      study_.rows.push_back({.method = series.name(), .order = series.order, .status = error.what()});
     }
     std::stable_sort(
         study_.rows.begin() + static_cast<std::ptrdiff_t>(first), study_.rows.end(),
@@ -149,13 +175,14 @@ class StudyInProgress {
 
   /// Runs the ladder of one series and says why it ended.
   std::string climb(const Series& series) {
-    const double factor = series.second > 4 ? std::sqrt(2.0) : 2.0;
+    const double factor = series.order > 4 ? std::sqrt(2.0) : 2.0;
     const std::size_t first = study_.rows.size();
-    const StudyRow natural = run_row(series, natural_step_, 0.0);
-    coarsen(series, factor, natural.error());
+    const double start = series.variable ? natural_eps : natural_step_;
+    const StudyRow natural = run_row(series, start, 0.0);
+    if (!series.variable) coarsen(series, factor, natural.error());
     double cpu_seconds = natural.cpu_seconds.median, best = natural.error();
     int in_vain = 0;
-    for (double step = natural_step_ / factor; study_.rows.size() < first + longest_ladder; step /= factor) {
+    for (double step = start / factor; study_.rows.size() < first + longest_ladder; step /= factor) {
       if (cpu_seconds * factor > options_.run_budget)
         return fmt::format("the next run would take about {:.2g} s", cpu_seconds * factor);
       const double part =

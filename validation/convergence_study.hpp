@@ -19,6 +19,7 @@ struct StudyOptions {
   std::vector<std::string> methods = {"type1/midpoint"};  ///< "auto" is default_method()
   std::vector<int> orders = {};                           ///< empty: all possible ones of each method
   std::vector<double> steps = {};                         ///< empty: a ladder, see convergence_study
+  bool adaptive = false;  ///< also variable steps, with a ladder of eps, for methods that allow them
   /// Tolerances of the yardsticks; empty: no runs of theirs.
   std::vector<double> rtols = {1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12, 1e-13, 1e-14};
   std::vector<std::string> yardsticks = {ida_method, erk_method};  ///< beside the methods

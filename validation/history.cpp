@@ -19,7 +19,9 @@ bool better(const StudyRow& a, const StudyRow& b) {
 const StudyRow* shown_row(const Study& study) {
   const StudyRow* best = nullptr;
   for (const StudyRow& row : study.rows)
-    if (row.ok() && !row.is_yardstick() && (best == nullptr || better(row, *best))) best = &row;
+    if (row.ok() && !row.is_yardstick() && !row.method.ends_with(variable_steps) &&
+        (best == nullptr || better(row, *best)))
+      best = &row;
   return best;
 }
 

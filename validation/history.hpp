@@ -25,8 +25,9 @@ struct History {
   std::string failure;             ///< empty, or why the run stopped
 };
 
-/// The run of a study that comes nearest to the error 1e-6 from below, repeated with about `points` points
-/// kept, and with half as many steps at least; where none is that exact, the most exact one.
+/// The run of a study with steps of one size that comes nearest to the error 1e-6 from below, repeated with
+/// about `points` points kept, and with half as many steps at least; where none is that exact, the most exact
+/// one.
 History record_history(const CatalogueScene& scene, const Registry& registry, const SolverFactory& solvers,
                        const Study& study, long points = 400);
 

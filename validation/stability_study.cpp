@@ -183,7 +183,8 @@ IdaBeside run_ida_beside(const StabilityCase& that, const Truth& truth, double r
     const auto without =
         that.drop_dependent_rows ? without_rows(*given, dependent_rows(*given, given->start)) : given;
     const Scene& scene = *without;
-    const IdaRun run = integrate_with_ida(scene, that.t_end, {.rtol = rtol, .max_steps = ida_most_steps});
+    const ReferenceRun run =
+        integrate_with_ida(scene, that.t_end, {.rtol = rtol, .max_steps = ida_most_steps});
     beside.cpu_seconds = run.cpu_seconds;
     if (!run.ok()) {
       beside.status = run.failure;

@@ -114,6 +114,23 @@ void judge(StudyRow& row, const Scene& scene, const Sample& end, const Truth& tr
     row.status = truth.missing;
 }
 
+namespace {
+
+/// The counts of the work and the errors, or why there are none.
+void conclude(StudyRow& row, const Work& work, const std::string& failure, const Scene& scene,
+              const Sample& end, const Truth& truth) {
+  row.steps = work.steps;
+  row.newton_iterations = work.iterations;
+  row.residual_evaluations = work.residual_evaluations;
+  row.jacobian_evaluations = work.jacobian_evaluations;
+  if (failure.empty())
+    judge(row, scene, end, truth);
+  else
+    row.status = failure;
+}
+
+}  // namespace
+
 StudyRow run_ours(Integrator& integrator, long steps, Momentum momentum, int repeats, const Truth& truth,
                   const Look& look) {
   Sample end;
@@ -127,15 +144,34 @@ StudyRow run_ours(Integrator& integrator, long steps, Momentum momentum, int rep
   const IntegratorOptions& options = integrator.options();
   StudyRow row{.method = options.method, .order = options.order, .step = options.step};
   row.cpu_seconds = repeat(once, repeats);
-  const Work& work = integrator.work();
-  row.steps = work.steps;
-  row.newton_iterations = work.iterations;
-  row.residual_evaluations = work.residual_evaluations;
-  row.jacobian_evaluations = work.jacobian_evaluations;
-  if (failure.empty())
-    judge(row, integrator.scene(), end, truth);
-  else
-    row.status = failure;
+  conclude(row, integrator.work(), failure, integrator.scene(), end, truth);
+  return row;
+}
+
+StudyRow run_variable(AdaptiveIntegrator& integrator, double t_end, Momentum momentum, int repeats,
+                      const Truth& truth, const Look& look) {
+  Sample end;
+  std::string failure;
+  const auto once = [&] {
+    double looking = 0.0;
+    long observed = 0;
+    const double before = thread_seconds();
+    integrator.reset();
+    const RunReport report = run(integrator, t_end, momentum, steps_between_looks, [&](const Sample& sample) {
+      end = sample;
+      const double pause = thread_seconds();
+      if (look && observed++ > 0) look();
+      looking += thread_seconds() - pause;
+      return true;
+    });
+    failure = report.last.failure;
+    return failure.empty() ? thread_seconds() - before - looking : -1.0;
+  };
+  const IntegratorOptions& options = integrator.options();
+  StudyRow row{
+      .method = options.method + variable_steps, .order = options.order, .step = integrator.adaptive().eps};
+  row.cpu_seconds = repeat(once, repeats);
+  conclude(row, integrator.work(), failure, integrator.integrator().scene(), end, truth);
   return row;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <diracstep/core/adaptive_integrator.hpp>
 #include <diracstep/core/integrator.hpp>
 #include <diracstep/validation/scene_catalogue.hpp>
 #include <functional>
@@ -20,13 +21,16 @@ struct CpuSeconds {
 inline constexpr const char* ida_method = "ida";
 inline constexpr const char* erk_method = "erk";
 
+/// What the method names of rows with variable steps end in.
+inline constexpr const char* variable_steps = " adaptive";
+
 /// One run of a study.  A number that does not apply or was not reached is NaN.
 struct StudyRow {
   static constexpr double none = std::numeric_limits<double>::quiet_NaN();
 
   std::string method;
   int order = 0;       ///< 0 for a yardstick
-  double step = none;  ///< ours: the step size, fitted to the interval
+  double step = none;  ///< ours: the step size, fitted to the interval, or eps of variable steps
   double rtol = none;  ///< a yardstick's
   std::string status = "ok";
   double error_q = none;
@@ -77,6 +81,11 @@ using Look = std::function<void()>;
 /// above 0.3 s is repeated less often, and one above 1 s is its own warm-up.
 StudyRow run_ours(Integrator& integrator, long steps, Momentum momentum, int repeats, const Truth& truth,
                   const Look& look = {});
+
+/// The same with variable steps to t_end; the survey of the pace belongs to the construction.  The row's
+/// method ends in `variable_steps` and its step is eps.
+StudyRow run_variable(AdaptiveIntegrator& integrator, double t_end, Momentum momentum, int repeats,
+                      const Truth& truth, const Look& look = {});
 
 /// The same for a yardstick, by its method name; `end` receives where it got to.
 StudyRow run_yardstick(const std::string& method, const Scene& scene, double t_end, double rtol, int repeats,

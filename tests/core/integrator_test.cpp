@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <diracstep/core/adaptive_integrator.hpp>
 #include <diracstep/core/run.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
 #include <limits>
@@ -338,6 +339,20 @@ TEST(Integrator, StepsAllocateNothing) {
     EXPECT_EQ(testing::allocations - before, 0);
     EXPECT_TRUE(ok);
   });
+}
+
+TEST(AdaptiveIntegrator, StepsAllocateNothing) {
+  if (!testing::counts_allocations) GTEST_SKIP() << "allocations cannot be counted here";
+  for (const auto& scene : testing::every_constraint_class())
+    for (const StepControl control : {StepControl::integrating, StepControl::in_step}) {
+      AdaptiveIntegrator integrator(scene, Registry::with_built_ins(), kinsol(),
+                                    {.method = "type1/gl:3", .step = 0.1, .compensated_sums = true},
+                                    {.eps = 0.2, .control = control});
+      for (int k = 0; k < 30; ++k) ASSERT_TRUE(integrator.step().ok());
+      const long before = testing::allocations;
+      for (int k = 0; k < 20; ++k) ASSERT_TRUE(integrator.step().ok());
+      EXPECT_EQ(testing::allocations - before, 0) << scene->name;
+    }
 }
 
 TEST(Integrator, FixedPointStepsAndKeptJacobiansAllocateNothing) {

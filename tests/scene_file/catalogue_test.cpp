@@ -65,7 +65,7 @@ TEST(PublishedCases, AWrongValueOrAWrongMotionFails) {
 
 TEST(DegenerateCircuit, IdaMeetsTheClosedFormToo) {
   const CatalogueScene entry = make_scene("lc_circuit");
-  const IdaRun ida = integrate_with_ida(*entry.scene, 10.0, {.rtol = 1e-11});
+  const ReferenceRun ida = integrate_with_ida(*entry.scene, 10.0, {.rtol = 1e-11});
   ASSERT_TRUE(ida.ok()) << ida.failure;
   const auto exact = entry.reference.at(10.0);
   ASSERT_TRUE(exact.has_value());

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <diracstep/core/integrator.hpp>
 #include <diracstep/validation/command/arguments.hpp>
+#include <diracstep/validation/command/variable_steps.hpp>
 #include <diracstep/validation/command/verbs.hpp>
 #include <diracstep/validation/report.hpp>
 #include <diracstep/validation/scene_catalogue.hpp>
@@ -20,24 +21,26 @@ struct Options {
   std::string method = automatic_method;
   int order = 0;
   std::optional<std::string> rule;
+  bool adaptive = false;
+  double eps = 0.2;
   std::vector<std::string> set;
   bool json = false;
 };
 
-std::string as_json(const Integrator& integrator) {
+std::string as_json(const Integrator& integrator, const std::vector<PlanLine>& lines) {
   nlohmann::ordered_json json;
   json["scene"] = integrator.scene().name;
   json["method"] = integrator.options().method;
   json["order"] = integrator.options().order;
   json["plan"] = nlohmann::ordered_json::array();
-  for (const PlanLine& line : integrator.plan())
+  for (const PlanLine& line : lines)
     json["plan"].push_back({{"item", line.item}, {"decision", line.decision}, {"reason", line.reason}});
   return json.dump(2) + '\n';
 }
 
-std::string as_text(const Integrator& integrator) {
+std::string as_text(const Integrator& integrator, const std::vector<PlanLine>& lines) {
   std::vector<std::vector<std::string>> rows{{"item", "decision", "reason"}};
-  for (const PlanLine& line : integrator.plan()) rows.push_back({line.item, line.decision, line.reason});
+  for (const PlanLine& line : lines) rows.push_back({line.item, line.decision, line.reason});
   return fmt::format("{} with {}, order {}\n\n{}", integrator.scene().name, integrator.options().method,
                      integrator.options().order, aligned(rows));
 }
@@ -47,7 +50,18 @@ void plan(const Options& options, Session& session) {
   const Integrator integrator(
       entry.scene, session.registry, session.solvers,
       {options.method, options.order, entry.natural_step, rule(session, options.rule)});
-  print(options.json ? as_json(integrator) : as_text(integrator));
+  std::vector<PlanLine> lines = integrator.plan();
+  if (options.adaptive) {
+    const IntegratorOptions used{.method = options.method,
+                                 .order = options.order,
+                                 .step = entry.natural_step,
+                                 .constraint_rule = rule(session, options.rule)};
+    lines = AdaptiveIntegrator(entry.scene, session.registry, session.solvers, used,
+                               {.eps = options.eps, .end = entry.t_end})
+                .plan();
+  }
+  lines.push_back(pace_line(*entry.scene, session.solvers, entry.t_end));
+  print(options.json ? as_json(integrator, lines) : as_text(integrator, lines));
 }
 
 }  // namespace
@@ -67,6 +81,8 @@ void add_plan(CLI::App& app, Session& session) {
   verb->add_option("--rule", options->rule,
                    "Rule for nonholonomic rows: left, right, midpoint, trapezoidal or one of a plugin;\n"
                    "the method's own without it");
+  verb->add_flag("--adaptive", options->adaptive, "The plan of reversible steps of varying size");
+  verb->add_option("--eps", options->eps, "Radians of a step of varying size")->capture_default_str();
   verb->add_option("--set", options->set, "Set a parameter of the scene; may be repeated")
       ->type_name("NAME=VALUE")
       ->allow_extra_args(false);

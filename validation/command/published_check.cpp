@@ -51,7 +51,8 @@ void check_published_cases(bool json, Session& session) {
   for (const std::string& name : scene_names(session)) {
     if (interrupted()) break;
     say(name);
-    for (PublishedCase& one : run_published_cases(make_scene(session, name), session.registry, session.solvers))
+    for (PublishedCase& one :
+         run_published_cases(make_scene(session, name), session.registry, session.solvers))
       cases.push_back(std::move(one));
   }
   print(json ? as_json(cases) : as_text(cases));

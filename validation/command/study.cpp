@@ -36,6 +36,7 @@ struct Options {
   std::optional<std::string> methods;
   std::optional<std::string> orders, steps, rtols;
   bool without_ida = false, without_erk = false;
+  bool adaptive = false;
   int repeat = 5;
   double budget = 1.0;
   std::optional<double> end;
@@ -110,6 +111,7 @@ StudyOptions study_options(const Options& options) {
   if (options.rtols) study.rtols = numbers("--rtols", *options.rtols);
   if (options.without_ida) std::erase(study.yardsticks, ida_method);
   if (options.without_erk) std::erase(study.yardsticks, erk_method);
+  study.adaptive = options.adaptive;
   study.repeats = options.repeat;
   study.run_budget = options.budget;
   study.t_end = options.end;
@@ -236,6 +238,8 @@ void add_study(CLI::App& app, Session& session) {
   verb->add_option("--orders", options->orders, "Orders, 2,4,…; without it all that fit");
   verb->add_option("--steps", options->steps, "Step sizes, H1,H2,…; a ladder without it");
   verb->add_option("--rtols", options->rtols, "Tolerances of the yardsticks; 1e-4,1e-5,…,1e-14 without it");
+  verb->add_flag("--adaptive", options->adaptive,
+                 "Also reversible variable steps, with a ladder of eps (in the column of the steps)");
   verb->add_flag("--without-ida", options->without_ida, "No runs of IDA");
   verb->add_flag("--without-erk", options->without_erk, "No runs of the explicit Runge–Kutta method");
   verb->add_option("--repeat", options->repeat, "Timed runs of each row")->capture_default_str();
