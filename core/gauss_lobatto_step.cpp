@@ -203,7 +203,7 @@ class GaussLobattoStep final : public StepProblem {
   double lobatto_time(int j) const { return step_.start + table_.lobatto_c[j] * step_.size; }
   int row_of(int j) const { return n_ * s_ + m_ * j; }
 
-  auto velocities(ConstVectorRef x) const { return x.head(n_ * s_).reshaped(n_, s_); }
+  Eigen::Map<const Columns> velocities(ConstVectorRef x) const { return {x.data(), n_, s_}; }
 
   /// Everything the residual is made of, at x, unless x is where it was last taken.
   void evaluate(ConstVectorRef x) {

@@ -75,7 +75,7 @@ std::vector<StabilityMethod> chosen_methods(const Options& options, const Regist
 }
 
 /// The cases on each scene given, or the scene as it stands where there are none or its parameters are set.
-std::vector<StabilityCase> chosen_cases(const Options& options) {
+std::vector<StabilityCase> chosen_cases(const Options& options, const Session& session) {
   std::vector<StabilityCase> all = stability_cases(options.full);
   if (options.scenes.empty()) {
     if (!options.set.empty()) throw Misuse("--set needs a scene whose parameters are set");
@@ -88,7 +88,7 @@ std::vector<StabilityCase> chosen_cases(const Options& options) {
     if (changes.empty())
       std::ranges::copy_if(all, std::back_inserter(chosen),
                            [&](const StabilityCase& that) { return that.scene.scene->name == scene; });
-    if (chosen.size() == before) chosen.push_back(stability_case(make_scene(scene, changes)));
+    if (chosen.size() == before) chosen.push_back(stability_case(make_scene(session, scene, changes)));
   }
   return chosen;
 }
@@ -138,7 +138,7 @@ std::string text_of(const std::vector<LinearStability>& linear, const std::vecto
 
 void stability(const Options& options, Session& session) {
   const std::vector<StabilityMethod> methods = chosen_methods(options, session.registry);
-  const std::vector<StabilityCase> cases = chosen_cases(options);
+  const std::vector<StabilityCase> cases = chosen_cases(options, session);
   const auto out = options.out.empty() ? std::nullopt : std::optional(output_directory(options.out));
   if (!options.write.empty()) (void)with_tables(options.write, {});
   Progress progress;
