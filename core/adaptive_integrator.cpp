@@ -34,6 +34,16 @@ IntegratorOptions inner_options(IntegratorOptions options, const Registry& regis
   return options;
 }
 
+/// "auto" replaced by the method it stands for.
+IntegratorOptions with_method(IntegratorOptions options, const Scene& scene) {
+  if (options.method != automatic_method) return options;
+  const DefaultMethod choice =
+      default_method(scene, options.order, options.constraint_rule, options.dense_limit);
+  options.method = choice.method;
+  options.order = choice.order;
+  return options;
+}
+
 std::vector<double> eps_fractions(const IntegratorOptions& given, int inner_order, StepControl control) {
   if (control != StepControl::in_step || given.order == 0 || given.order == inner_order) return {1.0};
   const auto fractions = composition_fractions(given.order);
@@ -66,12 +76,12 @@ AdaptiveIntegrator::AdaptiveIntegrator(std::shared_ptr<const Scene> scene, const
                                        const SolverFactory& solvers, IntegratorOptions options,
                                        AdaptiveOptions adaptive)
     : adaptive_(checked(adaptive)),
-      options_(options),
-      main_(std::move(scene), registry, solvers, inner_options(options, registry, adaptive.control)),
-      side_(std::make_shared<const Scene>(main_.scene()), registry, solvers, options),
-      meter_(make_meter(main_.scene(), solvers, adaptive_, options.step, report_.accelerations)),
-      sign_(options.step > 0.0 ? 1.0 : -1.0) {
-  fractions_ = eps_fractions(options, main_.options().order, adaptive_.control);
+      options_(with_method(std::move(options), *completed(scene))),
+      main_(scene, registry, solvers, inner_options(options_, registry, adaptive.control)),
+      side_(std::make_shared<const Scene>(main_.scene()), registry, solvers, options_),
+      meter_(make_meter(main_.scene(), solvers, adaptive_, options_.step, report_.accelerations)),
+      sign_(options_.step > 0.0 ? 1.0 : -1.0) {
+  fractions_ = eps_fractions(options_, main_.options().order, adaptive_.control);
   options_.order = side_.options().order;
   reset();
 }

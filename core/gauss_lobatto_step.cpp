@@ -73,7 +73,7 @@ class GaussLobattoStep final : public StepProblem {
   }
 
   void reset() override {
-    lq_.setZero();
+    for (Columns* columns : {&lq_, &lqq_}) columns->setZero();
     last_x_.setZero();
     if (sums_) sums_->forget();
     curvature_ = row_curvature_ = 0.0;

@@ -94,6 +94,11 @@ OrderScene degenerate_order_scene() {
   return scene;
 }
 
+bool takes(const Method& method, const OrderScene& scene) {
+  if (scene.scene->lagrangian->structure().y_hessian_zero) return method.stages > 0;
+  return !(scene.scene->force && method.info.type == GeneratingType::four);
+}
+
 int claimed_order(const MethodInfo& method, const Scene& scene) {
   const bool constrained = scene.rows() > 0 || scene.force;
   return constrained && method.constrained_order > 0 ? method.constrained_order : method.order;

@@ -33,6 +33,10 @@ struct OrderMeasurement {
   std::string failure;  ///< empty, or why there is no order
 };
 
+/// Whether a method is for a scene: type 4 takes no forces, and phase-space Lagrangians are for the
+/// Gauss-Lobatto family.
+bool takes(const Method& method, const OrderScene& scene);
+
 /// The order that a method states for a scene: its constrained order where that has rows or a force and one
 /// is stated.
 int claimed_order(const MethodInfo& method, const Scene& scene);

@@ -47,8 +47,8 @@ Check check_consistency(const Subject& subject) {
 
 Check check_order(const Subject& subject, const OrderScene& scene) {
   const MethodInfo& info = subject.method.info;
-  if (scene.scene->force && info.type == GeneratingType::four)
-    return not_applicable("type 4 takes no forces");
+  if (!takes(subject.method, scene))
+    return not_applicable(scene.scene->force ? "type 4 takes no forces" : "only the Gauss-Lobatto family");
   const int claimed = claimed_order(info, *scene.scene);
   const OrderMeasurement measured = measure_order(subject.registry, scene, subject.stepping());
   if (!measured.failure.empty()) return pass_if(false, measured.order, claimed, measured.failure);

@@ -18,12 +18,6 @@ constexpr int highest_visible_order = 8;
 
 bool degenerate(const OrderScene& scene) { return scene.scene->lagrangian->structure().y_hessian_zero; }
 
-/// Type 4 takes no forces; phase-space Lagrangians are for the Gauss-Lobatto family.
-bool takes(const Method& method, const OrderScene& scene) {
-  if (degenerate(scene)) return method.stages > 0;
-  return !(scene.scene->force && method.info.type == GeneratingType::four);
-}
-
 double membership(const Registry& registry, const Method& method, const OrderScene& scene,
                   const IntegratorOptions& options) {
   constexpr long steps = 20;

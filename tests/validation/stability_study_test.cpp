@@ -65,7 +65,7 @@ TEST(LinearStability, ACompositionWithNegativeStepsMeetsItsPoleUnderDamping) {
 
 TEST(LinearStability, AMethodWithoutForcesHasNoDampingLimit) {
   EXPECT_TRUE(std::isnan(linear("type4/legendre(type1/midpoint)", 2).damping_limit));
-  EXPECT_THROW((void)linear("type1/gl:2", 6), Misuse);
+  EXPECT_THROW((void)linear("type1/gl:2", 5), Misuse);
 }
 
 StabilityCase knife_edge(long steps) {
@@ -109,7 +109,7 @@ TEST(StabilityRun, EveryOutcomeCanBeReached) {
   EXPECT_EQ(run_case(that, "type1/gl:3").outcome, StabilityOutcome::accurate);
   that.accuracy = 0.0;
   EXPECT_EQ(run_case(that, "type1/gl:3").outcome, StabilityOutcome::bounded);
-  EXPECT_EQ(run_case(that, "type1/gl:3", 8).outcome, StabilityOutcome::refused);
+  EXPECT_EQ(run_case(that, "type1/gl:3", 7).outcome, StabilityOutcome::refused);
   const StabilityRow refused = run_case(that, "type1/no such method");
   EXPECT_EQ(refused.outcome, StabilityOutcome::refused);
   EXPECT_NE(refused.message.find("no such method"), std::string::npos);
