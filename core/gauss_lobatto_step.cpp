@@ -382,7 +382,9 @@ class GaussLobattoStep final : public StepProblem {
     lagrangian_->gradient(step_.start, q0_, v0, lq_.col(0), lv_.col(0));
     lagrangian_->hessian(step_.start, q0_, v0, lqq_.col(0), lqv_.col(0), lvv_.col(0));
     curvature_ = std::max(curvature_, max_norm(lqq_.col(0)));
+    const double before = blocks_[0].scale;  // of impulses nothing is known yet
     update_scales();
+    blocks_[0].scale = std::max(blocks_[0].scale, before);
   }
 
   /// Terms of the momentum rows are momenta, those of the last step where this one is not solved yet; a
