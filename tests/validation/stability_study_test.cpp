@@ -195,7 +195,13 @@ TEST(EnergyDoubt, NamesTheWorstPoint) {
   const auto entry = make_scene("kepler_e06");
   const Scene& scene = *entry.scene;
   EnergyDoubt doubt(scene);
-  Sample point{.time = 1.0, .q = scene.start.q, .v = scene.start.v, .p = {}, .lambda = {}, .impulse = {}, .energy = -0.49};
+  Sample point{.time = 1.0,
+               .q = scene.start.q,
+               .v = scene.start.v,
+               .p = {},
+               .lambda = {},
+               .impulse = {},
+               .energy = -0.49};
   doubt.see(point);
   EXPECT_EQ(doubt.text(), "");
   point.energy = std::nan("");
