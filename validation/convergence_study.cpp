@@ -293,7 +293,7 @@ void conclude(Study& study) {
                  .order = ours.order,
                  .ida_cpu_seconds = ida_seconds,
                  .erk_cpu_seconds = erk_seconds};
-      at.cpu_seconds = cpu_seconds_at(points(study, ours.method, ours.order), error);
+      at.cpu_seconds = cpu_seconds_within(points(study, ours.method, ours.order), error);
       if (at.cpu_seconds && ida_seconds) at.ratio = *ida_seconds / *at.cpu_seconds;
       if (at.cpu_seconds && erk_seconds) at.erk_ratio = *erk_seconds / *at.cpu_seconds;
       study.at_error.push_back(at);

@@ -46,7 +46,8 @@ struct AtError {
   std::string method;
   int order = 0;
   bool best = false;  ///< the fastest of ours at this error
-  std::optional<double> cpu_seconds = {};
+  std::optional<double> cpu_seconds =
+      {};  ///< of ours an upper bound where its coarsest run is below the error
   std::optional<double> ida_cpu_seconds = {};
   std::optional<double> ratio = {};  ///< IDA's time over ours
   std::optional<double> erk_cpu_seconds = {};

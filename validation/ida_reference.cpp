@@ -292,6 +292,7 @@ class IdaIntegration {
     end.p.resize(n);
     scene_.lagrangian->gradient(t, end.q, end.v, force, end.p);
     end.energy = scene_.energy(t, end.q, end.v);
+    if (scene_.rows() == 0) return;
     const SolveReport report = solve_acceleration(t, end.q, end.v);
     end.lambda = acceleration_.tail(scene_.rows());
     if (run.ok() && !report.ok()) run.failure = std::string("forces at the end: ") + describe(report.status);

@@ -107,4 +107,10 @@ std::optional<double> cpu_seconds_at(const std::vector<WorkPoint>& points, doubl
   return std::nullopt;
 }
 
+std::optional<double> cpu_seconds_within(const std::vector<WorkPoint>& points, double error) {
+  const std::vector<WorkPoint> envelope = lower_envelope(points);
+  if (!envelope.empty() && envelope.front().error < error) return envelope.front().cpu_seconds;
+  return cpu_seconds_at(points, error);
+}
+
 }  // namespace diracstep

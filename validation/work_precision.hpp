@@ -40,4 +40,7 @@ std::vector<WorkPoint> lower_envelope(std::vector<WorkPoint> points);
 /// where the envelope does not reach the error, or starts below it: nothing is extrapolated.
 std::optional<double> cpu_seconds_at(const std::vector<WorkPoint>& points, double error);
 
+/// The same, but where the cheapest point is below the error already its time: an upper bound.
+std::optional<double> cpu_seconds_within(const std::vector<WorkPoint>& points, double error);
+
 }  // namespace diracstep

@@ -73,6 +73,14 @@ TEST(CpuSecondsAt, NeverExtrapolates) {
   EXPECT_FALSE(cpu_seconds_at({}, 1e-3).has_value());
 }
 
+TEST(CpuSecondsWithin, TakesTheCheapestPointWhereThatIsExactEnough) {
+  const std::vector<WorkPoint> points{{0.1, 1e-2, 1.0}, {0.05, 1e-4, 100.0}};
+  EXPECT_EQ(cpu_seconds_within(points, 1e-1), 1.0);
+  EXPECT_NEAR(*cpu_seconds_within(points, 1e-3), 10.0, 1e-12);
+  EXPECT_FALSE(cpu_seconds_within(points, 0.9e-4).has_value());
+  EXPECT_FALSE(cpu_seconds_within({}, 1e-3).has_value());
+}
+
 TEST(CpuSecondsAt, LeavesOutBeatenPoints) {
   const std::vector<WorkPoint> points{
       {0.1, 1e-2, 1.0}, {0.07, 5e-2, 2.0}, {0.05, 1e-4, 100.0}, {0.01, 1e-3, 900.0}};

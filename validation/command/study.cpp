@@ -55,9 +55,10 @@ constexpr const char* explanation =
     "the relative\n"
     "error (maximum norm, q and projected p) at the end of the motion reaches each level, read off the lower "
     "envelope of\n"
-    "error against time by log-log interpolation. A dash: the method does not get there, or is below the "
-    "level with the\n"
-    "coarsest step it was run with. The fastest of ours is bold. One run on one machine: compare within a "
+    "error against time by log-log interpolation. A dash: the method does not get there. Where the "
+    "coarsest step is\n"
+    "below the level already, its time stands; of a yardstick, a dash. The fastest of ours is bold. One run "
+    "on one machine: compare within a "
     "table.\n\n";
 
 std::string tables(const std::vector<Study>& studies) {
