@@ -55,8 +55,18 @@ class GaussLobattoStep final : public StepProblem {
     return true;
   }
 
-  void reset() override {
-    for (Columns* columns : {&lq_, &lqq_}) columns->setZero();
+  void keep() override {
+    force_size_ = max_norm(lq_);
+    if (curvature_known_) curvature_size_ = max_norm(lqq_);
+  }
+  void reset() override { force_size_ = curvature_size_ = 0.0; }
+  void save(Snapshot& to) const override {
+    to.put(force_size_);
+    to.put(curvature_size_);
+  }
+  void restore(Snapshot& from) override {
+    force_size_ = from.number();
+    curvature_size_ = from.number();
   }
   const SparsityPattern& pattern() const override { return pattern_; }
   std::span<const ResidualBlock> blocks() const override { return blocks_; }
@@ -72,6 +82,7 @@ class GaussLobattoStep final : public StepProblem {
     q0_ = q0;
     p0_ = p0;
     last_x_[0] = std::nan("");
+    curvature_known_ = false;
     for (Rows& rows : rows_) rows.evaluate_impulse_rows(step_.start, q0_, 0);
     update_scales();
   }
@@ -105,6 +116,7 @@ class GaussLobattoStep final : public StepProblem {
 
   void jacobian(ConstVectorRef x, VectorRef values) override {
     evaluate(x);
+    curvature_known_ = true;
     for (int i = 0; i < s_; ++i) {
       lagrangian_->hessian(gauss_time(i), q_.col(i), x.segment(n_ * i, n_), lqq_.col(i), lqv_.col(i),
                            lvv_.col(i));
@@ -281,7 +293,7 @@ class GaussLobattoStep final : public StepProblem {
     const double velocity = max_norm(q0_) / h;
     double one_forms = 0.0;
     for (const Rows& rows : rows_) one_forms = std::max(one_forms, max_norm(rows.at_lobatto.col(0)));
-    blocks_[0].scale = usable_scale(max_norm(p0_) + h * max_norm(lq_) + h * max_norm(lqq_) * max_norm(q0_));
+    blocks_[0].scale = usable_scale(max_norm(p0_) + h * force_size_ + h * curvature_size_ * max_norm(q0_));
     if (m_ > 0) blocks_[1].scale = usable_scale(one_forms * velocity);
   }
 
@@ -305,6 +317,8 @@ class GaussLobattoStep final : public StepProblem {
   Columns lq_, lv_;        ///< ∂L/∂q + f and ∂L/∂v at the Gauss nodes
   Columns impulses_;       ///< A(Q~_j)ᵀ λ_j
   Columns lqq_, lqv_, lvv_, fq_, fv_;
+  bool curvature_known_ = false;                    ///< lqq_ was evaluated in this step
+  double force_size_ = 0.0, curvature_size_ = 0.0;  ///< of ∂L/∂q and ∂²L/∂q² in the last step kept
 };
 
 }  // namespace

@@ -63,6 +63,8 @@ Integrator::Integrator(Preparation preparation, const Registry& registry, const 
       velocity_problem_(*scene_, dense_),
       acceleration_problem_(*scene_, dense_) {
   require_step(options_.step);
+  if (options_.substeps < 1)
+    throw Misuse("substeps = " + std::to_string(options_.substeps) + "; 1 or more is needed");
   if (scene_->lagrangian->structure().y_hessian_zero) {
     phase_space_velocity_problem_.emplace(*scene_, dense_);
     velocity_solver_ = solvers(*phase_space_velocity_problem_);
@@ -72,6 +74,7 @@ Integrator::Integrator(Preparation preparation, const Registry& registry, const 
   }
   plan_stages(registry, solvers);
   velocity_unknowns_.setZero(velocity_problem_.size());
+  start_velocity_.setZero(scene_->dimension());
   acceleration_unknowns_.setZero(acceleration_problem_.size());
   reset(scene_->start);
 }
@@ -80,8 +83,11 @@ Integrator::Part Integrator::make_part(const Method& method, bool mirror_rule,
                                        const SolverFactory& solvers) const {
   std::optional<StepRule> rule = options_.constraint_rule;
   if (rule && mirror_rule) rule = mirrored(*rule);
-  Part part{method.step(*scene_, dense_, rule, options_.force_degenerate), nullptr};
-  if (part.problem->size() > 0) part.solver = solvers(*part.problem);
+  Part part{method.step(*scene_, dense_, rule, options_.force_degenerate), nullptr, nullptr};
+  if (part.problem->size() > 0) {
+    part.solver = solvers(*part.problem);
+    part.continuation = std::make_unique<StepContinuation>(*part.problem, *part.solver);
+  }
   return part;
 }
 
@@ -122,43 +128,51 @@ void Integrator::reset(const Start& start) {
   scene_->lagrangian->gradient(start.time, q_, v_, lq, p_);
   if (!p_.allFinite())
     throw Misuse("scene '" + scene_->name + "': the momentum ∂L/∂v is not finite at the start");
+  forget();
+  work_ = {};
+}
+
+/// Nothing of the steps so far shows in the next ones.
+void Integrator::forget() {
   first_stage_solved_ = false;
   for (Stage& stage : stages_) stage.predictor.reset();
   for (Part& part : parts_) {
     part.problem->reset();
     if (part.solver) part.solver->reset();
   }
-  work_ = {};
 }
 
-void Integrator::count(const SolveReport& report) {
-  ++work_.solves;
+void Integrator::count(const SolveReport& report, long solves) {
+  work_.solves += solves;
+  work_.retries.line_searches += report.line_searches;
   work_.iterations += report.iterations;
   work_.residual_evaluations += report.residual_evaluations;
   work_.jacobian_evaluations += report.jacobian_evaluations;
 }
 
-SolveReport Integrator::solve_stage(std::size_t number, double t, const Vector& q, const Vector& p) {
+SolveReport Integrator::solve_stage(std::size_t number, double t, const Vector& q, const Vector& p,
+                                    Guess guess) {
   Stage& stage = stages_[number];
   Part& part = parts_[stage.part];
-  part.problem->begin({t, stage.fraction * options_.step}, q, p);
+  const Interval step{t, stage.fraction * size_};
+  part.problem->begin(step, q, p);
   if (!part.solver) return {};
-  const bool predicted = stage.predictor.ready();
-  if (predicted)
+  if (guess == Guess::predicted && !stage.predictor.ready()) guess = Guess::plain;
+  if (guess == Guess::predicted)
     stage.predictor.predict(stage.solution);
   else
     part.problem->guess(v_, stage.solution);
-  SolveReport report = part.solver->solve(stage.solution);
+  const SolveReport report = part.solver->solve(stage.solution);
   count(report);
-  if (report.ok() || !predicted) return report;
-  part.problem->guess(v_, stage.solution);
-  report = part.solver->solve(stage.solution);
-  count(report);
-  return report;
+  if (report.ok() && !doubtful(stage, step, q, p, guess, report)) return report;
+  return retry_stage(stage, step, q, p, guess, report);
 }
 
 StepReport Integrator::failed(const SolveReport& report, const StepProblem& problem, double time) {
   first_stage_solved_ = false;  // the problem holds the data of the stage that failed
+  v_ = v_before_;
+  for (Part& part : parts_)
+    if (part.solver) part.solver->reset();  // pivots chosen for a matrix that led nowhere
   std::ostringstream message;
   message << "step " << work_.steps << " from t = " << time << ": " << describe(report.status) << " after "
           << report.iterations << " iterations";
@@ -168,25 +182,47 @@ StepReport Integrator::failed(const SolveReport& report, const StepProblem& prob
     message << separator << blocks[b].name << " residual " << report.residual_norms[b];
     separator = ", ";
   }
+  if (reached_ > 0.0 && reached_ < 1.0)
+    message << "; the solution can be followed up to a step of " << reached_ * size_;
   return {report, work_.steps, time, message.str()};
 }
 
 StepReport Integrator::step() {
+  size_ = options_.step;
+  StepReport report = take(1);
+  for (int pieces = 2; !report.ok() && pieces <= options_.substeps; pieces *= 2) {
+    size_ = options_.step / pieces;
+    const StepReport divided = take(pieces);
+    if (!divided.ok()) continue;
+    ++work_.retries.divided_steps;
+    report = divided;
+  }
+  size_ = options_.step;
+  return report;
+}
+
+/// One step in so many equal pieces.
+StepReport Integrator::take(int pieces) {
   const double start = time();
+  const Guess guess = pieces == 1 ? Guess::predicted : Guess::plain;
   double t = start;
   SolveReport total;
+  reached_ = 1.0;
+  v_before_ = v_;
   q_stage_ = q_;
   p_stage_ = p_;
-  for (std::size_t k = 0; k < stages_.size(); ++k) {
-    Stage& stage = stages_[k];
+  for (std::size_t k = 0; k < stages_.size() * static_cast<std::size_t>(pieces); ++k) {
+    const std::size_t number = k % stages_.size();
+    Stage& stage = stages_[number];
     StepProblem& problem = *parts_[stage.part].problem;
-    const double h = stage.fraction * options_.step;
+    const double h = stage.fraction * size_;
     if (k > 0 || !first_stage_solved_) {
-      const SolveReport report = solve_stage(k, t, q_stage_, p_stage_);
+      const SolveReport report = solve_stage(number, t, q_stage_, p_stage_, guess);
       if (!report.ok()) return failed(report, problem, start);
       total.iterations += report.iterations;
       total.residual_evaluations += report.residual_evaluations;
       total.jacobian_evaluations += report.jacobian_evaluations;
+      total.line_searches += report.line_searches;
       total.residual_norms = report.residual_norms;
     }
     problem.finish(stage.solution, q_next_, p_next_, impulse_);
@@ -201,27 +237,38 @@ StepReport Integrator::step() {
   }
   std::swap(q_, q_stage_);
   std::swap(p_, p_stage_);
-  for (Stage& stage : stages_) stage.predictor.learn(stage.solution);
+  for (Stage& stage : stages_)
+    if (pieces == 1)
+      stage.predictor.learn(stage.solution);
+    else
+      stage.predictor.reset();  // its steps are no longer equally long
+  for (Part& part : parts_) part.problem->keep();
   first_stage_solved_ = false;
   return {total, work_.steps++, start, {}};
+}
+
+/// The velocity in Δ_Q(q) whose momentum is p up to the annihilator.
+SolveReport Integrator::project_velocity(double t, const Vector& q, const Vector& p, Vector& v) {
+  const Eigen::Index n = q_.size();
+  velocity_solver_->reset();
+  if (phase_space_velocity_problem_) {
+    phase_space_velocity_problem_->begin(t, q);
+    v = v_;
+    return velocity_solver_->solve(v);
+  }
+  velocity_problem_.begin(t, q, p);
+  velocity_unknowns_.head(n) = v_;
+  velocity_unknowns_.tail(velocity_unknowns_.size() - n).setZero();
+  const SolveReport report = velocity_solver_->solve(velocity_unknowns_);
+  if (report.ok()) v = velocity_unknowns_.head(n);
+  return report;
 }
 
 /// v, and the forces of the rows into acceleration_unknowns_.  Reading leaves no trace in the stepping: v_
 /// stays.
 SolveReport Integrator::solve_velocity(double t, Vector& v) {
-  const Eigen::Index n = q_.size();
-  if (phase_space_velocity_problem_) {
-    phase_space_velocity_problem_->begin(t, q_);
-    v = v_;
-    return velocity_solver_->solve(v);
-  }
-  velocity_problem_.begin(t, q_, p_);
-  velocity_solver_->reset();
-  velocity_unknowns_.head(n) = v_;
-  velocity_unknowns_.tail(velocity_unknowns_.size() - n).setZero();
-  const SolveReport report = velocity_solver_->solve(velocity_unknowns_);
-  if (!report.ok()) return report;
-  v = velocity_unknowns_.head(n);
+  const SolveReport report = project_velocity(t, q_, p_, v);
+  if (!report.ok() || phase_space_velocity_problem_) return report;
   acceleration_problem_.begin(t, q_, v);
   acceleration_unknowns_.setZero();
   acceleration_solver_->reset();
@@ -244,7 +291,9 @@ SolveReport Integrator::sample(Momentum momentum, Sample& sample) {
     scene_->lagrangian->gradient(t, q_, sample.v, q_next_, sample.p);
   } else if (momentum == Momentum::minus && m > 0) {
     if (!first_stage_solved_) {
-      report = solve_stage(0, t, q_, p_);
+      size_ = options_.step;
+      v_before_ = v_;
+      report = solve_stage(0, t, q_, p_, Guess::predicted);
       if (!report.ok()) return report;
       first_stage_solved_ = true;
     }

@@ -54,6 +54,7 @@ class ImplicitStep final : public StepProblem {
     hessian_.setZero(s_->pattern().nonzeros(), s_->pairs());
     last_x_.setConstant(size(), std::nan(""));
     q1_.setZero(n_);
+    terms_.setZero(s_->columns());
     if (scene.force) {
       if (s_->type() == GeneratingType::four) throw Misuse("generating functions of type 4 take no forces");
       force_.emplace(scene.force, rule);
@@ -67,8 +68,18 @@ class ImplicitStep final : public StepProblem {
 
   int size() const override { return n_ + m_ + inner_; }
   int leading_unknowns() const override { return n_; }
-  void reset() override {
-    for (Columns* columns : {&y_, &hessian_}) columns->setZero();
+  void keep() override {
+    if (hessian_known_) measure_terms();
+    terms_known_ = terms_known_ || hessian_known_;
+  }
+  void reset() override { terms_known_ = false; }
+  void save(Snapshot& to) const override {
+    to.put(terms_known_ ? 1.0 : 0.0);
+    to.put(terms_);
+  }
+  void restore(Snapshot& from) override {
+    terms_known_ = from.whole_number(1) == 1;
+    from.read(terms_);
   }
   const SparsityPattern& pattern() const override { return pattern_; }
   std::span<const ResidualBlock> blocks() const override { return blocks_; }
@@ -83,7 +94,8 @@ class ImplicitStep final : public StepProblem {
   void begin(Interval step, const Vector& q0, const Vector& p0) override {
     data_.freeze(step, q0, p0);
     last_x_[0] = std::nan("");
-    if (hessian_.isZero(0.0)) sample_hessian();
+    if (!terms_known_) sample_hessian();
+    hessian_known_ = false;
     update_scales();
   }
 
@@ -117,6 +129,7 @@ class ImplicitStep final : public StepProblem {
   void jacobian(ConstVectorRef x, VectorRef values) override {
     evaluate(x);
     s_->hessian(data_.step, y_, hessian_);
+    hessian_known_ = true;
     values.setZero();
     for (const HessianBlock& block : hessian_blocks_) {
       const double factor = block.row_factor(*this) * block.column_factor(*this);
@@ -315,16 +328,21 @@ class ImplicitStep final : public StepProblem {
     if (inner_ > 0)
       s_->guess_inner(data_.step, data_.q0, data_.p0, Vector::Zero(n_), y_.rightCols(s_->inner_columns()));
     s_->hessian(data_.step, y_, hessian_);
+    measure_terms();
+  }
+
+  void measure_terms() {
+    for (int i = 0; i < s_->columns(); ++i) terms_[i] = cancelling_terms(i);
   }
 
   void update_scales() {
     const double own =
         graph_.starts_from_position ? std::abs(data_.step.size) * max_norm(data_.p0) : max_norm(data_.q0);
-    blocks_[0].scale = usable_scale(std::max(own, std::abs(row_factor()) * cancelling_terms(0)));
+    blocks_[0].scale = usable_scale(std::max(own, std::abs(row_factor()) * terms_[0]));
     if (m_ > 0) blocks_[1].scale = data_.constraint_scale();
     if (inner_ == 0) return;
     double largest = 0.0;
-    for (int i = 2; i < s_->columns(); ++i) largest = std::max(largest, cancelling_terms(i));
+    for (int i = 2; i < s_->columns(); ++i) largest = std::max(largest, terms_[i]);
     blocks_.back().scale = usable_scale(largest);
   }
 
@@ -356,6 +374,8 @@ class ImplicitStep final : public StepProblem {
   std::vector<ResidualBlock> blocks_;
   Vector last_x_, q1_;
   Columns y_, gradient_, hessian_;
+  Vector terms_;  ///< size of the terms of each column of the gradient, in the last step kept
+  bool terms_known_ = false, hessian_known_ = false;
 };
 
 /// The graph is solved for its end by S itself; what is left is c(q0, q1(p0 + A(q0)ᵀλ)) = 0 for hλ.

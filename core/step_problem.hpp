@@ -33,8 +33,16 @@ class StepProblem : public NonlinearProblem {
   /// How many unknowns come before the multipliers, whose guess hardly matters.
   virtual int leading_unknowns() const { return size(); }
 
+  /// Keeps what the next steps need of the one just finished: the sizes of terms that round-off is judged by.
+  /// Until then a step leaves no trace.
+  virtual void keep() {}
+
   /// Forgets all that earlier steps left behind, so that a run repeats bit by bit.
   virtual void reset() {}
+
+  /// Writes and reads what was kept.
+  virtual void save(Snapshot& /*to*/) const {}
+  virtual void restore(Snapshot& /*from*/) {}
 
   /// What the unknowns are, for plans: "q1 (3), λ (1)".
   virtual std::string unknowns() const = 0;

@@ -50,12 +50,17 @@ class KinsolSolver final : public NonlinearSolver {
     guess_ = x;
     set_scales();
     attempt(KIN_NONE);
-    if (!report_.ok()) attempt(KIN_LINESEARCH);
+    if (!report_.ok()) {
+      ++report_.line_searches;
+      attempt(KIN_LINESEARCH);
+    }
     x = unknowns();
     return report_;
   }
 
   void reset() override { linear_solver_->reset(); }
+  void save(Snapshot& to) const override { linear_solver_->save(to); }
+  void restore(Snapshot& from) override { linear_solver_->restore(from); }
 
   std::string description() const override { return std::string("KINSOL, ") + linear_solver_->name(); }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <diracstep/core/snapshot.hpp>
 #include <diracstep/core/sparsity_pattern.hpp>
 #include <memory>
 
@@ -15,6 +16,9 @@ class LinearSolver {
   virtual void solve(double* b) = 0;
   /// Forgets the pivots of earlier factorisations.
   virtual void reset() {}
+  /// Writes and reads what the next factorisation depends on.
+  virtual void save(Snapshot& /*to*/) const {}
+  virtual void restore(Snapshot& /*from*/) {}
   virtual const char* name() const = 0;
 };
 

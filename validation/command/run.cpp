@@ -6,10 +6,8 @@
 #include <diracstep/core/run.hpp>
 #include <diracstep/validation/command/arguments.hpp>
 #include <diracstep/validation/command/interrupt.hpp>
-#include <diracstep/validation/command/run_report.hpp>
-#include <diracstep/validation/command/trajectory_file.hpp>
+#include <diracstep/validation/command/run_control.hpp>
 #include <diracstep/validation/command/verbs.hpp>
-#include <diracstep/validation/progress.hpp>
 #include <memory>
 #include <optional>
 
@@ -26,61 +24,12 @@ struct Options {
   std::string momentum = "projected";
   std::string out;
   long every = 1;
+  int substeps = 1;
+  std::string checkpoint;
+  long checkpoint_every = 0;
+  std::string resume;
   std::vector<std::string> set;
   bool json = false;
-};
-
-/// Steps to the end, to a failure or to Ctrl-C, and keeps points on the way.
-class Trajectory {
- public:
-  Trajectory(Integrator& integrator, Momentum momentum, long every, TrajectoryFile* file, RunResult& result)
-      : integrator_(integrator), momentum_(momentum), every_(every), file_(file), result_(result) {}
-
-  void run(long steps) {
-    keep();
-    for (long k = 1; k <= steps && result_.failure.empty() && !interrupted(); ++k) {
-      const StepReport report = integrator_.step();
-      if (!report.ok())
-        result_.failure = report.failure;
-      else if (k == steps || (file_ != nullptr && k % every_ == 0))
-        keep();
-      if (k % steps_between_looks == 0) show(k, steps);
-    }
-    if (result_.failure.empty() && interrupted() && integrator_.work().steps < steps)
-      result_.failure = fmt::format("interrupted at t = {:.17g}", integrator_.time());
-    if (integrator_.time() != kept_time_) keep();
-    result_.work = integrator_.work();
-  }
-
- private:
-  static constexpr long steps_between_looks = 256;
-
-  void keep() {
-    Sample sample;
-    const SolveReport report = integrator_.sample(momentum_, sample);
-    if (!report.ok()) {
-      if (result_.failure.empty())
-        result_.failure =
-            fmt::format("reading the state at t = {}: {}", integrator_.time(), describe(report.status));
-      return;
-    }
-    kept_time_ = integrator_.time();
-    if (file_ != nullptr) file_->write(sample);
-    result_.end = std::move(sample);
-  }
-
-  void show(long k, long steps) {
-    progress_.show(static_cast<double>(k) / static_cast<double>(steps),
-                   fmt::format("step {} of {}", k, steps));
-  }
-
-  Integrator& integrator_;
-  Momentum momentum_;
-  long every_;
-  TrajectoryFile* file_;
-  RunResult& result_;
-  double kept_time_ = std::nan("");
-  Progress progress_;
 };
 
 StepGrid fitted_steps(const CatalogueScene& entry, double end, const std::optional<double>& wanted) {
@@ -93,19 +42,61 @@ StepGrid fitted_steps(const CatalogueScene& entry, double end, const std::option
   return grid;
 }
 
-void run(const Options& options, Session& session) {
-  const CatalogueScene entry = make_scene(options.scene, parameters(options.set));
-  const Momentum representative = momentum(options.momentum);
+void require_sense(const Options& options) {
   if (options.every < 1) throw Misuse(fmt::format("--every = {}; 1 or more is needed", options.every));
+  if (options.checkpoint_every < 0)
+    throw Misuse(
+        fmt::format("--checkpoint-every = {}; a number of steps is needed, or 0 for every ten seconds",
+                    options.checkpoint_every));
+  if (options.checkpoint_every > 0 && options.checkpoint.empty() && options.resume.empty())
+    throw Misuse("--checkpoint-every without --checkpoint FILE");
+  if (!options.out.empty() && options.out == options.checkpoint)
+    throw Misuse(fmt::format("--out and --checkpoint are both '{}'", options.out));
+}
+
+/// Where the file goes on: from the checkpoint, or from its beginning.
+void open_trajectory(std::optional<TrajectoryFile>& file, const Options& options, const Scene& scene,
+                     const std::optional<Checkpoint>& saved) {
+  if (options.out.empty()) return;
+  if (saved)
+    file.emplace(options.out, scene, TrajectoryFile::Mark{saved->points, saved->bytes});
+  else
+    file.emplace(options.out, scene);
+}
+
+void go_on(const Checkpoint& saved, const Options& options, Integrator& integrator) {
+  try {
+    integrator.restore(saved.state);
+  } catch (const Misuse& misuse) {
+    throw Misuse(fmt::format("--resume: '{}': {}", options.resume, misuse.what()));
+  }
+  say(fmt::format("going on from step {}, t = {:g}", integrator.work().steps, integrator.time()));
+}
+
+void run(const Options& options, Session& session) {
+  require_sense(options);
+  const CatalogueScene entry = make_scene(options.scene, parameters(options.set));
+  Keeping keeping{.momentum = momentum(options.momentum), .every = options.every};
   const StepGrid grid = fitted_steps(entry, options.end.value_or(entry.t_end), options.step);
-  Integrator integrator(entry.scene, session.registry, session.solvers,
-                        {options.method, options.order, grid.step, {}});
+  Integrator integrator(
+      entry.scene, session.registry, session.solvers,
+      {.method = options.method, .order = options.order, .step = grid.step, .substeps = options.substeps});
+  keeping.checkpoint = options.checkpoint.empty() ? options.resume : options.checkpoint;
+  keeping.checkpoint_every = options.checkpoint_every;
+  keeping.identity = identity(entry, integrator, keeping, !options.out.empty());
+  std::optional<Checkpoint> saved;
+  if (!options.resume.empty()) {
+    saved = read_checkpoint(options.resume);
+    require_same_run(*saved, keeping.identity, options.resume);
+    go_on(*saved, options, integrator);
+  }
   std::optional<TrajectoryFile> file;
-  if (!options.out.empty()) file.emplace(options.out, *entry.scene);
+  open_trajectory(file, options, *entry.scene, saved);
+  if (file) keeping.file = &*file;
 
   RunResult result;
-  result.momentum = representative;
-  Trajectory(integrator, representative, options.every, file ? &*file : nullptr, result).run(grid.steps);
+  result.momentum = keeping.momentum;
+  run_to(grid.steps, integrator, keeping, result);
   if (file) {
     file->close();
     result.out = options.out;
@@ -139,6 +130,18 @@ void add_run(CLI::App& app, Session& session) {
       ->capture_default_str();
   verb->add_option("--out", options->out, "CSV file for the trajectory")->type_name("FILE");
   verb->add_option("--every", options->every, "Keep each K-th point")->type_name("K")->capture_default_str();
+  verb->add_option("--substeps", options->substeps,
+                   "Take a step that cannot be solved in 2, 4, … up to N smaller ones")
+      ->type_name("N")
+      ->capture_default_str();
+  verb->add_option("--checkpoint", options->checkpoint, "Keep all that is needed to go on in this file")
+      ->type_name("FILE");
+  verb->add_option("--checkpoint-every", options->checkpoint_every,
+                   "Write it at each K-th step; without, every ten seconds and at the end")
+      ->type_name("K");
+  verb->add_option("--resume", options->resume,
+                   "Go on from a checkpoint, with the same bits as if never interrupted")
+      ->type_name("FILE");
   verb->add_option("--set", options->set, "Set a parameter of the scene; may be repeated")
       ->type_name("NAME=VALUE")
       ->allow_extra_args(false);
@@ -146,7 +149,9 @@ void add_run(CLI::App& app, Session& session) {
   verb->footer(
       "Examples:\n"
       "  diracstep run knife_edge --step 0.05 --out knife_edge.csv\n"
-      "  diracstep run kepler_e06 --order 8 --end 100 --set e=0.3 --every 10 --out orbit.csv");
+      "  diracstep run kepler_e06 --order 8 --end 100 --set e=0.3 --every 10 --out orbit.csv\n"
+      "  diracstep run kepler_e06 --end 1e6 --every 1000 --out k.csv --checkpoint k.checkpoint\n"
+      "  diracstep run kepler_e06 --end 1e6 --every 1000 --out k.csv --resume k.checkpoint");
   verb->callback([options, &session] { run(*options, session); });
 }
 
