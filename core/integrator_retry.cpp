@@ -80,7 +80,7 @@ SolveReport Integrator::follow_stage(Stage& stage, Interval step, const Vector& 
   found.jacobian_evaluations += path.report.jacobian_evaluations;
   reached_ = path.reached;
   if (!path.report.ok()) {
-    if (found.ok()) found.status = SolveStatus::other_branch;
+    if (found.ok() && path.reached > 0.0) found.status = SolveStatus::other_branch;
     return found;
   }
   if (found.ok() && part.continuation->distance(q, guess_, stage.solution) <= another_solution) return found;

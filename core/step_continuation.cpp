@@ -2,6 +2,7 @@
 #include <cmath>
 #include <diracstep/core/scales.hpp>
 #include <diracstep/core/step_continuation.hpp>
+#include <limits>
 #include <utility>
 
 namespace diracstep {
@@ -19,6 +20,8 @@ constexpr long most_solves = 100;
 constexpr double largest_ratio = 0.75;
 /// Below this part of the velocities involved |w − v0| is round-off.
 constexpr double round_off = 1e-9;
+/// … and below this part of q/h.
+constexpr double rounded_positions = 16.0 * std::numeric_limits<double>::epsilon();
 
 void add(SolveReport& total, const SolveReport& report) {
   total.status = report.status;
@@ -39,7 +42,8 @@ StepContinuation::StepContinuation(StepProblem& problem, NonlinearSolver& solver
 double StepContinuation::change(double h, const Vector& q0, const Vector& v0, ConstVectorRef x) {
   problem_.finish(x, q1_, p1_, impulse_);
   q1_ = (q1_ - q0) / h;
-  const double floor = round_off * (max_norm(q1_) + max_norm(v0));
+  const double floor = std::max(round_off * (max_norm(q1_) + max_norm(v0)),
+                                rounded_positions * max_norm(q0) / std::abs(h));
   q1_ -= v0;
   const double norm = max_norm(q1_);
   return norm > floor ? norm : 0.0;
@@ -56,7 +60,7 @@ bool StepContinuation::solve(double h, const Vector& q0, const Vector& v0, Point
   return true;
 }
 
-/// Two points, half as far and whole, from which on w tends to v0; the smallest ones where there are none.
+/// Two points, one half as far as the other, from which on w tends to v0.
 bool StepContinuation::start(Interval step, const Vector& q0, const Vector& p0, const Vector& v0,
                              Result& work) {
   bool found = false;
@@ -66,7 +70,7 @@ bool StepContinuation::start(Interval step, const Vector& q0, const Vector& p0, 
     problem_.begin({step.start, part * step.size}, q0, p0);
     problem_.guess(v0, next_.x);
     const bool solved = solve(next_.part * step.size, q0, v0, next_, work);
-    if (solved && found && (next_.change <= largest_ratio * last_.change || k == most_halvings)) {
+    if (solved && found && last_.change > 0.0 && next_.change <= largest_ratio * last_.change) {
       std::swap(before_, next_);
       return true;
     }

@@ -17,7 +17,8 @@ class StepContinuation {
   struct Result {
     SolveReport report;  ///< of all solves together; ok where the whole step was reached
     long solves = 0;
-    double reached = 0.0;  ///< the largest part of the step that could be solved, 0 … 1
+    double reached = 0.0;  ///< the largest part of the step that could be solved, 0 … 1; 0 where no small
+                           ///< step was found whose w tends to v0, be it for round-off: then nothing is known
   };
 
   /// Follows the solution into x.
