@@ -71,7 +71,7 @@ SolveReport Integrator::follow_stage(Stage& stage, Interval step, const Vector& 
   Part& part = parts_[stage.part];
   ++work_.retries.continuations;
   if (!project_velocity(step.start, q, p, start_velocity_).ok()) start_velocity_ = v_;
-  guess_.resize(stage.solution.size());
+  guess_ = stage.solution;
   const StepContinuation::Result path = part.continuation->follow(step, q, p, start_velocity_, guess_);
   count(path.report, path.solves);
   found.iterations += path.report.iterations;

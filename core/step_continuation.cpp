@@ -11,8 +11,10 @@ namespace {
 
 constexpr double first_part = 1.0 / 2.0;
 constexpr int most_halvings = 24;  ///< of the first part
-/// A point of the path has to be found in so many iterations, else the way to it is halved.
+/// A point of the path has to be found in so many iterations or so near its guess, in units of the way from
+/// the last point, else the way to it is halved.
 constexpr int most_iterations = 6;
+constexpr double near_guess = 0.25;
 /// The path ends where a stride would be shorter than this part of what lies behind.
 constexpr double shortest_stride = 1.0 / 64.0;
 constexpr long most_solves = 100;
@@ -42,8 +44,8 @@ StepContinuation::StepContinuation(StepProblem& problem, NonlinearSolver& solver
 double StepContinuation::change(double h, const Vector& q0, const Vector& v0, ConstVectorRef x) {
   problem_.finish(x, q1_, p1_, impulse_);
   q1_ = (q1_ - q0) / h;
-  const double floor = std::max(round_off * (max_norm(q1_) + max_norm(v0)),
-                                rounded_positions * max_norm(q0) / std::abs(h));
+  const double floor =
+      std::max(round_off * (max_norm(q1_) + max_norm(v0)), rounded_positions * max_norm(q0) / std::abs(h));
   q1_ -= v0;
   const double norm = max_norm(q1_);
   return norm > floor ? norm : 0.0;
@@ -54,7 +56,7 @@ bool StepContinuation::solve(double h, const Vector& q0, const Vector& v0, Point
   const SolveReport report = solver_.solve(point.x);
   ++work.solves;
   add(work.report, report);
-  if (!report.ok() || report.iterations > most_iterations) return false;
+  if (!report.ok()) return false;
   point.change = change(h, q0, v0, point.x);
   work.reached = std::max(work.reached, point.part);
   return true;
@@ -69,7 +71,9 @@ bool StepContinuation::start(Interval step, const Vector& q0, const Vector& p0, 
     next_.part = part;
     problem_.begin({step.start, part * step.size}, q0, p0);
     problem_.guess(v0, next_.x);
-    const bool solved = solve(next_.part * step.size, q0, v0, next_, work);
+    const int before = work.report.iterations;
+    const bool solved = solve(next_.part * step.size, q0, v0, next_, work) &&
+                        work.report.iterations - before <= most_iterations;
     if (solved && found && last_.change > 0.0 && next_.change <= largest_ratio * last_.change) {
       std::swap(before_, next_);
       return true;
@@ -91,7 +95,11 @@ StepContinuation::Result StepContinuation::follow(Interval step, const Vector& q
     const double ahead = (next_.part - last_.part) / (last_.part - before_.part);
     next_.x = last_.x + ahead * (last_.x - before_.x);
     problem_.begin({step.start, next_.part * step.size}, q0, p0);
-    if (solve(next_.part * step.size, q0, v0, next_, work)) {
+    const int before = work.report.iterations;
+    const bool solved = solve(next_.part * step.size, q0, v0, next_, work);
+    const double missed = (next_.x - last_.x - ahead * (last_.x - before_.x)).lpNorm<Eigen::Infinity>();
+    const double way = (next_.x - last_.x).lpNorm<Eigen::Infinity>();
+    if (solved && (work.report.iterations - before <= most_iterations || missed <= near_guess * way)) {
       std::swap(before_, last_);
       std::swap(last_, next_);
       stride *= 2.0;
@@ -100,9 +108,15 @@ StepContinuation::Result StepContinuation::follow(Interval step, const Vector& q
       going = stride >= shortest_stride * last_.part && work.solves < most_solves;
     }
   }
-  if (going) x = last_.x;
-  if (!going && work.report.ok()) work.report.status = SolveStatus::no_convergence;
   problem_.begin(step, q0, p0);
+  if (going) {
+    x = last_.x;
+    return work;
+  }
+  if (work.report.ok()) work.report.status = SolveStatus::no_convergence;
+  const double expected = last_.change / last_.part;  // |w − v0| of the whole step, if it grew as it began to
+  if (work.reached > 0.0 && std::abs(change(step.size, q0, v0, x) - expected) <= expected / 2.0)
+    work.reached = 0.0;
   return work;
 }
 

@@ -21,7 +21,8 @@ class StepContinuation {
                            ///< step was found whose w tends to v0, be it for round-off: then nothing is known
   };
 
-  /// Follows the solution into x.
+  /// Follows the solution into x, which holds one found otherwise.  Where the path ends early but that one
+  /// moves as the path began to, the path is taken to have ended for round-off: nothing is known.
   Result follow(Interval step, const Vector& q0, const Vector& p0, const Vector& v0, VectorRef x);
 
   /// Whether the mean velocity of a solution x and that of half the step tend to the velocity at the start.
