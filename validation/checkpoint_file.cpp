@@ -36,6 +36,7 @@ std::string_view checked_body(std::string_view bytes, const std::string& path) {
 }
 
 long count(const Json& json, const char* key) {
+  if (!json.at(key).is_number_integer()) throw std::out_of_range(fmt::format("{} is no whole number", key));
   const auto value = json.at(key).get<std::int64_t>();
   if (value < 0) throw std::out_of_range(fmt::format("{} = {}", key, value));
   return value;

@@ -248,8 +248,7 @@ TEST(Integrator, ResetForgetsTheSizeOfEarlierResiduals) {
     const IntegratorOptions options{.method = method, .step = 0.01};
     Integrator used = integrator_for(shared, options), fresh = integrator_for(shared, options);
     used.reset({0.0, Vector::Constant(1, 1e12), Vector::Zero(1)});
-    const StepReport report = used.step();
-    ASSERT_TRUE(report.ok()) << method << ": " << report.failure;
+    (void)used.step();  // whether round-off of this size allows a solution or not
     used.reset();
     EXPECT_TRUE(same_bits(run_of(used), run_of(fresh))) << method;
     EXPECT_EQ(used.work().iterations, fresh.work().iterations) << method;
