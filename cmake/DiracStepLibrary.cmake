@@ -1,6 +1,11 @@
 # How every target of the project is compiled.
+# A second argument PRIVATE keeps the language standard from those that link it.
 function(diracstep_compile_options target)
-  target_compile_features(${target} PUBLIC cxx_std_20)
+  set(scope PUBLIC)
+  if(ARGC GREATER 1)
+    set(scope ${ARGV1})
+  endif()
+  target_compile_features(${target} ${scope} cxx_std_20)
   target_compile_options(${target} PRIVATE
     -Wall -Wextra -Wpedantic -Wshadow
     $<$<BOOL:${DIRACSTEP_WARNINGS_AS_ERRORS}>:-Werror>
@@ -44,5 +49,5 @@ function(diracstep_library folder)
   install(EXPORT diracstep_${folder} NAMESPACE DiracStep:: FILE DiracStep-${folder}.cmake
     DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/DiracStep)
   install(DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR}/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/diracstep/${folder}
-    FILES_MATCHING PATTERN *.hpp PATTERN command EXCLUDE)  # the command's own parts are no interface
+    FILES_MATCHING PATTERN *.hpp PATTERN *.h PATTERN command EXCLUDE)  # the command's own parts are no interface
 endfunction()

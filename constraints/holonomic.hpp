@@ -14,7 +14,10 @@ class HolonomicRows final : public ConstraintRows {
  public:
   HolonomicRows(F phi, std::vector<std::string> names)
       : ConstraintRows(true, SparsityPattern::dense(M, N), SparsityPattern::dense(N, N), std::move(names)),
-        phi_(std::move(phi)) {}
+        phi_(std::move(phi)),
+        constant_(is_linear(phi_)) {}
+
+  bool constant() const override { return constant_; }
 
   void position(double t, ConstVectorRef q, VectorRef phi) const override {
     const auto values = evaluate<double>(t, q);
@@ -69,7 +72,24 @@ class HolonomicRows final : public ConstraintRows {
       return call_with_time(phi_, Scalar::variable(t, N), seed<Scalar, N>(q, 0));
   }
 
+  /// Whether φ is linear in (q, t), by running it once on Dependence.
+  static bool is_linear(const F& phi) {
+    using Scalar = Dependence<N + 1>;
+    std::array<Scalar, N> q;
+    for (std::size_t i = 0; i < N; ++i) q[i] = Scalar::variable(i);
+    try {
+      for (const Scalar& row : call_with_time(phi, Scalar::variable(N), q))
+        for (std::size_t i = 0; i <= N; ++i)
+          for (std::size_t j = 0; j <= N; ++j)
+            if (row.second_derivative(i, j)) return false;
+      return true;
+    } catch (const typename Scalar::Branches&) {
+      return false;
+    }
+  }
+
   F phi_;
+  bool constant_;
 };
 
 }  // namespace detail

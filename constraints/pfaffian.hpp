@@ -2,6 +2,7 @@
 
 #include <array>
 #include <diracstep/core/constraint_rows.hpp>
+#include <diracstep/core/dependence.hpp>
 #include <diracstep/core/jet.hpp>
 #include <diracstep/core/phase_function.hpp>
 
@@ -23,7 +24,10 @@ class PfaffianRows final : public ConstraintRows {
   PfaffianRows(A a, B b, std::vector<std::string> names)
       : ConstraintRows(false, SparsityPattern::dense(M, N), SparsityPattern::dense(N, N), std::move(names)),
         a_(std::move(a)),
-        b_(std::move(b)) {}
+        b_(std::move(b)),
+        constant_(are_constant(a_, b_)) {}
+
+  bool constant() const override { return constant_; }
 
   void coefficients(double t, ConstVectorRef q, VectorRef a, VectorRef b) const override {
     const auto rows = evaluate_a<double>(t, q);
@@ -88,8 +92,38 @@ class PfaffianRows final : public ConstraintRows {
     return sums;
   }
 
+  /// Whether A depends on nothing and b on the time alone, by running both once on Dependence: their products
+  /// with further variables then have no second derivatives by q, nor those of A by the time.
+  static bool are_constant(const A& a, const B& b) {
+    using Scalar = Dependence<2 * N + 1>;
+    std::array<Scalar, N> q;
+    for (std::size_t i = 0; i < N; ++i) q[i] = Scalar::variable(i);
+    const Scalar t = Scalar::variable(2 * N);
+    try {
+      const std::array<std::array<Scalar, N>, M> rows = call_with_time(a, t, q);
+      for (const auto& row : rows)
+        for (std::size_t i = 0; i < N; ++i)
+          if (varies(row[i] * Scalar::variable(N + i), N + i, true)) return false;
+      if constexpr (!std::is_same_v<B, NoOffset>) {
+        const std::array<Scalar, M> offset = call_with_time(b, t, q);
+        for (const Scalar& entry : offset)
+          if (varies(entry * Scalar::variable(N), N, false)) return false;
+      }
+      return true;
+    } catch (const typename Scalar::Branches&) {
+      return false;
+    }
+  }
+
+  static bool varies(const Dependence<2 * N + 1>& product, std::size_t factor, bool with_time) {
+    for (std::size_t j = 0; j < N; ++j)
+      if (product.second_derivative(j, factor)) return true;
+    return with_time && product.second_derivative(2 * N, factor);
+  }
+
   A a_;
   B b_;
+  bool constant_;
 };
 
 }  // namespace detail

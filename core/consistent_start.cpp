@@ -3,6 +3,7 @@
 #include <diracstep/core/consistent_start.hpp>
 #include <diracstep/core/constraint_distribution.hpp>
 #include <diracstep/core/errors.hpp>
+#include <diracstep/core/hidden_rows.hpp>
 #include <diracstep/core/saddle_point.hpp>
 #include <sstream>
 
@@ -99,6 +100,7 @@ class RowSubset final : public ConstraintRows {
     }
   }
 
+  bool constant() const override { return block_->constant(); }
   void position(double t, ConstVectorRef q, VectorRef phi) const override {
     Vector all(block_->rows());
     block_->position(t, q, all);
@@ -154,7 +156,12 @@ class RowSubset final : public ConstraintRows {
 
 }  // namespace
 
-ConsistentStart project_start(const Scene& scene, const Start& start, const SolverFactory& solvers) {
+ConsistentStart project_start(const Scene& given, const Start& given_start, const SolverFactory& solvers) {
+  auto copy = std::make_shared<Scene>(given);
+  copy->start = given_start;
+  const auto complete = completed(std::move(copy)), extended = with_hidden_rows(complete);
+  const Scene& scene = *extended;
+  const Start& start = complete->start;
   require_size("the start q", start.q.size(), scene.dimension());
   require_size("the start v", start.v.size(), scene.dimension());
   ConsistentStart result{start, 0.0, 0.0};

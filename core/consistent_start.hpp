@@ -17,7 +17,8 @@ struct ConsistentStart {
 /// The nearest start on the constraints: q is the point of φ(t,q) = 0 nearest to the given one in the
 /// Euclidean norm, then v the velocity of the affine distribution nearest to the given one in the norm of
 /// ∂²L/∂v² (for a degenerate Lagrangian: of any solution of  ∂L/∂v(q,v) − Aᵀμ = ∂L/∂v(q,v̂),  A v + b = 0).
-/// Throws Misuse where no such point is found, saying why.
+/// The rows that a degenerate Lagrangian hides count as rows (hidden_rows.hpp).  A start with a momentum in
+/// place of v is given its velocity first.  Throws Misuse where no such point is found, saying why.
 ConsistentStart project_start(const Scene& scene, const Start& start, const SolverFactory& solvers);
 
 /// Names of the rows of A(t,q) that depend on the others to within `tolerance` of their size, found with

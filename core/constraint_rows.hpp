@@ -30,6 +30,9 @@ class ConstraintRows {
   const SparsityPattern& curvature_pattern() const { return curvature_pattern_; }
   const std::vector<std::string>& names() const { return names_; }
 
+  /// Whether A depends on neither t nor q, and b not on q; false where that is not known.
+  virtual bool constant() const { return false; }
+
   /// φ(t,q), m values.  Holonomic rows only; the default throws std::logic_error.
   virtual void position(double t, ConstVectorRef q, VectorRef phi) const;
 

@@ -51,7 +51,7 @@ Covector differential_plus(const DiscreteLagrangianAt& l) { return gamma_plus({l
 Covector differential_minus(const DiscreteLagrangianAt& l) { return gamma_minus({l.q0, l.q1, l.d1, l.d2}); }
 
 DiscreteDiracStructure::DiscreteDiracStructure(const ConstraintBlocks& constraints, int dimension,
-                                               StepRule rule)
+                                               const ConstraintRule& rule)
     : rows_(constraints, dimension), discrete_constraint_(constraints, dimension, rule) {}
 
 double DiscreteDiracStructure::constraint_norm(Interval step, const Vector& q0, const Vector& q1) {

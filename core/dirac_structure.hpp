@@ -87,7 +87,7 @@ struct Membership {
 /// The discrete Dirac structures D_{d+} (4.24) and D_{d−} (4.41) of a discrete constraint.
 class DiscreteDiracStructure {
  public:
-  DiscreteDiracStructure(const ConstraintBlocks& constraints, int dimension, StepRule rule);
+  DiscreteDiracStructure(const ConstraintBlocks& constraints, int dimension, const ConstraintRule& rule);
 
   /// ((z0,z1),α) ∈ D_{d+}: (q0,q1) ∈ Δ^d_Q and α − Ω♭_{d+}(z0,z1) ∈ Δ°_Q(q0) × {0}.
   Membership plus(Interval step, const PhasePoint& z0, const PhasePoint& z1, const Covector& alpha);

@@ -1,8 +1,7 @@
 #pragma once
 
 #include <diracstep/core/constraint_distribution.hpp>
-#include <diracstep/core/generating_function.hpp>
-#include <diracstep/core/step_nodes.hpp>
+#include <diracstep/core/discrete_rows.hpp>
 
 namespace diracstep {
 
@@ -11,13 +10,12 @@ namespace diracstep {
 ///   nonholonomic rows   Σ w_i [A(t_i, q_i)(q1−q0) + h b(t_i, q_i)],   q_i = (1−c_i) q0 + c_i q1
 ///   holonomic rows      φ(t1, q1), so that nothing drifts
 ///
-/// with the nodes of `rule` (left, right: order 1; midpoint, trapezoidal: order 2).  It contains the diagonal
-/// and induces Δ_Q back (Leok and Ohsawa (4.17)–(4.19)).
+/// with the nodes of the rule (left, right: order 1; midpoint, trapezoidal: order 2), or nonholonomic rows of
+/// one's own.  It contains the diagonal and induces Δ_Q back (Leok and Ohsawa (4.17)–(4.19)).
 class DiscreteConstraint {
  public:
-  DiscreteConstraint(const ConstraintBlocks& blocks, int dimension, StepRule rule);
+  DiscreteConstraint(const ConstraintBlocks& blocks, int dimension, const ConstraintRule& rule);
 
-  StepRule rule() const { return rule_; }
   int rows() const { return pattern_.rows(); }
 
   /// Of ∂c/∂q1.
@@ -32,13 +30,23 @@ class DiscreteConstraint {
  private:
   struct Block {
     std::shared_ptr<const ConstraintRows> rows;
+    int first;  ///< row
     Vector coefficients, offset, node_derivative, derivative;
   };
   void residual(Block& block, Interval step, ConstVectorRef q0, ConstVectorRef q1, VectorRef c);
   void end_derivative(Block& block, Interval step, ConstVectorRef q0, ConstVectorRef q1);
 
+  /// The rows of one's own and where they stand among all.
+  struct Own {
+    std::shared_ptr<const DiscreteRows> rows;
+    std::vector<int> places;
+    Vector values, derivative;
+  };
+  void plan_own(std::vector<int> places, int dimension);
+
   StepRule rule_;
-  std::vector<Block> blocks_;
+  std::vector<Block> blocks_;  ///< without the nonholonomic ones where there are own rows
+  Own own_;
   SparsityPattern pattern_;
   BlockPattern layout_;
   Vector q_, increment_;

@@ -11,6 +11,8 @@ namespace {
 
 using Extended = long double;
 using Row = std::vector<Extended>;
+using ExtendedVector = Eigen::Matrix<Extended, Eigen::Dynamic, 1>;
+using ExtendedColumns = Eigen::Matrix<Extended, Eigen::Dynamic, Eigen::Dynamic>;
 
 struct Legendre {
   Extended value, derivative;
@@ -102,33 +104,42 @@ Extended integral(const Row& nodes, const Row& weights, std::size_t j, Extended 
   return end * sum;
 }
 
-Vector rounded(const Row& row) {
-  Vector column(static_cast<Eigen::Index>(row.size()));
-  for (std::size_t i = 0; i < row.size(); ++i)
-    column[static_cast<Eigen::Index>(i)] = static_cast<double>(row[i]);
-  return column;
+ExtendedVector column(const Row& row) {
+  return ExtendedVector::Map(row.data(), static_cast<Eigen::Index>(row.size()));
 }
 
 }  // namespace
 
-GaussLobattoTableau gauss_lobatto_tableau(int s) {
+ExtendedGaussLobattoTableau extended_gauss_lobatto_tableau(int s) {
   if (s < 1 || s > 20) throw Misuse("GL(" + std::to_string(s) + "): the number of stages must be 1 to 20");
   const Row c = gauss_nodes(s), b = gauss_weights(c), lc = lobatto_nodes(s), lb = lobatto_weights(lc);
-  GaussLobattoTableau t{rounded(c),    rounded(b),    rounded(lc),       rounded(lb),
-                        Columns(s, s), Columns(s, s), Columns(s + 1, s), Columns(s, s + 1)};
+  ExtendedGaussLobattoTableau t{column(c),
+                                column(b),
+                                column(lc),
+                                column(lb),
+                                ExtendedColumns(s, s),
+                                ExtendedColumns(s, s),
+                                ExtendedColumns(s + 1, s),
+                                ExtendedColumns(s, s + 1)};
   const auto at = [](int i) { return static_cast<std::size_t>(i); };
   for (int i = 0; i < s; ++i)
     for (int j = 0; j < s; ++j) {
-      t.a(i, j) = static_cast<double>(integral(c, b, at(j), c[at(i)]));
-      t.a_hat(i, j) = static_cast<double>(b[at(j)] * (1.0L - integral(c, b, at(i), c[at(j)]) / b[at(i)]));
+      t.a(i, j) = integral(c, b, at(j), c[at(i)]);
+      t.a_hat(i, j) = b[at(j)] * (1.0L - integral(c, b, at(i), c[at(j)]) / b[at(i)]);
     }
   for (int j = 0; j <= s; ++j)
     for (int i = 0; i < s; ++i) {
       const Extended to_node = integral(c, b, at(i), lc[at(j)]);
-      t.lobatto_a(j, i) = static_cast<double>(to_node);
-      t.e(i, j) = j == s ? 0.0 : static_cast<double>(lb[at(j)] * (1.0L - to_node / b[at(i)]));
+      t.lobatto_a(j, i) = to_node;
+      t.e(i, j) = j == s ? 0.0L : lb[at(j)] * (1.0L - to_node / b[at(i)]);
     }
   return t;
+}
+
+GaussLobattoTableau gauss_lobatto_tableau(int s) {
+  const ExtendedGaussLobattoTableau t = extended_gauss_lobatto_tableau(s);
+  return {t.c.cast<double>(), t.b.cast<double>(),     t.lobatto_c.cast<double>(), t.lobatto_b.cast<double>(),
+          t.a.cast<double>(), t.a_hat.cast<double>(), t.lobatto_a.cast<double>(), t.e.cast<double>()};
 }
 
 Columns lagrange_basis(const Vector& nodes, const Vector& points) {

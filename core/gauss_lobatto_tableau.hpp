@@ -11,15 +11,19 @@ namespace diracstep {
 ///   / b_i)
 ///
 /// Rows and columns count from 0; a~ is (s+1)×s, e is s×(s+1) with a last column of zeros.  Computed in
-/// extended precision and rounded once.
-struct GaussLobattoTableau {
-  Vector c, b;
-  Vector lobatto_c, lobatto_b;
-  Columns a, a_hat, lobatto_a, e;
+/// extended precision and, for double, rounded once.
+template <class Real>
+struct GaussLobattoTableauOf {
+  Eigen::Matrix<Real, Eigen::Dynamic, 1> c, b;
+  Eigen::Matrix<Real, Eigen::Dynamic, 1> lobatto_c, lobatto_b;
+  Eigen::Matrix<Real, Eigen::Dynamic, Eigen::Dynamic> a, a_hat, lobatto_a, e;
 };
+using GaussLobattoTableau = GaussLobattoTableauOf<double>;
+using ExtendedGaussLobattoTableau = GaussLobattoTableauOf<long double>;
 
 /// Throws Misuse unless 1 ≤ s ≤ 20.
 GaussLobattoTableau gauss_lobatto_tableau(int s);
+ExtendedGaussLobattoTableau extended_gauss_lobatto_tableau(int s);
 
 /// Values at `points` of the polynomials that are 1 at one of `nodes` and 0 at the others: one row a point,
 /// one column a node.

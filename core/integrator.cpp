@@ -2,8 +2,11 @@
 #include <cmath>
 #include <diracstep/core/composition.hpp>
 #include <diracstep/core/consistent_start.hpp>
+#include <diracstep/core/default_method.hpp>
 #include <diracstep/core/errors.hpp>
+#include <diracstep/core/hidden_rows.hpp>
 #include <diracstep/core/integrator.hpp>
+#include <diracstep/core/singularity.hpp>
 #include <sstream>
 
 namespace diracstep {
@@ -36,6 +39,14 @@ Integrator::Preparation Integrator::prepare(std::shared_ptr<const Scene> given,
       result.lines.push_back({"dropped rows", joined(dependent), "they depend on others at the start"});
     }
   }
+  const int own_rows = scene->rows();
+  scene = with_hidden_rows(scene);
+  if (scene->rows() > own_rows) {
+    std::vector<std::string> names = scene->row_names();
+    names.erase(names.begin(), names.begin() + own_rows);
+    result.lines.push_back(
+        {"hidden rows", joined(names), "motions without momentum; these rows determine them"});
+  }
   if (options.project_start) {
     const ConsistentStart moved = project_start(*scene, scene->start, solvers);
     auto copy = std::make_shared<Scene>(*scene);
@@ -58,14 +69,17 @@ Integrator::Integrator(Preparation preparation, const Registry& registry, const 
     : scene_(std::move(preparation.scene)),
       preparation_(std::move(preparation.lines)),
       options_(std::move(options)),
-      method_(registry.method(options_.method)),
+      method_(choose_method(registry)),
       dense_(scene_->dimension() + scene_->rows() <= options_.dense_limit),
       velocity_problem_(*scene_, dense_),
       acceleration_problem_(*scene_, dense_) {
   require_step(options_.step);
   if (options_.substeps < 1)
     throw Misuse("substeps = " + std::to_string(options_.substeps) + "; 1 or more is needed");
-  if (scene_->lagrangian->structure().y_hessian_zero) {
+  if (options_.constraint_rule && options_.constraint_rule->own)
+    require_discretisation(*options_.constraint_rule->own, scene_->constraints, scene_->start.time,
+                           scene_->start.q);
+  if (scene_->lagrangian->structure().phase_space()) {
     phase_space_velocity_problem_.emplace(*scene_, dense_);
     velocity_solver_ = solvers(*phase_space_velocity_problem_);
   } else {
@@ -73,17 +87,34 @@ Integrator::Integrator(Preparation preparation, const Registry& registry, const 
     acceleration_solver_ = solvers(acceleration_problem_);
   }
   plan_stages(registry, solvers);
+  if (options_.compensated_sums) compensate();
   velocity_unknowns_.setZero(velocity_problem_.size());
   start_velocity_.setZero(scene_->dimension());
   acceleration_unknowns_.setZero(acceleration_problem_.size());
   reset(scene_->start);
 }
 
+Method Integrator::choose_method(const Registry& registry) {
+  if (options_.method == automatic_method) {
+    const DefaultMethod choice =
+        default_method(*scene_, options_.order, options_.constraint_rule, options_.dense_limit);
+    options_.method = choice.method;
+    options_.order = choice.order;
+    preparation_.push_back({"method", "by default", choice.reason});
+  }
+  return registry.method(options_.method);
+}
+
 Integrator::Part Integrator::make_part(const Method& method, bool mirror_rule,
                                        const SolverFactory& solvers) const {
-  std::optional<StepRule> rule = options_.constraint_rule;
-  if (rule && mirror_rule) rule = mirrored(*rule);
-  Part part{method.step(*scene_, dense_, rule, options_.force_degenerate), nullptr, nullptr};
+  const std::optional<ConstraintRule>& given = options_.constraint_rule;
+  const bool other_rule = mirror_rule && given;
+  if (other_rule && given->own)
+    throw Misuse("a discrete constraint of one's own has no adjoint; compose a method that is self-adjoint");
+  const auto step = [&](const std::optional<ConstraintRule>& rule) {
+    return method.step(*scene_, dense_, rule, options_.force_degenerate);
+  };
+  Part part{other_rule ? step(mirrored(given->nodes)) : step(given), nullptr, nullptr};
   if (part.problem->size() > 0) {
     part.solver = solvers(*part.problem);
     part.continuation = std::make_unique<StepContinuation>(*part.problem, *part.solver);
@@ -91,24 +122,36 @@ Integrator::Part Integrator::make_part(const Method& method, bool mirror_rule,
   return part;
 }
 
+/// The composition of a self-adjoint method; others are followed by their adjoint with half the step each,
+/// which is self-adjoint and of the next even order.
+Integrator::Sequence Integrator::composed(const MethodInfo& info) const {
+  const int order = options_.order, own = info.self_adjoint ? info.order : info.order + info.order % 2;
+  const auto fractions = composition_fractions(!info.self_adjoint && order == own ? 2 : order);
+  if (order < own || order == info.order)
+    throw Misuse("method '" + info.name + "' of order " + std::to_string(info.order) +
+                 " cannot be composed to order " + std::to_string(order));
+  Sequence sequence;
+  for (const double fraction : fractions) {
+    if (info.self_adjoint) {
+      sequence.emplace_back(fraction, 0);
+      continue;
+    }
+    sequence.emplace_back(fraction / 2.0, 0);
+    sequence.emplace_back(fraction / 2.0, 1);
+  }
+  return sequence;
+}
+
 void Integrator::plan_stages(const Registry& registry, const SolverFactory& solvers) {
   const MethodInfo& info = method_.info;
   if (options_.order == 0) options_.order = info.order;
   parts_.push_back(make_part(method_, false, solvers));
-  std::vector<std::pair<double, std::size_t>> sequence;  // fraction and part
+  Sequence sequence;
   if (options_.order == info.order) {
     sequence = {{1.0, 0}};
-  } else if (info.self_adjoint && info.order == 2) {
-    for (const double fraction : composition_fractions(options_.order)) sequence.emplace_back(fraction, 0);
-  } else if (info.order == 1) {
-    parts_.push_back(make_part(registry.adjoint_of(method_), true, solvers));
-    for (const double fraction : composition_fractions(options_.order)) {
-      sequence.emplace_back(fraction / 2.0, 0);
-      sequence.emplace_back(fraction / 2.0, 1);
-    }
   } else {
-    throw Misuse("method '" + info.name + "' of order " + std::to_string(info.order) +
-                 " cannot be composed to order " + std::to_string(options_.order));
+    sequence = composed(info);
+    if (!info.self_adjoint) parts_.push_back(make_part(registry.adjoint_of(method_), true, solvers));
   }
   for (const auto& [fraction, part] : sequence) {
     StepProblem& problem = *parts_[part].problem;
@@ -116,11 +159,19 @@ void Integrator::plan_stages(const Registry& registry, const SolverFactory& solv
   }
 }
 
+void Integrator::compensate() {
+  for (Part& part : parts_)
+    if (!part.problem->compensate())
+      throw Misuse("method '" + method_.info.name + "' on scene '" + scene_->name +
+                   "' has no compensated sums; type1/midpoint and typeN/gl:S have");
+}
+
 void Integrator::reset() { reset(scene_->start); }
 
 void Integrator::reset(const Start& start) {
   require_consistent(*scene_, start);
-  start_time_ = start.time;
+  clock_ = {start.time, 0.0, 0};
+  size_ = options_.step;
   q_ = start.q;
   v_ = start.v;
   p_.setZero(q_.size());
@@ -129,12 +180,27 @@ void Integrator::reset(const Start& start) {
   if (!p_.allFinite())
     throw Misuse("scene '" + scene_->name + "': the momentum ∂L/∂v is not finite at the start");
   forget();
+  on_a_motion_ = false;
   work_ = {};
+}
+
+void Integrator::restart(double time, ConstVectorRef q, ConstVectorRef p, ConstVectorRef v) {
+  require_size("restart: q", q.size(), q_.size());
+  require_size("restart: p", p.size(), q_.size());
+  require_size("restart: v", v.size(), q_.size());
+  if (!std::isfinite(time) || !q.allFinite() || !p.allFinite() || !v.allFinite())
+    throw Misuse("restart: the time, q, p or v is not finite");
+  clock_ = {time, 0.0, 0};
+  q_ = q;
+  p_ = p;
+  v_ = v;
+  forget();
+  on_a_motion_ = true;
 }
 
 /// Nothing of the steps so far shows in the next ones.
 void Integrator::forget() {
-  first_stage_solved_ = false;
+  first_stage_solved_ = retryable_ = unlearned_ = false;
   for (Stage& stage : stages_) stage.predictor.reset();
   for (Part& part : parts_) {
     part.problem->reset();
@@ -160,17 +226,18 @@ SolveReport Integrator::solve_stage(std::size_t number, double t, const Vector& 
   if (guess == Guess::predicted && !stage.predictor.ready()) guess = Guess::plain;
   if (guess == Guess::predicted)
     stage.predictor.predict(stage.solution);
-  else
+  else if (guess == Guess::plain)
     part.problem->guess(v_, stage.solution);
+  guess_ = stage.solution;
   const SolveReport report = part.solver->solve(stage.solution);
   count(report);
-  if (report.ok() && !doubtful(stage, step, q, p, guess, report)) return report;
+  if (report.ok() && !doubtful(stage, step, q, p, report)) return report;
   return retry_stage(stage, step, q, p, guess, report);
 }
 
 StepReport Integrator::failed(const SolveReport& report, const StepProblem& problem, double time) {
   first_stage_solved_ = false;  // the problem holds the data of the stage that failed
-  v_ = v_before_;
+  v_ = before_.v;
   for (Part& part : parts_)
     if (part.solver) part.solver->reset();  // pivots chosen for a matrix that led nowhere
   std::ostringstream message;
@@ -187,28 +254,76 @@ StepReport Integrator::failed(const SolveReport& report, const StepProblem& prob
   return {report, work_.steps, time, message.str()};
 }
 
-StepReport Integrator::step() {
-  size_ = options_.step;
-  StepReport report = take(1);
+StepReport Integrator::step(double h) {
+  require_step(h);
+  if (h != size_) first_stage_solved_ = false;
+  learn();
+  return take(h, Guess::predicted);
+}
+
+StepReport Integrator::retry(double h) {
+  require_step(h);
+  if (!retryable_) throw Misuse("retry: no step was taken just before");
+  clock_ = before_.clock;
+  q_ = before_.q;
+  p_ = before_.p;
+  v_ = before_.v;
+  const Guess guess = unlearned_ ? Guess::last_solution : Guess::plain;  // plain after a divided step
+  first_stage_solved_ = unlearned_ = false;
+  --work_.steps;
+  return take(h, guess);
+}
+
+/// Shows the last step to the predictors: not at once, since it may be taken again.
+void Integrator::learn() {
+  if (unlearned_)
+    for (Stage& stage : stages_) stage.predictor.learn(stage.solution);
+  unlearned_ = false;
+}
+
+void Integrator::advance_clock(double h) {
+  if (h == options_.step) {
+    ++clock_.steps;
+    return;
+  }
+  const double now = time(), change = h + clock_.rest, next = now + change;
+  clock_ = {next, change - (next - now), 0};
+}
+
+/// After a step: what it leaves to the next ones.
+void Integrator::remember(int pieces) {
+  for (Part& part : parts_) part.problem->keep();
+  retryable_ = true;
+  unlearned_ = pieces == 1;
+  if (!unlearned_)  // the steps are no longer equally long
+    for (Stage& stage : stages_) stage.predictor.reset();
+}
+
+/// One step, where the options allow it and nothing else does in smaller ones.
+StepReport Integrator::take(double h, Guess guess) {
+  StepReport report = take_in_pieces(h, 1, guess);
   for (int pieces = 2; !report.ok() && pieces <= options_.substeps; pieces *= 2) {
-    size_ = options_.step / pieces;
-    const StepReport divided = take(pieces);
+    const StepReport divided = take_in_pieces(h, pieces, Guess::plain);
     if (!divided.ok()) continue;
     ++work_.retries.divided_steps;
     report = divided;
   }
-  size_ = options_.step;
+  size_ = h;
   return report;
 }
 
 /// One step in so many equal pieces.
-StepReport Integrator::take(int pieces) {
+StepReport Integrator::take_in_pieces(double whole, int pieces, Guess guess) {
   const double start = time();
-  const Guess guess = pieces == 1 ? Guess::predicted : Guess::plain;
+  size_ = whole / pieces;
+  before_.clock = clock_;
+  before_.q = q_;
+  before_.p = p_;
+  before_.v = v_;
+  retryable_ = false;
   double t = start;
   SolveReport total;
   reached_ = 1.0;
-  v_before_ = v_;
   q_stage_ = q_;
   p_stage_ = p_;
   for (std::size_t k = 0; k < stages_.size() * static_cast<std::size_t>(pieces); ++k) {
@@ -218,7 +333,11 @@ StepReport Integrator::take(int pieces) {
     const double h = stage.fraction * size_;
     if (k > 0 || !first_stage_solved_) {
       const SolveReport report = solve_stage(number, t, q_stage_, p_stage_, guess);
-      if (!report.ok()) return failed(report, problem, start);
+      if (!report.ok()) {
+        StepReport failure = failed(report, problem, start);
+        failure.failure += describe_singularity(problem, stage.solution, *scene_);
+        return failure;
+      }
       total.iterations += report.iterations;
       total.residual_evaluations += report.residual_evaluations;
       total.jacobian_evaluations += report.jacobian_evaluations;
@@ -237,12 +356,8 @@ StepReport Integrator::take(int pieces) {
   }
   std::swap(q_, q_stage_);
   std::swap(p_, p_stage_);
-  for (Stage& stage : stages_)
-    if (pieces == 1)
-      stage.predictor.learn(stage.solution);
-    else
-      stage.predictor.reset();  // its steps are no longer equally long
-  for (Part& part : parts_) part.problem->keep();
+  remember(pieces);
+  advance_clock(whole);
   first_stage_solved_ = false;
   return {total, work_.steps++, start, {}};
 }
@@ -286,13 +401,14 @@ SolveReport Integrator::sample(Momentum momentum, Sample& sample) {
   sample.lambda = acceleration_unknowns_.tail(m);
   sample.energy = scene_->energy(t, q_, sample.v);
   sample.p = p_;
+  sample.impulse.resize(0);
   if (momentum == Momentum::projected) {
     q_next_.resize(n);
     scene_->lagrangian->gradient(t, q_, sample.v, q_next_, sample.p);
   } else if (momentum == Momentum::minus && m > 0) {
     if (!first_stage_solved_) {
-      size_ = options_.step;
-      v_before_ = v_;
+      learn();
+      retryable_ = false;
       report = solve_stage(0, t, q_, p_, Guess::predicted);
       if (!report.ok()) return report;
       first_stage_solved_ = true;
@@ -301,6 +417,7 @@ SolveReport Integrator::sample(Momentum momentum, Sample& sample) {
     ConstraintsAtPoint rows(scene_->constraints, static_cast<int>(n));
     rows.evaluate(t, q_);
     rows.add_annihilator(impulse_, sample.p);
+    sample.impulse = impulse_;
   }
   return report;
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <diracstep/core/default_method.hpp>
 #include <diracstep/core/nonlinear_solver.hpp>
 #include <diracstep/core/phase_space_step.hpp>
 #include <diracstep/core/predictor.hpp>
@@ -13,6 +14,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace diracstep {
@@ -25,17 +27,20 @@ enum class Momentum {
 };
 
 struct IntegratorOptions {
-  std::string method = "type1/midpoint";
+  std::string method = automatic_method;  ///< a name of the registry, or "auto": see default_method()
   int order = 0;  ///< composed to this order, methods that are not self-adjoint with their adjoint; 0 keeps
                   ///< the method's own
-  double step = 0.0;                                       ///< step size, may be negative; must be given
-  std::optional<StepRule> constraint_rule = std::nullopt;  ///< instead of the method's own
+  double step = 0.0;  ///< step size, may be negative; must be given
+  std::optional<ConstraintRule> constraint_rule = std::nullopt;  ///< instead of the method's own
   int dense_limit = 40;           ///< systems of up to this many unknowns use full matrices
   bool force_degenerate = false;  ///< use a method on a degenerate scene that is known to be unstable there
   bool project_start = false;     ///< move an inconsistent start onto the constraints instead of refusing it
   bool drop_dependent_rows =
       false;         ///< leave out rows that depend on others at the start instead of refusing
   int substeps = 1;  ///< a step that cannot be solved is taken in 2, 4, … up to so many smaller ones
+  bool compensated_sums = false;  ///< sums of a step in extended precision, what rounding drops carried on:
+                                  ///< round-off in the energy then grows like a random walk, see
+                                  ///< StepProblem::compensate.  Pays over very many steps
 };
 
 /// What one step did.  A failed step leaves the state as it was, bit by bit; only the work done counts.
@@ -84,7 +89,10 @@ struct Sample {
   Vector q;       ///< configuration
   Vector v;       ///< velocity in Δ_Q(q)
   Vector p;       ///< momentum, in the representative asked for
-  Vector lambda;  ///< forces Λ of the constraint rows at (q, v)
+  Vector lambda;  ///< forces Λ of the rows at (q, v): Aᵀ Λ is a generalised force, so Λ is power over the
+                  ///< unit of a row A v: a force for a row in m/s, a voltage for one in A
+  Vector impulse;  ///< with Momentum::minus the impulses λ that the next step lets in at q, units of Λ times
+                   ///< time; empty with the others
   double energy = 0.0;
 };
 
@@ -111,10 +119,25 @@ class Integrator {
   void reset(const Start& start);
 
   /// One step, of the size in the options.
-  StepReport step();
+  StepReport step() { return step(options_.step); }
 
-  double time() const { return start_time_ + static_cast<double>(work_.steps) * options_.step; }
+  /// One step of size h, which may change from step to step and be negative.  Throws Misuse for a step that
+  /// is zero or not finite.
+  StepReport step(double h);
+
+  /// Takes the last step again from where it started, now with size h; its solution is the guess.  A failure
+  /// leaves the state there.  Throws Misuse where the last call was no successful step.
+  StepReport retry(double h);
+
+  /// Goes on from another point of a motion: p is any momentum of its class, v a rough velocity that serves
+  /// as a guess.  That q fulfils the constraints is not checked.  The counts of work go on.
+  void restart(double time, ConstVectorRef q, ConstVectorRef p, ConstVectorRef v);
+
+  double time() const { return clock_.base + static_cast<double>(clock_.steps) * options_.step; }
   const Vector& position() const { return q_; }
+  /// A momentum of the class at the current point, and a rough velocity there.
+  const Vector& momentum() const { return p_; }
+  const Vector& rough_velocity() const { return v_; }
   const Work& work() const { return work_; }
   const Scene& scene() const { return *scene_; }
   const IntegratorOptions& options() const { return options_; }
@@ -126,7 +149,7 @@ class Integrator {
 
   /// All that the next steps depend on.  After `restore`, an integrator of the same scene and options goes on
   /// with the same bits as the one saved.  restore() throws Misuse for a snapshot that does not fit, and then
-  /// the integrator is as after reset().
+  /// the integrator is as after reset().  The last step before it cannot be taken again by retry().
   Snapshot save() const;
   void restore(Snapshot from);
 
@@ -154,9 +177,20 @@ class Integrator {
   Integrator(Preparation preparation, const Registry& registry, const SolverFactory& solvers,
              IntegratorOptions options);
 
+  /// Fractions of the step and the part that takes each.
+  using Sequence = std::vector<std::pair<double, std::size_t>>;
+
+  Method choose_method(const Registry& registry);
+  Sequence composed(const MethodInfo& info) const;
+  /// The time: `base`, where the step size last changed, and steps of the options' size from there on. `rest`
+  /// is what rounding has dropped from the base.
+  struct Clock {
+    double base = 0.0, rest = 0.0;
+    long steps = 0;
+  };
   Part make_part(const Method& method, bool mirror_rule, const SolverFactory& solvers) const;
   void plan_stages(const Registry& registry, const SolverFactory& solvers);
-  enum class Guess { predicted, plain };
+  enum class Guess { predicted, plain, last_solution };
 
   SolveReport project_velocity(double t, const Vector& q, const Vector& p, Vector& v);
   SolveReport solve_velocity(double t, Vector& v);
@@ -164,13 +198,18 @@ class Integrator {
   SolveReport solve(Part& part, Vector& x, SolveReport& total);
   SolveReport retry_stage(Stage& stage, Interval step, const Vector& q, const Vector& p, Guess guess,
                           SolveReport total);
-  bool doubtful(Stage& stage, Interval step, const Vector& q, const Vector& p, Guess guess,
+  bool doubtful(const Stage& stage, Interval step, const Vector& q, const Vector& p,
                 const SolveReport& report);
   SolveReport follow_stage(Stage& stage, Interval step, const Vector& q, const Vector& p, SolveReport found);
   void count(const SolveReport& report, long solves = 1);
-  StepReport take(int pieces);
-  StepReport failed(const SolveReport& report, const StepProblem& problem, double time);
   void forget();
+  void compensate();
+  void learn();
+  StepReport take(double h, Guess guess);
+  StepReport take_in_pieces(double h, int pieces, Guess guess);
+  void remember(int pieces);
+  void advance_clock(double h);
+  StepReport failed(const SolveReport& report, const StepProblem& problem, double time);
   void read(Snapshot& from);
 
   std::shared_ptr<const Scene> scene_;
@@ -187,13 +226,20 @@ class Integrator {
   std::unique_ptr<NonlinearSolver> velocity_solver_;
   std::unique_ptr<NonlinearSolver> acceleration_solver_;
 
-  double start_time_ = 0.0;
-  double size_ = 0.0;  ///< of the step under way
+  Clock clock_;
+  double size_ = 0.0;  ///< of the step under way, or of the last one
   Vector q_, p_;
-  Vector v_, v_before_;   ///< the velocity, roughly: a guess only; and that before the step under way
+  Vector v_;              ///< the velocity, roughly: a guess only
   double reached_ = 1.0;  ///< part of the step that could be solved, where the last one failed
   Vector q_next_, p_next_, q_stage_, p_stage_, impulse_, start_velocity_, guess_;
   Vector velocity_unknowns_, acceleration_unknowns_;
+  struct {
+    Clock clock;
+    Vector q, p, v;
+  } before_;                  ///< where the last step started
+  bool retryable_ = false;    ///< before_ is known
+  bool unlearned_ = false;    ///< the predictors have not seen the last step yet
+  bool on_a_motion_ = false;  ///< the start was given by restart(), so that v_ is near the velocity there
   bool first_stage_solved_ = false;  ///< the first stage of the next step is solved already
   Work work_;
 };

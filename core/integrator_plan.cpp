@@ -10,7 +10,7 @@ std::vector<PlanLine> Integrator::plan() const {
   lines.push_back({"unknowns", part.problem->unknowns(),
                    part.solver ? "one nonlinear system in each solve" : "the graph is solved for its end"});
   if (part.solver)
-    lines.push_back({"nonlinear solver", part.solver->description(), "Newton's method, exact Jacobian"});
+    lines.push_back({"nonlinear solver", part.solver->description(), part.solver->strategy()});
   else
     lines.push_back({"nonlinear solver", "left out", "the step is explicit and no rows bind"});
   if (part.solver) {
@@ -22,11 +22,12 @@ std::vector<PlanLine> Integrator::plan() const {
     lines.push_back({"multipliers", "left out", "the scene has no rows"});
     lines.push_back({"projection", "left out", "every momentum is that of a velocity"});
   } else {
-    const StepRule rule = options_.constraint_rule.value_or(method_.info.constraint_rule);
-    lines.push_back({"multipliers", std::to_string(m) + (method_.make ? "" : " a node"),
-                     !method_.make ? "nonholonomic rows at the Gauss, holonomic rows at the Lobatto nodes"
-                                   : std::string("nonholonomic rows by the ") + name(rule) +
-                                         " rule, holonomic rows at the end of the step"});
+    const ConstraintRule rule = options_.constraint_rule.value_or(method_.info.constraint_rule);
+    lines.push_back({"multipliers", std::to_string(m) + (method_.rows_inside ? " a node" : ""),
+                     method_.rows_inside
+                         ? "nonholonomic rows at the Gauss, holonomic rows at the Lobatto nodes"
+                         : std::string("nonholonomic rows by the ") + rule.description() +
+                               " rule, holonomic rows at the end of the step"});
     lines.push_back(
         {"projection", "where the state is read", "p is defined up to the annihilator between steps"});
   }

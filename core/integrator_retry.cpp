@@ -1,3 +1,4 @@
+#include <cmath>
 #include <diracstep/core/integrator.hpp>
 #include <diracstep/core/scales.hpp>
 
@@ -8,6 +9,8 @@ namespace {
 /// A solution is looked at twice after so many Newton iterations, where it lies so far from its guess in
 /// units of the way of the step.
 constexpr int many_iterations = 5;
+/// With an old Jacobian, or with none, so many iterations gain what one of Newton's method does.
+constexpr int old_jacobian_iterations = 3;
 constexpr double far_from_guess = 0.1;
 /// Solutions so far apart are different ones.
 constexpr double another_solution = 1e-6;
@@ -29,23 +32,21 @@ SolveReport Integrator::solve(Part& part, Vector& x, SolveReport& total) {
 
 /// Whether a solution may be another than the one smaller steps lead to: the first one of a run where it does
 /// not tend to the start as the step is halved, and any that Newton's method found far from its guess.
-bool Integrator::doubtful(Stage& stage, Interval step, const Vector& q, const Vector& p, Guess guess,
+bool Integrator::doubtful(const Stage& stage, Interval step, const Vector& q, const Vector& p,
                           const SolveReport& report) {
   Part& part = parts_[stage.part];
-  if (!stage.predictor.begun() && &stage == &stages_.front()) {
+  if (!std::isnan(part.problem->constant_jacobian_parameter())) return false;  // affine: one solution
+  if (!on_a_motion_ && !stage.predictor.begun() && &stage == &stages_.front()) {
     StepContinuation::Result work;
     if (!project_velocity(step.start, q, p, start_velocity_).ok()) return true;
-    const bool tends = part.continuation->tends_to_start(step, q, p, start_velocity_, stage.solution, work);
+    guess_ = stage.solution;
+    const bool tends = part.continuation->tends_to_start(step, q, p, start_velocity_, guess_, work);
     count(work.report, work.solves);
     return !tends;
   }
-  if (report.iterations < many_iterations) return false;
-  guess_.resize(stage.solution.size());
-  if (guess == Guess::predicted)
-    stage.predictor.predict(guess_);
-  else
-    part.problem->guess(v_, guess_);
-  return part.continuation->distance(q, stage.solution, guess_) > far_from_guess;
+  const int others = report.iterations - report.jacobian_evaluations;
+  return report.jacobian_evaluations + others / old_jacobian_iterations >= many_iterations &&
+         part.continuation->distance(q, stage.solution, guess_) > far_from_guess;
 }
 
 /// From a failed or doubtful solve on: the plain guess, the last solution, and at last the continuation,
@@ -53,7 +54,7 @@ bool Integrator::doubtful(Stage& stage, Interval step, const Vector& q, const Ve
 SolveReport Integrator::retry_stage(Stage& stage, Interval step, const Vector& q, const Vector& p,
                                     Guess guess, SolveReport total) {
   Part& part = parts_[stage.part];
-  if (!total.ok() && guess == Guess::predicted) {
+  if (!total.ok() && guess != Guess::plain) {
     ++work_.retries.plain_guesses;
     part.problem->guess(v_, stage.solution);
     (void)solve(part, stage.solution, total);

@@ -28,10 +28,13 @@ void for_each_count(AnyWork& work, Visit visit) {
 
 Snapshot Integrator::save() const {
   Snapshot to;
-  to.put(start_time_);
+  to.put(clock_.base);
   for_each_count(work_, [&](long count) { to.put(static_cast<double>(count)); });
+  to.put(clock_.rest);
+  to.put(static_cast<double>(clock_.steps));
+  to.put(size_);
   for (const Vector* column : {&q_, &p_, &v_}) to.put(*column);
-  to.put(first_stage_solved_ ? 1.0 : 0.0);
+  for (const bool mark : {first_stage_solved_, unlearned_, on_a_motion_}) to.put(mark ? 1.0 : 0.0);
   for (const Stage& stage : stages_) {
     to.put(stage.solution);
     stage.predictor.save(to);
@@ -58,10 +61,13 @@ void Integrator::restore(Snapshot from) {
 
 void Integrator::read(Snapshot& from) {
   forget();
-  start_time_ = from.number();
+  clock_.base = from.number();
   for_each_count(work_, [&](long& count) { count = from.whole_number(most_counted); });
+  clock_.rest = from.number();
+  clock_.steps = from.whole_number(most_counted);
+  size_ = from.number();
   for (Vector* column : {&q_, &p_, &v_}) from.read(*column);
-  first_stage_solved_ = from.whole_number(1) == 1;
+  for (bool* mark : {&first_stage_solved_, &unlearned_, &on_a_motion_}) *mark = from.whole_number(1) == 1;
   for (Stage& stage : stages_) {
     from.read(stage.solution);
     stage.predictor.restore(from);
@@ -70,7 +76,6 @@ void Integrator::read(Snapshot& from) {
     part.problem->restore(from);
     if (part.solver) part.solver->restore(from);
   }
-  size_ = options_.step;
   const Stage& first = stages_.front();
   if (first_stage_solved_) parts_[first.part].problem->begin({time(), first.fraction * size_}, q_, p_);
 }

@@ -1,6 +1,11 @@
 #include <diracstep/core/nonlinear_solver.hpp>
+#include <limits>
 
 namespace diracstep {
+
+double NonlinearProblem::constant_jacobian_parameter() const {
+  return std::numeric_limits<double>::quiet_NaN();
+}
 
 const char* describe(SolveStatus status) {
   switch (status) {

@@ -28,6 +28,16 @@ class NonlinearProblem {
   virtual std::span<const ResidualBlock> blocks() const = 0;
   virtual void residual(ConstVectorRef x, VectorRef f) = 0;
   virtual void jacobian(ConstVectorRef x, VectorRef values) = 0;
+
+  /// Where the Jacobian is the same at every x and in every solve with the same value of some parameter, such
+  /// as the step size: that value.  NaN where it is not.
+  virtual double constant_jacobian_parameter() const;
+
+  /// Whether there is a splitting: a matrix P near the Jacobian which costs little to solve with, so that
+  /// x ← x − P⁻¹F(x) converges quickly.
+  virtual bool has_splitting() const { return false; }
+  /// f ← P⁻¹ f.  Called only where there is a splitting.
+  virtual void solve_splitting(VectorRef /*f*/) {}
 };
 
 enum class SolveStatus {
@@ -66,6 +76,8 @@ class NonlinearSolver {
   virtual void restore(Snapshot& /*from*/) {}
   /// What does the work, for plans and reports: "KINSOL, dense".
   virtual std::string description() const = 0;
+  /// How it goes about it, for plans: "Newton's method, fresh Jacobian in each iteration".
+  virtual std::string strategy() const { return "Newton's method, exact Jacobian"; }
 };
 
 /// Makes the solver of one problem; the problem outlives it.

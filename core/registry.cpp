@@ -1,8 +1,10 @@
+#include <algorithm>
 #include <diracstep/core/errors.hpp>
 #include <diracstep/core/gauss_lobatto_step.hpp>
 #include <diracstep/core/gauss_lobatto_tableau.hpp>
 #include <diracstep/core/generating_functions/adjoint.hpp>
 #include <diracstep/core/generating_functions/euler.hpp>
+#include <diracstep/core/generating_functions/gauss_lobatto.hpp>
 #include <diracstep/core/generating_functions/legendre.hpp>
 #include <diracstep/core/generating_functions/quadrature.hpp>
 #include <diracstep/core/phase_space_step.hpp>
@@ -23,7 +25,7 @@ void add_quadrature(Registry& registry, StepRule rule, int order, std::string su
     step = [](const Scene& scene, bool dense) { return gauss_lobatto_step(1, scene, dense); };
   registry.add(
       {std::string("type1/") + name(rule), GeneratingType::one, order, order == 2, rule, std::move(summary),
-       std::move(adjoint)},
+       std::move(adjoint), 0, true},
       [rule](const Scene& scene) { return quadrature_lagrangian(scene.lagrangian, rule); }, std::move(step),
       rule == StepRule::midpoint ? 1 : 0);
 }
@@ -54,22 +56,27 @@ std::optional<Method> gauss_lobatto_method(const std::string& name) {
                         true,
                         StepRule::midpoint,
                         "Gauss-Lobatto Dirac step, " + std::to_string(s) + (s == 1 ? " stage" : " stages")};
-  return Method{info, nullptr,
-                [s](const Scene& scene, bool dense) { return gauss_lobatto_step(s, scene, dense); }, s};
+  return Method{
+      info,
+      [s, type = info.type](const Scene& scene) { return gauss_lobatto_function(type, s, scene.lagrangian); },
+      [s](const Scene& scene, bool dense) { return gauss_lobatto_step(s, scene, dense); }, s, true};
 }
 
 }  // namespace
 
-std::unique_ptr<StepProblem> Method::step(const Scene& scene, bool dense, std::optional<StepRule> rule,
+std::unique_ptr<StepProblem> Method::step(const Scene& scene, bool dense, std::optional<ConstraintRule> rule,
                                           bool force_degenerate) const {
-  if (scene.lagrangian->structure().y_hessian_zero && !force_degenerate) {
+  if (scene.lagrangian->structure().phase_space() && !force_degenerate) {
     if (stages > 0) return phase_space_step(stages, scene, dense);
     throw Misuse("scene '" + scene.name + "': its Lagrangian is linear in v, where '" + info.name +
                  "' is unstable or leaves p = ∂L/∂v; use type1/midpoint or typeN/gl:S");
   }
-  const bool own_rule = !rule || *rule == info.constraint_rule;
-  if (make_step && own_rule) return make_step(scene, dense);
-  if (make) return dirac_step(make(scene), scene, rule.value_or(info.constraint_rule), dense);
+  const bool stated_rule = !rule || (!rule->own && rule->nodes == info.constraint_rule);
+  if (make_step && stated_rule) return make_step(scene, dense);
+  ConstraintRule applied = info.constraint_rule;
+  if (rule && rule->own) applied.own = rule->own;  // forces keep the method's nodes
+  if (rule && !rule->own) applied.nodes = rule->nodes;
+  if (make && !rows_inside) return dirac_step(make(scene), scene, applied, dense);
   throw Misuse("method '" + info.name + "' has its own nodes for the constraint; no other rule applies");
 }
 
@@ -105,6 +112,20 @@ Method Registry::method(const std::string& name) const {
   return transformed(name);
 }
 
+void Registry::add_rule(const StepRule& rule) {
+  if (std::ranges::find(rules_, rule.name(), &StepRule::name) != rules_.end())
+    throw Misuse("constraint rule '" + name(rule) + "' is already registered");
+  rules_.push_back(rule);
+}
+
+StepRule Registry::rule(std::string_view wanted) const {
+  const auto found = std::ranges::find(rules_, wanted, &StepRule::name);
+  if (found != rules_.end()) return *found;
+  std::string message = "unknown constraint rule '" + std::string(wanted) + "'; the rules are";
+  for (const StepRule& known : rules_) message += " " + name(known);
+  throw Misuse(message);
+}
+
 Method Registry::transformed(const std::string& name) const {
   Transform transform;
   if (!parse_transform(name, transform)) {
@@ -113,8 +134,11 @@ Method Registry::transformed(const std::string& name) const {
     throw Misuse(message + " typeN/gl:S typeN/adjoint(...)");
   }
   const Method inner = method(transform.inner);
-  if (!inner.make)
-    throw Misuse("'" + name + "': " + transform.inner + " is no generating function of its end points");
+  if (!inner.make || inner.rows_inside)
+    throw Misuse(
+        "'" + name + "': " + transform.inner +
+        " keeps the rows at nodes inside the step, so no function of its end points makes it; typeN/gl:S "
+        "are its transforms, and it is its own adjoint");
   MethodInfo info = inner.info;
   info.name = name;
   info.type = transform.type;

@@ -55,8 +55,10 @@ void require_well_formed(const Scene& scene) {
   if (scene.hamiltonian)
     require_size(prefix + "the Hamiltonian", scene.hamiltonian->dimension(), scene.dimension());
   if (scene.force) require_size(prefix + "the force", scene.force->dimension(), scene.dimension());
-  for (const auto& block : scene.constraints)
+  for (const auto& block : scene.constraints) {
+    if (!block) throw Misuse(prefix + "scene.constraints holds a null pointer");
     require_size(prefix + "a constraint row", block->dimension(), scene.dimension());
+  }
 }
 
 std::shared_ptr<const Scene> completed(std::shared_ptr<const Scene> scene) {
@@ -75,11 +77,9 @@ std::shared_ptr<const Scene> completed(std::shared_ptr<const Scene> scene) {
   auto complete = std::make_shared<Scene>(*scene);
   if (from_momentum) {
     require_size(prefix + "the start p", start.p.size(), scene->dimension());
-    if (!scene->hamiltonian)
-      throw Misuse(prefix + "the start is given by p, which needs a Hamiltonian; give v instead");
     Vector hq(start.q.size());
-    complete->start.v.resize(start.q.size());
-    scene->hamiltonian->gradient(start.time, start.q, start.p, hq, complete->start.v);
+    complete->start.v.setZero(start.q.size());  // where the Lagrangian is tested for a Hamiltonian
+    hamiltonian_of(*complete)->gradient(start.time, start.q, start.p, hq, complete->start.v);
   }
   if (!scene->lagrangian) {
     const Vector& p = from_momentum ? start.p : start.v;  // regularity is tested there

@@ -9,8 +9,8 @@
 
 namespace diracstep {
 
-/// Where a motion starts: a configuration, and a velocity in the distribution or (for a scene with a
-/// Hamiltonian) a momentum whose velocity ∂H/∂p lies in it.
+/// Where a motion starts: a configuration, and a velocity in the distribution or a momentum whose velocity
+/// ∂H/∂p lies in it, with the scene's Hamiltonian or that of a regular Lagrangian.
 struct Start {
   double time = 0.0;
   Vector q;

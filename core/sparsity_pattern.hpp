@@ -80,6 +80,8 @@ class BlockPattern {
  public:
   BlockPattern(int rows, int columns) : rows_(rows), columns_(columns) {}
 
+  int rows() const { return rows_; }
+
   /// Adds `block` with its corner at (row, column), transposed if asked; returns the block's number.
   int add(const SparsityPattern& block, int row, int column, bool transposed = false);
 

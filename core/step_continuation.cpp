@@ -123,6 +123,7 @@ StepContinuation::Result StepContinuation::follow(Interval step, const Vector& q
 bool StepContinuation::tends_to_start(Interval step, const Vector& q0, const Vector& p0, const Vector& v0,
                                       VectorRef x, Result& work) {
   const double whole = change(step.size, q0, v0, x);
+  other_ = q1_;  // of that size, so that distance() allocates nothing
   before_.part = 0.5;
   problem_.begin({step.start, 0.5 * step.size}, q0, p0);
   problem_.guess(v0, before_.x);

@@ -1,39 +1,49 @@
-#include <array>
+#include <cmath>
+#include <diracstep/core/errors.hpp>
 #include <diracstep/core/step_nodes.hpp>
+#include <sstream>
 
 namespace diracstep {
 
 namespace {
 
-struct NamedRule {
-  const char* name;
-  std::array<StepNode, 2> nodes;
-  std::size_t size;
-};
-
-const NamedRule& rule_data(StepRule rule) {
-  static constexpr std::array<NamedRule, 4> rules{{
-      {"left", {{{0.0, 1.0}}}, 1},
-      {"right", {{{1.0, 1.0}}}, 1},
-      {"midpoint", {{{0.5, 1.0}}}, 1},
-      {"trapezoidal", {{{0.0, 0.5}, {1.0, 0.5}}}, 2},
-  }};
-  return rules.at(static_cast<std::size_t>(rule));
+std::string fault_of(std::string_view name, const std::vector<StepNode>& nodes) {
+  std::ostringstream text;
+  if (name.empty() || name.size() > StepRule::longest_name)
+    text << "its name has " << name.size() << " characters; 1 to " << StepRule::longest_name
+         << " are allowed";
+  if (nodes.empty() || nodes.size() > StepRule::most_nodes)
+    text << "it has " << nodes.size() << " nodes; 1 to " << StepRule::most_nodes << " are allowed";
+  double sum = 0.0;
+  for (const StepNode& node : nodes) {
+    if (!(node.c >= 0.0 && node.c <= 1.0)) text << "a node is " << node.c << "; nodes lie in [0, 1]";
+    sum += node.weight;
+  }
+  if (!(std::abs(sum - 1.0) <= 1e-12)) text << "its weights add up to " << sum << "; they must add up to 1";
+  return text.str();
 }
 
 }  // namespace
 
-std::span<const StepNode> step_nodes(StepRule rule) {
-  const NamedRule& data = rule_data(rule);
-  return {data.nodes.data(), data.size};
-}
-
-StepRule mirrored(StepRule rule) {
-  if (rule == StepRule::left) return StepRule::right;
-  if (rule == StepRule::right) return StepRule::left;
+StepRule step_rule(std::string_view name, const std::vector<StepNode>& nodes) {
+  const std::string fault = fault_of(name, nodes);
+  if (!fault.empty()) throw Misuse("constraint rule '" + std::string(name) + "': " + fault);
+  StepRule rule(name, {});
+  std::copy(nodes.begin(), nodes.end(), rule.nodes_.begin());
+  rule.size_ = nodes.size();
   return rule;
 }
 
-const char* name(StepRule rule) { return rule_data(rule).name; }
+StepRule mirrored(const StepRule& rule) {
+  if (rule == StepRule::left) return StepRule::right;
+  if (rule == StepRule::right) return StepRule::left;
+  std::vector<StepNode> nodes;
+  for (const StepNode& node : rule.nodes()) nodes.insert(nodes.begin(), {1.0 - node.c, node.weight});
+  if (std::ranges::equal(nodes, rule.nodes())) return rule;
+  constexpr std::string_view prefix = "mirrored ";
+  const std::string_view plain = rule.name();
+  if (plain.starts_with(prefix)) return step_rule(plain.substr(prefix.size()), nodes);
+  return step_rule((std::string(prefix) + std::string(plain)).substr(0, StepRule::longest_name), nodes);
+}
 
 }  // namespace diracstep

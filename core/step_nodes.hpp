@@ -1,6 +1,12 @@
 #pragma once
 
+#include <algorithm>
+#include <array>
+#include <initializer_list>
 #include <span>
+#include <string>
+#include <string_view>
+#include <vector>
 
 namespace diracstep {
 
@@ -8,19 +14,54 @@ namespace diracstep {
 struct StepNode {
   double c;
   double weight;
+
+  bool operator==(const StepNode&) const = default;
 };
 
-/// The one- and two-point rules that make a discrete Lagrangian out of L and discrete constraint rows out of
-/// one-forms.  Left and right are of order 1, midpoint and trapezoidal of order 2.
-enum class StepRule { left, right, midpoint, trapezoidal };
+/// The rules that make a discrete Lagrangian out of L and discrete constraint rows out of one-forms: a name,
+/// nodes, and weights that add up to 1.  Left and right are of order 1, midpoint and trapezoidal of order 2;
+/// others come from step_rule().
+class StepRule {
+ public:
+  static constexpr std::size_t most_nodes = 8;
+  static constexpr std::size_t longest_name = 63;
+  static const StepRule left, right, midpoint, trapezoidal;
 
-/// Nodes and weights of a rule; the weights add up to 1.
-std::span<const StepNode> step_nodes(StepRule rule);
+  std::string_view name() const { return name_.data(); }
+  std::span<const StepNode> nodes() const { return {nodes_.data(), size_}; }
 
-/// The rule of the adjoint step: left and right change places.
-StepRule mirrored(StepRule rule);
+  bool operator==(const StepRule&) const = default;
 
-/// "left", "right", "midpoint" or "trapezoidal".
-const char* name(StepRule rule);
+ private:
+  constexpr StepRule(std::string_view name, std::initializer_list<StepNode> nodes) : size_(nodes.size()) {
+    std::copy(name.begin(), name.end(), name_.begin());
+    std::copy(nodes.begin(), nodes.end(), nodes_.begin());
+  }
+  friend StepRule step_rule(std::string_view name, const std::vector<StepNode>& nodes);
+
+  std::array<char, longest_name + 1> name_{};
+  std::array<StepNode, most_nodes> nodes_{};
+  std::size_t size_;
+};
+
+inline constexpr StepRule StepRule::left{"left", {{0.0, 1.0}}};
+inline constexpr StepRule StepRule::right{"right", {{1.0, 1.0}}};
+inline constexpr StepRule StepRule::midpoint{"midpoint", {{0.5, 1.0}}};
+inline constexpr StepRule StepRule::trapezoidal{"trapezoidal", {{0.0, 0.5}, {1.0, 0.5}}};
+
+/// A rule of one's own.  Throws Misuse unless it has a name of 1 to longest_name characters and 1 to
+/// most_nodes nodes in [0,1] whose weights add up to 1; with another sum the discrete constraint would not
+/// induce Δ_Q back (Leok and Ohsawa (4.18)).
+StepRule step_rule(std::string_view name, const std::vector<StepNode>& nodes);
+
+/// Nodes and weights of a rule, which must outlive them.
+inline std::span<const StepNode> step_nodes(const StepRule& rule) { return rule.nodes(); }
+std::span<const StepNode> step_nodes(const StepRule&& rule) = delete;
+
+/// The rule of the adjoint step, with c and 1 − c exchanged: left and right change places.
+StepRule mirrored(const StepRule& rule);
+
+/// "left", "right", "midpoint", "trapezoidal", or the name it was given.
+inline std::string name(const StepRule& rule) { return std::string(rule.name()); }
 
 }  // namespace diracstep

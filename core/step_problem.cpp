@@ -12,7 +12,7 @@ namespace {
 
 /// What both forms of the step share: the frozen data and the two constraints of Δ_Q and Δ^d_Q.
 struct StepData {
-  StepData(const ConstraintBlocks& constraints, int dimension, StepRule rule)
+  StepData(const ConstraintBlocks& constraints, int dimension, const ConstraintRule& rule)
       : n(dimension), start_rows(constraints, dimension), discrete_constraint(constraints, dimension, rule) {
     q0.setZero(n);
     p0.setZero(n);
@@ -28,6 +28,16 @@ struct StepData {
 
   int rows() const { return discrete_constraint.rows(); }
 
+  /// Size of the terms of A(q0)ᵀλ.
+  double impulse_scale(ConstVectorRef lambda) const {
+    const auto places = start_rows.pattern().row_indices();
+    const double* const a = start_rows.coefficients().data();
+    double largest = 0.0;
+    for (std::size_t k = 0; k < places.size(); ++k)
+      largest = std::max(largest, std::abs(a[k] * lambda[places[k]]));
+    return largest;
+  }
+
   /// Size of the terms that cancel in c(q0,q1).
   double constraint_scale() const { return usable_scale(max_norm(start_rows.coefficients()) * max_norm(q0)); }
 
@@ -42,7 +52,8 @@ struct StepData {
 /// The graph and the constraint solved together.
 class ImplicitStep final : public StepProblem {
  public:
-  ImplicitStep(std::unique_ptr<GeneratingFunction> s, const Scene& scene, StepRule rule, bool dense)
+  ImplicitStep(std::unique_ptr<GeneratingFunction> s, const Scene& scene, const ConstraintRule& rule,
+               bool dense)
       : s_(std::move(s)),
         graph_(graph_of(s_->type())),
         data_(scene.constraints, s_->dimension(), rule),
@@ -52,12 +63,13 @@ class ImplicitStep final : public StepProblem {
     y_.setZero(n_, s_->columns());
     gradient_ = y_;
     hessian_.setZero(s_->pattern().nonzeros(), s_->pairs());
-    last_x_.setConstant(size(), std::nan(""));
+    last_x_.setZero(size());
     q1_.setZero(n_);
     terms_.setZero(s_->columns());
+    multipliers_.setZero(m_);
     if (scene.force) {
       if (s_->type() == GeneratingType::four) throw Misuse("generating functions of type 4 take no forces");
-      force_.emplace(scene.force, rule);
+      force_.emplace(scene.force, rule.nodes);
       force_by_end_.setZero(force_->pattern().nonzeros());
     }
     plan_blocks(dense);
@@ -70,16 +82,22 @@ class ImplicitStep final : public StepProblem {
   int leading_unknowns() const override { return n_; }
   void keep() override {
     if (hessian_known_) measure_terms();
-    terms_known_ = terms_known_ || hessian_known_;
+    terms_known_ = true;
+    multipliers_ = last_x_.segment(n_, m_);
   }
-  void reset() override { terms_known_ = false; }
+  void reset() override {
+    terms_known_ = false;
+    multipliers_.setZero();
+  }
   void save(Snapshot& to) const override {
     to.put(terms_known_ ? 1.0 : 0.0);
     to.put(terms_);
+    to.put(multipliers_);
   }
   void restore(Snapshot& from) override {
     terms_known_ = from.whole_number(1) == 1;
     from.read(terms_);
+    from.read(multipliers_);
   }
   const SparsityPattern& pattern() const override { return pattern_; }
   std::span<const ResidualBlock> blocks() const override { return blocks_; }
@@ -332,13 +350,16 @@ class ImplicitStep final : public StepProblem {
   }
 
   void measure_terms() {
-    for (int i = 0; i < s_->columns(); ++i) terms_[i] = cancelling_terms(i);
+    for (int i = 0; i < s_->columns(); ++i)
+      if (i != 1) terms_[i] = cancelling_terms(i);  // the end is no row
   }
 
   void update_scales() {
     const double own =
         graph_.starts_from_position ? std::abs(data_.step.size) * max_norm(data_.p0) : max_norm(data_.q0);
-    blocks_[0].scale = usable_scale(std::max(own, std::abs(row_factor()) * terms_[0]));
+    // The impulse, as large as it was in the last step.
+    const double impulse = graph_.starts_from_position && m_ > 0 ? data_.impulse_scale(multipliers_) : 0.0;
+    blocks_[0].scale = usable_scale(std::max({own, impulse, std::abs(row_factor()) * terms_[0]}));
     if (m_ > 0) blocks_[1].scale = data_.constraint_scale();
     if (inner_ == 0) return;
     double largest = 0.0;
@@ -374,14 +395,16 @@ class ImplicitStep final : public StepProblem {
   std::vector<ResidualBlock> blocks_;
   Vector last_x_, q1_;
   Columns y_, gradient_, hessian_;
-  Vector terms_;  ///< size of the terms of each column of the gradient, in the last step kept
+  Vector terms_;        ///< size of the terms of each column of the gradient, in the last step kept
+  Vector multipliers_;  ///< in that step
   bool terms_known_ = false, hessian_known_ = false;
 };
 
 /// The graph is solved for its end by S itself; what is left is c(q0, q1(p0 + A(q0)ᵀλ)) = 0 for hλ.
 class MultiplierStep final : public StepProblem {
  public:
-  MultiplierStep(std::unique_ptr<GeneratingFunction> s, const Scene& scene, StepRule rule, bool dense)
+  MultiplierStep(std::unique_ptr<GeneratingFunction> s, const Scene& scene, const ConstraintRule& rule,
+                 bool dense)
       : s_(std::move(s)),
         graph_(*s_->explicit_graph()),
         data_(scene.constraints, s_->dimension(), rule),
@@ -462,7 +485,7 @@ class MultiplierStep final : public StepProblem {
 }  // namespace
 
 std::unique_ptr<StepProblem> dirac_step(std::unique_ptr<GeneratingFunction> generating_function,
-                                        const Scene& scene, StepRule rule, bool dense) {
+                                        const Scene& scene, const ConstraintRule& rule, bool dense) {
   if (generating_function->explicit_graph() != nullptr && !scene.force)
     return std::make_unique<MultiplierStep>(std::move(generating_function), scene, rule, dense);
   return std::make_unique<ImplicitStep>(std::move(generating_function), scene, rule, dense);

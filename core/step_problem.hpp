@@ -36,6 +36,11 @@ class StepProblem : public NonlinearProblem {
   /// Keeps what the next steps need of the one just finished: the sizes of terms that round-off is judged by.
   /// Until then a step leaves no trace.
   virtual void keep() {}
+  /// From now on, sums over the stages in extended precision with coefficients to match, and q1, p1 with what
+  /// rounding drops from them carried into the step that starts there (compensated addition).  Plain sums
+  /// with rounded coefficients are a step that is not quite self-adjoint, whose energy drifts linearly by
+  /// round-off (Hairer, McLachlan, Razakarivony, BIT 48, 2008).  False where the step has no such form.
+  virtual bool compensate() { return false; }
 
   /// Forgets all that earlier steps left behind, so that a run repeats bit by bit.
   virtual void reset() {}
@@ -66,6 +71,6 @@ class StepProblem : public NonlinearProblem {
 /// none. With `dense` the Jacobian is a full matrix.  Throws Misuse for a force with type four, whose end
 /// point is not known before its momentum.
 std::unique_ptr<StepProblem> dirac_step(std::unique_ptr<GeneratingFunction> generating_function,
-                                        const Scene& scene, StepRule rule, bool dense);
+                                        const Scene& scene, const ConstraintRule& rule, bool dense);
 
 }  // namespace diracstep

@@ -72,18 +72,21 @@ void PieceBuilder::add_phase(SceneFunction& function, Piece piece) {
       if (varies(fxx[k][l]) || varies(fxy[k][l]) || varies(fyy[k][l])) function.quadratic = false;
     }
 
-  std::vector<Store> gradient, rate;
-  const std::vector<Node> fyt = graph_.derivative(fy, graph_.time());
+  std::vector<Store> gradient, rate, position_rate;
+  const std::vector<Node> fyt = graph_.derivative(fy, graph_.time()),
+                          fxt = graph_.derivative(fx, graph_.time());
   for (std::size_t k = 0; k < n; ++k) {
     const int slot = static_cast<int>(k);
     gradient.push_back({0, Table::slots, slot, fx[k]});
     gradient.push_back({1, Table::slots, slot, fy[k]});
     rate.push_back({0, Table::slots, slot, fyt[k]});
+    position_rate.push_back({0, Table::slots, slot, fxt[k]});
   }
   add_kernel(piece, {{0, Table::fixed, 0, piece.outputs[0]}});
   add_kernel(piece, std::move(gradient));
   add_kernel(piece, std::move(hessian));
   add_kernel(piece, std::move(rate));
+  add_kernel(piece, std::move(position_rate));
   function.pieces.push_back(std::move(piece));
 }
 

@@ -14,7 +14,7 @@ namespace diracstep::scene_compiler {
 
 /// What a function of the scene is, and with it which kernels its pieces have:
 ///
-///   phase      value; gradient; hessian; ∂(f_y)/∂t             one output, f
+///   phase      value; gradient; hessian; ∂(f_y)/∂t; ∂(f_x)/∂t   one output, f
 ///   rows       φ; A and b; ∂(A w + s b)/∂q; ∂(A w + b)/∂t; ∂(Aᵀλ)/∂q   an output for each row
 ///   force      f; ∂f/∂q and ∂f/∂v                               an output for each component
 enum class FunctionKind { phase, rows, force };

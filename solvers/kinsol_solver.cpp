@@ -1,47 +1,69 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <diracstep/solvers/detail/linear_solver.hpp>
+#include <diracstep/core/errors.hpp>
+#include <diracstep/solvers/detail/jacobian_factors.hpp>
 #include <diracstep/solvers/detail/sundials.hpp>
+#include <diracstep/solvers/detail/vector.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
 #include <exception>
+#include <limits>
 #include <string>
+#include <utility>
 
 namespace diracstep {
 
 namespace {
 
+using detail::data_of;
 using detail::require;
 
 /// KINSOL measures a Newton step in units of the guess, which may be next to zero.
 constexpr double no_limit = 1e100;
 /// A residual of so many tolerances is round-off.
 constexpr double round_off = 16.0;
+/// With a Jacobian of another point the error falls by a mere factor in each iteration, so that the last
+/// correction has to be this small.
+constexpr double linear_step_tolerance = 1e-14;
 
-/// KINSOL around our own direct linear solver.  The Jacobian's values live in `values_`; the SUNMatrix that
-/// KINSOL carries around is an empty shell, and the solver's `setup` factors `values_`.  Unlike the linear
-/// solvers that come with SUNDIALS, this one keeps its symbolic work from one call of KINSol to the next.
+/// A fixed-point iteration of so many iterations costs what Newton's method does.  It is judged by its first
+/// solves, once there is a history to guess from.
+constexpr int quick = 6, solves_to_judge = 12;
+
+/// KINSOL around our own direct linear solver.  KINSOL believes that it gets a new Jacobian in each
+/// iteration; JacobianFactors decides what it does get.  The SUNMatrix that KINSOL carries around is an empty
+/// shell. Unlike the linear solvers that come with SUNDIALS, ours keeps its symbolic work from one call of
+/// KINSol to the next.
 class KinsolSolver final : public NonlinearSolver {
  public:
   KinsolSolver(NonlinearProblem& problem, KinsolOptions options)
-      : problem_(problem), options_(options), linear_solver_(detail::make_linear_solver(problem.pattern())) {
+      : problem_(problem),
+        options_(options),
+        factors_(problem, options.jacobian),
+        fixed_point_(options.iteration != Iteration::newton && problem.has_splitting()) {
+    if (problem.blocks().size() > report_.residual_norms.size())
+      throw Misuse("a problem with " + std::to_string(problem.blocks().size()) +
+                   " residual blocks; at most 4 are reported");
     const int size = problem.size();
-    x_.reset(require(N_VNew_Serial(size, context_), "N_VNew_Serial"));
+    x_ = detail::make_vector(size, context_);
     unknown_scale_.reset(require(N_VClone(x_.get()), "N_VClone"));
     residual_scale_.reset(require(N_VClone(x_.get()), "N_VClone"));
-    last_residual_.setZero(size);
-    values_.setZero(problem.pattern().nonzeros());
+    for (Vector* column : {&guess_, &last_, &last_residual_}) column->setZero(size);
     make_matrix_shell();
     make_linear_solver_shell();
     kinsol_.reset(require(KINCreate(context_), "KINCreate"));
     sink_.attach(memory());
-    require(KINInit(memory(), &KinsolSolver::residual, x_.get()), "KINInit");
+    require(KINSetNumMaxIters(memory(), options.max_iterations), "KINSetNumMaxIters");
+    if (fixed_point_) require(KINSetMAA(memory(), options.anderson), "KINSetMAA");
+    require(KINInit(memory(), &KinsolSolver::evaluate, x_.get()), "KINInit");
     require(KINSetUserData(memory(), this), "KINSetUserData");
     require(KINSetLinearSolver(memory(), linear_shell_.get(), matrix_shell_.get()), "KINSetLinearSolver");
     require(KINSetJacFn(memory(), &KinsolSolver::jacobian), "KINSetJacFn");
     require(KINSetMaxSetupCalls(memory(), 1), "KINSetMaxSetupCalls");
-    require(KINSetNumMaxIters(memory(), options.max_iterations), "KINSetNumMaxIters");
     require(KINSetFuncNormTol(memory(), options.tolerance), "KINSetFuncNormTol");
-    require(KINSetScaledStepTol(memory(), options.step_tolerance), "KINSetScaledStepTol");
+    const double step_tolerance =
+        factors_.exact() ? options.step_tolerance : std::min(options.step_tolerance, linear_step_tolerance);
+    require(KINSetScaledStepTol(memory(), step_tolerance), "KINSetScaledStepTol");
     require(KINSetMaxNewtonStep(memory(), no_limit), "KINSetMaxNewtonStep");
   }
 
@@ -49,7 +71,10 @@ class KinsolSolver final : public NonlinearSolver {
     report_ = {};
     guess_ = x;
     set_scales();
-    attempt(KIN_NONE);
+    report_.status = SolveStatus::no_convergence;
+    if (fixed_point_ && !given_up_) attempt(KIN_FP);
+    if (options_.iteration == Iteration::automatic && fixed_point_) judge_fixed_point();
+    if (!report_.ok()) attempt(KIN_NONE);
     if (!report_.ok()) {
       ++report_.line_searches;
       attempt(KIN_LINESEARCH);
@@ -58,28 +83,56 @@ class KinsolSolver final : public NonlinearSolver {
     return report_;
   }
 
-  void reset() override { linear_solver_->reset(); }
-  void save(Snapshot& to) const override { linear_solver_->save(to); }
-  void restore(Snapshot& from) override { linear_solver_->restore(from); }
+  void reset() override {
+    factors_.reset();
+    judged_solves_ = judged_iterations_ = 0;
+    given_up_ = false;
+  }
+  void save(Snapshot& to) const override {
+    factors_.save(to);
+    for (const int count : {judged_solves_, judged_iterations_, given_up_ ? 1 : 0}) to.put(count);
+  }
+  void restore(Snapshot& from) override {
+    factors_.restore(from);
+    judged_solves_ = static_cast<int>(from.whole_number(solves_to_judge));
+    judged_iterations_ = static_cast<int>(from.whole_number(std::numeric_limits<int>::max()));
+    given_up_ = from.whole_number(1) == 1;
+  }
 
-  std::string description() const override { return std::string("KINSOL, ") + linear_solver_->name(); }
+  std::string description() const override { return std::string("KINSOL, ") + factors_.name(); }
+  std::string strategy() const override {
+    const std::string newton = "Newton's method, " + factors_.policy();
+    if (!fixed_point_) return newton;
+    const bool measured = options_.iteration == Iteration::automatic;
+    return (measured ? "fixed-point iteration while it is quick; otherwise "
+                     : "fixed-point iteration; where it fails ") +
+           newton;
+  }
 
  private:
   void* memory() const { return kinsol_.get(); }
 
-  Eigen::Map<Vector> unknowns() const { return {N_VGetArrayPointer(x_.get()), last_residual_.size()}; }
+  Eigen::Map<Vector> unknowns() const { return {data_of(x_.get()), guess_.size()}; }
+
+  /// Newton's method from now on, where the fixed-point iteration has turned out to be slow.
+  void judge_fixed_point() {
+    if (given_up_ || judged_solves_ == solves_to_judge) return;
+    judged_iterations_ += report_.ok() ? report_.iterations : options_.max_iterations;
+    given_up_ = ++judged_solves_ == solves_to_judge && judged_iterations_ > quick * solves_to_judge;
+  }
 
   /// From the guess to a status.
   void attempt(int strategy) {
     unknowns() = guess_;
-    int code = run(strategy);
+    strategy_ = strategy;
+    int code = run();
     double norm = measure_residual();
     // KINSOL ends where its steps are small beside the unknowns, which may be far from the origin or of
     // different sizes; it goes on for as long as the residual falls.
     while (code == KIN_STEP_LT_STPTOL && norm > round_off * options_.tolerance &&
            report_.iterations < options_.max_iterations)
-      if (!improve(strategy, code, norm)) break;
-    const bool converged = code == KIN_SUCCESS || code == KIN_INITIAL_GUESS_OK;
+      if (!improve(code, norm)) break;
+    const bool converged = strategy != KIN_FP && (code == KIN_SUCCESS || code == KIN_INITIAL_GUESS_OK);
     // Other codes, KIN_STEP_LT_STPTOL above all, come at the round-off floor as well as far from a solution.
     if (converged || norm <= options_.accept)
       report_.status = SolveStatus::ok;
@@ -89,14 +142,24 @@ class KinsolSolver final : public NonlinearSolver {
       report_.status = SolveStatus::not_finite;
     else
       report_.status = SolveStatus::no_convergence;
+    if (report_.ok() && strategy != KIN_FP && !factors_.exact() && report_.iterations > 0) correct_again();
+  }
+
+  /// Where the convergence is linear, what is left of the error is as large as the last residual and of the
+  /// same sign in one step after the other; a last correction, which is not evaluated any more, makes it
+  /// small beside round-off.
+  void correct_again() {
+    last_ = last_residual_;
+    factors_.solve(last_.data());
+    unknowns() -= last_;
   }
 
   /// Goes on from the last point and keeps the better one; false where the residual does not halve.
-  bool improve(int strategy, int& code, double& norm) {
+  bool improve(int& code, double& norm) {
     const double before = norm;
     const auto norms = report_.residual_norms;
     last_ = unknowns();
-    code = run(strategy);
+    code = run();
     norm = measure_residual();
     if (norm > before) {
       unknowns() = last_;
@@ -107,14 +170,26 @@ class KinsolSolver final : public NonlinearSolver {
   }
 
   /// One call of KINSOL from where the unknowns are.
-  int run(int strategy) {
+  int run() {
     singular_ = not_finite_ = false;
-    const int code = KINSol(memory(), x_.get(), strategy, unknown_scale_.get(), residual_scale_.get());
+    smallest_norm_ = HUGE_VAL;
+    factors_.begin();
+    const int code = KINSol(memory(), x_.get(), strategy_, unknown_scale_.get(), residual_scale_.get());
     if (exception_) std::rethrow_exception(std::exchange(exception_, nullptr));
     long iterations = 0;
     KINGetNumNonlinSolvIters(memory(), &iterations);
     report_.iterations += static_cast<int>(iterations);
+    report_.jacobian_evaluations += factors_.evaluations();
     return code;
+  }
+
+  /// The largest scaled entry of the last residual.
+  double scaled_norm() const {
+    const double* const scale = data_of(residual_scale_.get());
+    double largest = 0.0;
+    for (Eigen::Index i = 0; i < last_residual_.size(); ++i)
+      largest = std::max(largest, std::abs(last_residual_[i]) * scale[i]);
+    return largest;
   }
 
   /// Norm of each block at the last evaluation into the report; the largest one, scaled, back.
@@ -123,20 +198,24 @@ class KinsolSolver final : public NonlinearSolver {
     int row = 0;
     std::size_t b = 0;
     for (const ResidualBlock& block : problem_.blocks()) {
-      const double norm = last_residual_.segment(row, block.rows).lpNorm<Eigen::Infinity>();
-      const bool finite = last_residual_.segment(row, block.rows).allFinite();
-      report_.residual_norms.at(b++) = finite ? norm : std::nan("");
-      largest = finite ? std::max(largest, norm / block.scale) : HUGE_VAL;
-      if (!finite) break;
-      row += block.rows;
+      double norm = 0.0;
+      for (int k = 0; k < block.rows; ++k, ++row) {
+        const double entry = std::abs(last_residual_[row]);
+        if (!(entry <= norm)) norm = entry;  // NaN as well, and then nothing replaces it
+        if (!std::isfinite(norm)) norm = std::nan("");
+      }
+      report_.residual_norms.at(b++) = norm;
+      if (std::isnan(norm)) return HUGE_VAL;
+      largest = std::max(largest, norm / block.scale);
     }
     return largest;
   }
 
   void set_scales() {
     const double size = guess_.lpNorm<Eigen::Infinity>();
-    N_VConst(size > 0.0 && std::isfinite(size) ? 1.0 / size : 1.0, unknown_scale_.get());
-    double* scale = N_VGetArrayPointer(residual_scale_.get());
+    const double unit = size > 0.0 && std::isfinite(size) ? 1.0 / size : 1.0;
+    std::fill_n(data_of(unknown_scale_.get()), guess_.size(), unit);
+    double* scale = data_of(residual_scale_.get());
     for (const ResidualBlock& block : problem_.blocks())
       scale = std::fill_n(scale, block.rows, 1.0 / block.scale);
   }
@@ -154,27 +233,55 @@ class KinsolSolver final : public NonlinearSolver {
 
   static KinsolSolver& self(void* data) { return *static_cast<KinsolSolver*>(data); }
   static KinsolSolver& self(SUNLinearSolver solver) { return self(solver->content); }
+  Eigen::Map<Vector> map(N_Vector x) const { return {data_of(x), guess_.size()}; }
 
-  static int residual(N_Vector x, N_Vector f, void* data) {
+  static int evaluate(N_Vector x, N_Vector f, void* data) {
     KinsolSolver& solver = self(data);
     return solver.guarded([&] {
-      const Eigen::Index size = solver.last_residual_.size();
       ++solver.report_.residual_evaluations;
-      solver.problem_.residual(Vector::Map(N_VGetArrayPointer(x), size), solver.last_residual_);
-      Vector::Map(N_VGetArrayPointer(f), size) = solver.last_residual_;
+      solver.problem_.residual(solver.map(x), solver.last_residual_);
       solver.not_finite_ = !solver.last_residual_.allFinite();
+      if (solver.strategy_ == KIN_FP) return solver.contract(solver.map(x), solver.map(f));
+      solver.map(f) = solver.last_residual_;
       return solver.not_finite_ ? 1 : 0;  // KINSOL then tries a shorter step
     });
+  }
+
+  /// g = x − P⁻¹F(x); x = g as well, which ends the iteration, where the residual is round-off; a failure
+  /// where it grows.
+  int contract(Eigen::Map<Vector> x, Eigen::Map<Vector> g) {
+    const double norm = scaled_norm();
+    const bool stagnates = norm > smallest_norm_ / 2.0;
+    if (not_finite_ || norm > 2.0 * smallest_norm_) return norm <= options_.accept ? end_near(x, g) : -1;
+    smallest_norm_ = std::min(smallest_norm_, norm);
+    if (norm <= options_.tolerance || (stagnates && norm <= round_off * options_.tolerance))
+      return end_near(x, g);
+    contract_to(x, g);
+    return 0;
+  }
+
+  void contract_to(const Eigen::Map<Vector>& x, Eigen::Map<Vector> g) {
+    g = last_residual_;
+    problem_.solve_splitting(g);
+    g = x - g;
+  }
+
+  /// KINSOL ends where x does not move and gives x back, so x takes the last correction.
+  int end_near(Eigen::Map<Vector> x, Eigen::Map<Vector> g) {
+    contract_to(x, g);
+    x = g;
+    return 0;
   }
 
   static int jacobian(N_Vector x, N_Vector, SUNMatrix, void* data, N_Vector, N_Vector) {
     KinsolSolver& solver = self(data);
     return solver.guarded([&] {
-      ++solver.report_.jacobian_evaluations;
-      solver.problem_.jacobian(Vector::Map(N_VGetArrayPointer(x), solver.last_residual_.size()),
-                               solver.values_);
-      solver.not_finite_ = !solver.values_.allFinite();
-      return solver.not_finite_ ? -1 : 0;
+      using Outcome = detail::JacobianFactors::Outcome;
+      const double norm = solver.factors_.exact() ? 0.0 : solver.scaled_norm();
+      const Outcome outcome = solver.factors_.prepare(solver.map(x), norm);
+      solver.not_finite_ = outcome == Outcome::not_finite;
+      solver.singular_ = outcome == Outcome::singular;
+      return outcome == Outcome::ready ? 0 : -1;
     });
   }
 
@@ -192,14 +299,10 @@ class KinsolSolver final : public NonlinearSolver {
     ops.gettype = [](SUNLinearSolver) { return SUNLINEARSOLVER_DIRECT; };
     ops.getid = [](SUNLinearSolver) { return SUNLINEARSOLVER_CUSTOM; };
     ops.initialize = [](SUNLinearSolver) { return 0; };
-    ops.setup = [](SUNLinearSolver s, SUNMatrix) {
-      KinsolSolver& solver = self(s);
-      solver.singular_ = !solver.linear_solver_->factor(solver.values_.data());
-      return solver.singular_ ? 1 : 0;
-    };
+    ops.setup = [](SUNLinearSolver, SUNMatrix) { return 0; };  // jacobian() has done it
     ops.solve = [](SUNLinearSolver s, SUNMatrix, N_Vector x, N_Vector b, sunrealtype) {
-      if (x != b) N_VScale(1.0, b, x);
-      self(s).linear_solver_->solve(N_VGetArrayPointer(x));
+      std::copy_n(data_of(b), self(s).guess_.size(), data_of(x));
+      self(s).factors_.solve(data_of(x));
       return 0;
     };
     ops.free = [](SUNLinearSolver s) {
@@ -210,21 +313,55 @@ class KinsolSolver final : public NonlinearSolver {
 
   NonlinearProblem& problem_;
   KinsolOptions options_;
-  std::unique_ptr<detail::LinearSolver> linear_solver_;
+  detail::JacobianFactors factors_;
+  bool fixed_point_;
   detail::Context context_;  // outlives everything made from it
   detail::MessageSink sink_;
   detail::VectorHandle x_, unknown_scale_, residual_scale_;
   detail::MatrixHandle matrix_shell_;
   detail::LinearSolverHandle linear_shell_;
   detail::KinsolHandle kinsol_;
-  Vector guess_, last_, last_residual_, values_;
+  Vector guess_, last_, last_residual_;
   SolveReport report_;
   std::exception_ptr exception_;
+  int strategy_ = KIN_NONE;
+  int judged_solves_ = 0, judged_iterations_ = 0;
+  bool given_up_ = false;            ///< the fixed-point iteration was slow
+  double smallest_norm_ = HUGE_VAL;  ///< of the fixed-point iteration so far
   bool singular_ = false;
   bool not_finite_ = false;
 };
 
+template <class Enum, std::size_t N>
+Enum find_name(const char* what, const std::array<std::pair<const char*, Enum>, N>& names,
+               const std::string& name) {
+  std::string allowed;
+  for (const auto& [text, value] : names) {
+    if (name == text) return value;
+    allowed += (allowed.empty() ? "" : ", ") + std::string(text);
+  }
+  throw Misuse(std::string(what) + " '" + name + "'; there are " + allowed);
+}
+
+constexpr std::array<std::pair<const char*, JacobianPolicy>, 4> policies{
+    {{"automatic", JacobianPolicy::automatic},
+     {"fresh", JacobianPolicy::fresh},
+     {"per-step", JacobianPolicy::per_step},
+     {"kept", JacobianPolicy::kept}}};
+constexpr std::array<std::pair<const char*, Iteration>, 3> iterations{
+    {{"newton", Iteration::newton},
+     {"fixed-point", Iteration::fixed_point},
+     {"automatic", Iteration::automatic}}};
+
 }  // namespace
+
+const char* name(JacobianPolicy policy) { return policies.at(static_cast<std::size_t>(policy)).first; }
+const char* name(Iteration iteration) { return iterations.at(static_cast<std::size_t>(iteration)).first; }
+
+JacobianPolicy jacobian_policy(const std::string& name) {
+  return find_name("Jacobian policy", policies, name);
+}
+Iteration iteration(const std::string& name) { return find_name("iteration", iterations, name); }
 
 SolverFactory kinsol(KinsolOptions options) {
   return [options](NonlinearProblem& problem) -> std::unique_ptr<NonlinearSolver> {

@@ -4,7 +4,24 @@
 
 namespace diracstep {
 
-/// Settings of the Newton iteration; the defaults solve a step to round-off.
+/// When Newton's method takes a new Jacobian.  A Jacobian that the problem declares constant is factored once
+/// for each value of its parameter, whatever is asked for except `fresh`.
+enum class JacobianPolicy {
+  automatic,  ///< fresh for up to 11 unknowns, kept above
+  fresh,      ///< in every iteration
+  per_step,   ///< in the first iteration of a solve, and where the residual then falls too slowly
+  kept,       ///< only where the residual falls too slowly, so that one serves many steps
+};
+
+enum class Iteration {
+  newton,
+  fixed_point,  ///< x ← x − P⁻¹F(x) by KINSOL's fixed-point solver with the problem's splitting P; Newton's
+                ///< method where there is none or it does not converge
+  automatic,  ///< fixed-point while a solve takes no more than six iterations, which is what two of
+              ///< Newton's method cost, then Newton's method
+};
+
+/// Settings of the iteration; the defaults solve a step to round-off.
 ///
 /// A residual row counts as zero below `tolerance` times the scale of its block.  Where round-off keeps it
 /// above, a Newton step below `step_tolerance` of the unknowns ends the iteration, and the solution is
@@ -14,12 +31,21 @@ struct KinsolOptions {
   double step_tolerance = 1e-9;
   double accept = 1e-11;
   int max_iterations = 20;
+  JacobianPolicy jacobian = JacobianPolicy::automatic;
+  Iteration iteration = Iteration::newton;
+  int anderson = 0;  ///< how many past iterates accelerate the fixed-point iteration
 };
 
-/// Solves nonlinear problems with SUNDIALS KINSOL: Newton's method with a fresh exact Jacobian in each
-/// iteration, and once more with a line search where that fails.  Full patterns are factored densely, others
-/// with KLU. The factory throws Misuse for a sparse problem where the library was built without KLU, and
-/// std::runtime_error where SUNDIALS cannot set itself up.
+/// Names as a user writes them, "automatic", "per-step", …; the second throws Misuse for any other.
+const char* name(JacobianPolicy policy);
+JacobianPolicy jacobian_policy(const std::string& name);
+const char* name(Iteration iteration);
+Iteration iteration(const std::string& name);
+
+/// Solves nonlinear problems with SUNDIALS KINSOL: Newton's method with exact Jacobians, and once more with a
+/// line search where that fails.  Full patterns are factored densely, others with KLU.  The factory throws
+/// Misuse for a sparse problem where the library was built without KLU, and std::runtime_error where SUNDIALS
+/// cannot set itself up.
 SolverFactory kinsol(KinsolOptions options = {});
 
 }  // namespace diracstep

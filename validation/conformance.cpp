@@ -67,6 +67,12 @@ bool settled(const std::vector<Point>& points) {
                   slope_of({end - 2 * fitted_points, end - fitted_points})) < 0.01;
 }
 
+void find_reference(OrderScene& scene) {
+  const StepGrid grid = fit_steps(0.0, scene.t_end, scene.t_end / 240.0);
+  const IntegratorOptions options{.method = "type1/gl:6", .step = grid.step};
+  end_of(Registry::with_built_ins(), scene.scene, options, grid.steps, Momentum::projected, scene.reference);
+}
+
 }  // namespace
 
 std::vector<OrderScene> order_scenes() {
@@ -77,21 +83,29 @@ std::vector<OrderScene> order_scenes() {
   scenes.push_back({"mixed", laws::mixed(), 6.0, {}});
   scenes.push_back({"affine, driven", laws::driven(), 6.0, {}});
   scenes.push_back({"forced, mixed", laws::forced(laws::mixed()), 6.0, {}});
-  const Registry registry = Registry::with_built_ins();
-  for (OrderScene& scene : scenes) {
-    const StepGrid grid = fit_steps(0.0, scene.t_end, scene.t_end / 240.0);
-    end_of(registry, scene.scene, {.method = "type1/gl:6", .step = grid.step}, grid.steps,
-           Momentum::projected, scene.reference);
-  }
+  scenes.push_back({"phase space", laws::phase_space(), 6.0, {}});
+  for (OrderScene& scene : scenes) find_reference(scene);
   return scenes;
 }
 
-MeasuredOrder measure_order(const Registry& registry, const OrderScene& scene, IntegratorOptions options,
-                            Momentum momentum) {
-  const Vector expected = join(scene.reference.q, scene.reference.p);
+OrderScene degenerate_order_scene() {
+  OrderScene scene{"degenerate circuit", laws::degenerate_circuit(), 6.0, {}};
+  find_reference(scene);
+  return scene;
+}
+
+int claimed_order(const MethodInfo& method, const Scene& scene) {
+  const bool constrained = scene.rows() > 0 || scene.force;
+  return constrained && method.constrained_order > 0 ? method.constrained_order : method.order;
+}
+
+OrderMeasurement measure_order(const Registry& registry, const OrderScene& scene, IntegratorOptions options,
+                               Momentum momentum) {
+  const auto everything = [](const Sample& s) { return join(join(s.q, s.p), s.lambda); };
+  const Vector expected = everything(scene.reference);
   const double claimed = options.order > 0 ? options.order : registry.method(options.method).info.order;
   std::vector<Point> points;
-  MeasuredOrder result{std::nan(""), 0.0, 0.0, {}};
+  OrderMeasurement result{std::nan(""), 0.0, 0.0, {}};
   for (int quarter_octave = 0; quarter_octave <= 40; ++quarter_octave) {
     const long steps = std::lround(4.0 * std::pow(2.0, 0.25 * quarter_octave));
     options.step = scene.t_end / static_cast<double>(steps);
@@ -104,7 +118,7 @@ MeasuredOrder measure_order(const Registry& registry, const OrderScene& scene, I
       points.clear();
       continue;
     }
-    const double error = (join(end.q, end.p) - expected).lpNorm<Eigen::Infinity>();
+    const double error = (everything(end) - expected).lpNorm<Eigen::Infinity>();
     if (error < std::max(round_off, 1e-13 * std::sqrt(static_cast<double>(solves)))) break;
     if (std::ssize(points) >= fitted_points && error < 1e-9) {
       std::vector<Point> last(points.end() - fitted_points + 1, points.end());
@@ -171,7 +185,8 @@ double symplecticity_defect(const Registry& registry, const std::shared_ptr<cons
 double membership_residual(const Registry& registry, const std::shared_ptr<const Scene>& scene,
                            const IntegratorOptions& options, long steps) {
   const Method method = registry.method(options.method);
-  if (!method.make || method.info.type == GeneratingType::four) return std::nan("");
+  const bool no_function_of_end_points = !method.make || (method.rows_inside && scene->rows() > 0);
+  if (no_function_of_end_points || method.info.type == GeneratingType::four) return std::nan("");
   std::vector<Vector> q, plus, minus;
   for (const Momentum momentum : {Momentum::plus, Momentum::minus}) {
     Integrator integrator(scene, registry, kinsol(), options);
@@ -184,7 +199,7 @@ double membership_residual(const Registry& registry, const std::shared_ptr<const
     if (!report.ok()) return std::nan("");
   }
   const auto s = method.make(*scene);
-  const StepRule rule = options.constraint_rule.value_or(method.info.constraint_rule);
+  const ConstraintRule rule = options.constraint_rule.value_or(method.info.constraint_rule);
   DiscreteDiracStructure structure(scene->constraints, scene->dimension(), rule);
   const GraphOf graph = graph_of(s->type());
   double largest = 0.0;

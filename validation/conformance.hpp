@@ -18,23 +18,31 @@ struct OrderScene {
   Sample reference;
 };
 
-/// One scene of each class: unconstrained, holonomic, nonholonomic, mixed, affine and time-dependent, forced.
+/// The scene of `validation/law_scenes.hpp` for degenerate circuits, in the same way.
+OrderScene degenerate_order_scene();
+
+/// One scene of each class: unconstrained, holonomic, nonholonomic, mixed, affine and time-dependent, forced,
+/// and a phase-space Lagrangian.
 std::vector<OrderScene> order_scenes();
 
 /// An order found by halving the step until the errors are asymptotic.
-struct MeasuredOrder {
+struct OrderMeasurement {
   double order = 0.0;  ///< NaN where it could not be measured
   double error = 0.0;  ///< at the finer step of the last pair
   double step = 0.0;
   std::string failure;  ///< empty, or why there is no order
 };
 
-/// Order of q and of the momentum representative in the maximum norm at the end: the slope of log(error) over
-/// log(h) through the four finest of a ladder of steps, four to an octave, that lie above round-off: above
-/// 1e-12 and 1e-13 times the square root of the solves (it grows like a random walk), and, where the slope
-/// falls below half the claimed order before, above 30 times the error there.
-MeasuredOrder measure_order(const Registry& registry, const OrderScene& scene, IntegratorOptions options,
-                            Momentum momentum = Momentum::projected);
+/// The order that a method states for a scene: its constrained order where that has rows or a force and one
+/// is stated.
+int claimed_order(const MethodInfo& method, const Scene& scene);
+
+/// Order of q, of the momentum representative and of the forces Λ of the rows in the maximum norm at the end:
+/// the slope of log(error) over log(h) through the four finest of a ladder of steps, four to an octave, that
+/// lie above round-off: above 1e-12 and 1e-13 times the square root of the solves (it grows like a random
+/// walk), and, where the slope falls below half the claimed order before, above 30 times the error there.
+OrderMeasurement measure_order(const Registry& registry, const OrderScene& scene, IntegratorOptions options,
+                               Momentum momentum = Momentum::projected);
 
 /// |Φ_{−h}(Φ_h(y)) − y| in q and projected p, with the method's own step both ways: round-off for a
 /// self-adjoint method.

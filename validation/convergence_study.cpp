@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <diracstep/core/composition.hpp>
 #include <diracstep/core/errors.hpp>
 #include <diracstep/core/run.hpp>
+#include <diracstep/plugins/callback_error.hpp>
 #include <diracstep/validation/convergence_study.hpp>
 #include <diracstep/validation/work_precision.hpp>
 #include <utility>
@@ -19,6 +21,7 @@ constexpr int plateau_length = 2;         // refinements in vain that end a ladd
 constexpr double usual_ladder = 12.0;     // rows, for the progress only
 constexpr std::size_t longest_ladder = 40;
 constexpr double fewest_steps = 2.0;
+constexpr double natural_eps = 1.0;       // radians of the coarsest variable step
 constexpr double smallest_error = 1e-17;  // an error of zero has no logarithm
 
 struct Interrupted {};
@@ -38,7 +41,10 @@ class StudyInProgress {
     natural_step_ = std::copysign(scene.natural_step, study_.t_end - study_.t_start);
     require_options();
     for (const auto& method : options_.methods)
-      for (const int order : orders_of(method)) series_.emplace_back(method, order);
+      for (const int order : orders_of(method)) {
+        series_.push_back(chosen(method, order));
+        if (options.adaptive) series_.push_back(series_.back().with_variable_steps());
+      }
     require_one_that_fits();
   }
 
@@ -50,7 +56,9 @@ class StudyInProgress {
       study_.reference_how = truth_.how;
       study_.reference_error = truth_.self_error;
       for (; series_done_ < series_.size(); ++series_done_) run_series(series_[series_done_]);
-      run_ida_ladder();
+      for (std::size_t i = 0; i < options_.yardsticks.size(); ++i)
+        run_yardstick_ladder(options_.yardsticks[i],
+                             static_cast<double>(i) / static_cast<double>(options_.yardsticks.size()));
     } catch (const Interrupted&) {
       study_.interrupted = true;
     }
@@ -59,7 +67,14 @@ class StudyInProgress {
   }
 
  private:
-  using Series = std::pair<std::string, int>;
+  struct Series {
+    std::string method;
+    int order;
+    bool variable;
+
+    std::string name() const { return method + (variable ? variable_steps : ""); }
+    Series with_variable_steps() const { return {method, order, true}; }
+  };
 
   void require_options() const {
     if (options_.methods.empty()) throw Misuse("a study needs at least one method");
@@ -75,7 +90,15 @@ class StudyInProgress {
     for (const double step : options_.steps) (void)fit_steps(study_.t_start, study_.t_end, step);
   }
 
+  Series chosen(const std::string& method, int order) const {
+    if (method != automatic_method) return {method, order, false};
+    const DefaultMethod choice =
+        default_method(*entry_.scene, order, options_.constraint_rule, IntegratorOptions{}.dense_limit);
+    return {choice.method, choice.order, false};
+  }
+
   std::vector<int> orders_of(const std::string& method) const {
+    if (method == automatic_method) return options_.orders.empty() ? std::vector<int>{0} : options_.orders;
     const Method known = registry_.method(method);
     return options_.orders.empty() ? possible_orders(known.info) : options_.orders;
   }
@@ -94,8 +117,12 @@ class StudyInProgress {
     throw Misuse(reason);
   }
 
+  IntegratorOptions integrator_options(const Series& series, double step) const {
+    return {series.method, series.order, step, options_.constraint_rule};
+  }
+
   Integrator integrator(const Series& series, double step) const {
-    return {entry_.scene, registry_, solvers_, {series.first, series.second, step, options_.constraint_rule}};
+    return {entry_.scene, registry_, solvers_, integrator_options(series, step)};
   }
 
   void look(double part_of_series, const std::string& what) const {
@@ -106,8 +133,9 @@ class StudyInProgress {
   }
 
   const StudyRow& run_row(const Series& series, double step, double part) {
+    if (series.variable) return run_variable_row(series, step, part);
     const StepGrid grid = fit_steps(study_.t_start, study_.t_end, step);
-    const std::string what = fmt::format("{} order {}, step {:.3g}", series.first, series.second, grid.step);
+    const std::string what = fmt::format("{} order {}, step {:.3g}", series.method, series.order, grid.step);
     const auto look_around = [&] { look(part, what); };
     look_around();
     Integrator ours = integrator(series, grid.step);
@@ -115,18 +143,30 @@ class StudyInProgress {
         run_ours(ours, grid.steps, options_.momentum, options_.repeats, truth_, look_around));
   }
 
+  const StudyRow& run_variable_row(const Series& series, double eps, double part) {
+    const std::string what = fmt::format("{} order {}, eps {:.3g}", series.name(), series.order, eps);
+    const auto look_around = [&] { look(part, what); };
+    look_around();
+    AdaptiveIntegrator ours(entry_.scene, registry_, solvers_, integrator_options(series, natural_step_),
+                            {.eps = eps, .end = study_.t_end});
+    return study_.rows.emplace_back(
+        run_variable(ours, study_.t_end, options_.momentum, options_.repeats, truth_, look_around));
+  }
+
   void run_series(const Series& series) {
     const std::size_t first = study_.rows.size();
-    study_.measured_orders.push_back({series.first, series.second, {}, 0, {}});
+    study_.measured_orders.push_back({series.name(), series.order, {}, 0, {}});
     try {
-      if (options_.steps.empty())
+      if (options_.steps.empty() || series.variable)
         study_.measured_orders.back().ladder_end = climb(series);
       else
         for (std::size_t i = 0; i < options_.steps.size(); ++i)
           run_row(series, options_.steps[i],
                   static_cast<double>(i) / static_cast<double>(options_.steps.size()));
     } catch (const Misuse& misuse) {
-      study_.rows.push_back({.method = series.first, .order = series.second, .status = misuse.what()});
+      study_.rows.push_back({.method = series.name(), .order = series.order, .status = misuse.what()});
+    } catch (const CallbackError& error) {
+      study_.rows.push_back({.method = series.name(), .order = series.order, .status = error.what()});
     }
     std::stable_sort(
         study_.rows.begin() + static_cast<std::ptrdiff_t>(first), study_.rows.end(),
@@ -135,13 +175,14 @@ class StudyInProgress {
 
   /// Runs the ladder of one series and says why it ended.
   std::string climb(const Series& series) {
-    const double factor = series.second > 4 ? std::sqrt(2.0) : 2.0;
+    const double factor = series.order > 4 ? std::sqrt(2.0) : 2.0;
     const std::size_t first = study_.rows.size();
-    const StudyRow natural = run_row(series, natural_step_, 0.0);
-    coarsen(series, factor, natural.error());
+    const double start = series.variable ? natural_eps : natural_step_;
+    const StudyRow natural = run_row(series, start, 0.0);
+    if (!series.variable) coarsen(series, factor, natural.error());
     double cpu_seconds = natural.cpu_seconds.median, best = natural.error();
     int in_vain = 0;
-    for (double step = natural_step_ / factor; study_.rows.size() < first + longest_ladder; step /= factor) {
+    for (double step = start / factor; study_.rows.size() < first + longest_ladder; step /= factor) {
       if (cpu_seconds * factor > options_.run_budget)
         return fmt::format("the next run would take about {:.2g} s", cpu_seconds * factor);
       const double part =
@@ -164,25 +205,26 @@ class StudyInProgress {
     }
   }
 
-  void run_ida_ladder() {
+  void run_yardstick_ladder(const std::string& yardstick, double part) {
     std::vector<double> rtols = options_.rtols;
     std::ranges::sort(rtols, std::greater{});
     const std::size_t first = study_.rows.size();
     std::vector<Sample> ends(rtols.size());
+    const auto run = [&](double rtol, int repeats, Sample& end) {
+      return run_yardstick(yardstick, *entry_.scene, study_.t_end, rtol, repeats, truth_, end);
+    };
     for (std::size_t i = 0; i < rtols.size(); ++i) {
-      look(static_cast<double>(i) / static_cast<double>(rtols.size()),
-           fmt::format("IDA, rtol {:g}", rtols[i]));
-      study_.rows.push_back(
-          run_ida(*entry_.scene, study_.t_end, rtols[i], options_.repeats, truth_, ends[i]));
-      if (i > 0) compare_ida(study_.rows[first + i - 1], ends[i - 1], study_.rows[first + i].ok(), ends[i]);
+      look(part, fmt::format("{}, rtol {:g}", yardstick, rtols[i]));
+      study_.rows.push_back(run(rtols[i], options_.repeats, ends[i]));
+      if (i > 0) compare(study_.rows[first + i - 1], ends[i - 1], study_.rows[first + i].ok(), ends[i]);
     }
     if (rtols.empty() || rtols.back() < 1e-13) return;
     Sample tighter;  // for the last row's own estimate only
-    const StudyRow row = run_ida(*entry_.scene, study_.t_end, 0.1 * rtols.back(), 1, truth_, tighter);
-    compare_ida(study_.rows.back(), ends.back(), row.ok(), tighter);
+    const StudyRow row = run(0.1 * rtols.back(), 1, tighter);
+    compare(study_.rows.back(), ends.back(), row.ok(), tighter);
   }
 
-  static void compare_ida(StudyRow& row, const Sample& end, bool tighter_ok, const Sample& tighter) {
+  static void compare(StudyRow& row, const Sample& end, bool tighter_ok, const Sample& tighter) {
     if (!row.ok() || !tighter_ok) return;
     row.self_error = std::max(relative_error(end.q, tighter.q), relative_error(end.p, tighter.p));
   }
@@ -210,8 +252,9 @@ std::vector<WorkPoint> points(const Study& study, const std::string& method, int
 }  // namespace
 
 std::vector<int> possible_orders(const MethodInfo& method) {
-  if (method.order == 1) return {1, 2, 4, 6, 8};
-  if (method.order == 2 && method.self_adjoint) return {2, 4, 6, 8};
+  std::vector<int> orders{composition_orders.begin(), composition_orders.end()};
+  if (method.order == 1) orders.insert(orders.begin(), 1);
+  if (method.order == 1 || (method.order == 2 && method.self_adjoint)) return orders;
   return {method.order};
 }
 
@@ -239,15 +282,20 @@ void conclude(Study& study) {
     measured.points = fit ? fit->points : 0;
   }
   study.at_error.clear();
-  const std::vector<WorkPoint> ida = points(study, ida_method, 0);
+  const std::vector<WorkPoint> ida = points(study, ida_method, 0), erk = points(study, erk_method, 0);
   for (const double error : compared_errors) {
     const std::size_t first = study.at_error.size();
-    const auto ida_seconds = cpu_seconds_at(ida, error);
+    const auto ida_seconds = cpu_seconds_at(ida, error), erk_seconds = cpu_seconds_at(erk, error);
     std::optional<std::size_t> best;
     for (const MeasuredOrder& ours : study.measured_orders) {
-      AtError at{error, ours.method, ours.order, false, {}, ida_seconds, {}};
+      AtError at{.error = error,
+                 .method = ours.method,
+                 .order = ours.order,
+                 .ida_cpu_seconds = ida_seconds,
+                 .erk_cpu_seconds = erk_seconds};
       at.cpu_seconds = cpu_seconds_at(points(study, ours.method, ours.order), error);
       if (at.cpu_seconds && ida_seconds) at.ratio = *ida_seconds / *at.cpu_seconds;
+      if (at.cpu_seconds && erk_seconds) at.erk_ratio = *erk_seconds / *at.cpu_seconds;
       study.at_error.push_back(at);
       if (at.cpu_seconds && (!best || *at.cpu_seconds < *study.at_error[*best].cpu_seconds))
         best = study.at_error.size() - 1;

@@ -12,15 +12,17 @@ namespace diracstep {
 /// "plus", "minus" or "projected".
 const char* name(Momentum momentum);
 
-/// The orders a method can be run at: its own, and those it can be composed to.
+/// The orders a study runs a method at: its own and, for methods of order 1 and 2, those of its compositions.
 std::vector<int> possible_orders(const MethodInfo& method);
 
 struct StudyOptions {
-  std::vector<std::string> methods = {"type1/midpoint"};
-  std::vector<int> orders = {};    ///< empty: all possible ones
-  std::vector<double> steps = {};  ///< empty: a ladder, see convergence_study
-  /// Empty: no IDA.
+  std::vector<std::string> methods = {"type1/midpoint"};  ///< "auto" is default_method()
+  std::vector<int> orders = {};                           ///< empty: all possible ones of each method
+  std::vector<double> steps = {};                         ///< empty: a ladder, see convergence_study
+  bool adaptive = false;  ///< also variable steps, with a ladder of eps, for methods that allow them
+  /// Tolerances of the yardsticks; empty: no runs of theirs.
   std::vector<double> rtols = {1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12, 1e-13, 1e-14};
+  std::vector<std::string> yardsticks = {ida_method, erk_method};  ///< beside the methods
   int repeats = 5;  ///< timed runs of each row; long runs take fewer
   Momentum momentum = Momentum::projected;
   std::optional<double> t_end = {};              ///< instead of the scene's
@@ -37,19 +39,22 @@ struct MeasuredOrder {
   std::string ladder_end;
 };
 
-/// CPU time to reach an error, for one method and order and for IDA; empty where a side does not get there.
+/// CPU time to reach an error, for one method and order and for the yardsticks; empty where a side does not
+/// get there.
 struct AtError {
-  double error;
+  double error = 0.0;
   std::string method;
-  int order;
-  bool best;  ///< the fastest of ours at this error
-  std::optional<double> cpu_seconds;
-  std::optional<double> ida_cpu_seconds;
-  std::optional<double> ratio;  ///< IDA's time over ours
+  int order = 0;
+  bool best = false;  ///< the fastest of ours at this error
+  std::optional<double> cpu_seconds = {};
+  std::optional<double> ida_cpu_seconds = {};
+  std::optional<double> ratio = {};  ///< IDA's time over ours
+  std::optional<double> erk_cpu_seconds = {};
+  std::optional<double> erk_ratio = {};  ///< the explicit method's time over ours
 };
 
 /// The errors `at_error` is taken at.
-inline constexpr std::array<double, 3> compared_errors{1e-3, 1e-6, 1e-9};
+inline constexpr std::array<double, 4> compared_errors{1e-3, 1e-6, 1e-9, 1e-12};
 
 struct Study {
   std::string scene;
@@ -71,7 +76,7 @@ struct Study {
 /// way; false ends the study, which then holds the rows finished so far.
 using StudyObserver = std::function<bool(double part, const std::string& what)>;
 
-/// Error against CPU time at t_end for every (method, order), and for IDA.
+/// Error against CPU time at t_end for every (method, order), and for the yardsticks.
 ///
 /// Errors are relative maximum norms, absolute where the reference is zero; that of p is taken against ∂L/∂v
 /// of the reference.  A scene without a reference at t_end is measured against IDA at the tolerance 1e-13.

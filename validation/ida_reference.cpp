@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
-#include <ctime>
 #include <diracstep/core/errors.hpp>
+#include <diracstep/core/hidden_rows.hpp>
 #include <diracstep/core/saddle_point.hpp>
 #include <diracstep/solvers/detail/linear_solver.hpp>
 #include <diracstep/solvers/detail/sundials.hpp>
@@ -149,18 +149,12 @@ struct FreeIda {
   void operator()(void* memory) const { IDAFree(&memory); }
 };
 
-double thread_seconds() {
-  std::timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
-
 /// IDA around our own direct linear solver: the Jacobian's values live in `values_`, the SUNMatrix that IDA
 /// carries around is an empty shell, and `setup`, which follows every evaluation of the Jacobian, factors
 /// them.
 class IdaIntegration {
  public:
-  IdaIntegration(const Scene& scene, const IdaOptions& options)
+  IdaIntegration(const Scene& scene, const ReferenceOptions& options)
       : scene_(scene),
         options_(options),
         atol_(options.atol > 0.0 ? options.atol : options.rtol),
@@ -174,9 +168,9 @@ class IdaIntegration {
       vector->reset(require(N_VNew_Serial(dae_.size(), context_), "N_VNew_Serial"));
   }
 
-  IdaRun run(double t_end) {
+  ReferenceRun run(double t_end) {
     double before = thread_seconds();
-    IdaRun run;
+    ReferenceRun run;
     double t = scene_.start.time;
     run.failure = make_start();
     run.cpu_seconds = thread_seconds() - before;
@@ -279,7 +273,7 @@ class IdaIntegration {
     return message.str();
   }
 
-  void read_counters(IdaRun& run) const {
+  void read_counters(ReferenceRun& run) const {
     IDAGetNumSteps(ida(), &run.steps);
     IDAGetNumResEvals(ida(), &run.residual_evaluations);
     IDAGetNumJacEvals(ida(), &run.jacobian_evaluations);
@@ -288,7 +282,7 @@ class IdaIntegration {
   }
 
   /// The forces come from the acceleration system; those of IDA, Λ̇, are differences and less accurate.
-  void read_end(double t, IdaRun& run) {
+  void read_end(double t, ReferenceRun& run) {
     const int n = scene_.dimension();
     Sample& end = run.end;
     end.time = t;
@@ -362,7 +356,7 @@ class IdaIntegration {
   }
 
   const Scene& scene_;
-  IdaOptions options_;
+  ReferenceOptions options_;
   double atol_;
   ImplicitLagrangianDae dae_;
   AccelerationProblem acceleration_problem_;
@@ -379,25 +373,11 @@ class IdaIntegration {
   std::exception_ptr exception_;
 };
 
-[[noreturn]] void throw_bad(const char* option, double value, const char* allowed) {
-  std::ostringstream message;
-  message << "IDA: " << option << " = " << value << "; " << allowed;
-  throw Misuse(message.str());
-}
-
 }  // namespace
 
-IdaRun integrate_with_ida(const Scene& given, double t_end, const IdaOptions& options) {
-  const auto scene = completed(std::make_shared<const Scene>(given));
-  require_consistent(*scene, scene->start);
-  if (!(t_end > scene->start.time && std::isfinite(t_end)))
-    throw_bad("t_end", t_end, "a finite time after the start is needed");
-  if (!(options.rtol >= 1e-14 && options.rtol <= 1e-1))
-    throw_bad("rtol", options.rtol, "it must lie in [1e-14, 1e-1]");
-  if (!(options.atol >= 0.0 && std::isfinite(options.atol)))
-    throw_bad("atol", options.atol, "a finite number, 0 or more, is needed");
-  if (options.max_steps < 1)
-    throw_bad("max_steps", static_cast<double>(options.max_steps), "1 or more is needed");
+ReferenceRun integrate_with_ida(const Scene& given, double t_end, const ReferenceOptions& options) {
+  const auto scene = with_hidden_rows(completed(std::make_shared<const Scene>(given)));
+  require_reference("IDA", *scene, t_end, options);
   return IdaIntegration(*scene, options).run(t_end);
 }
 

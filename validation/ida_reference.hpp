@@ -1,34 +1,12 @@
 #pragma once
 
-#include <diracstep/core/integrator.hpp>
 #include <diracstep/core/scene.hpp>
 #include <diracstep/core/sparsity_pattern.hpp>
+#include <diracstep/validation/reference_run.hpp>
 #include <memory>
-#include <string>
 #include <vector>
 
 namespace diracstep {
-
-struct IdaOptions {
-  double rtol = 1e-8;  ///< relative tolerance, in [1e-14, 1e-1]
-  double atol = 0.0;   ///< absolute tolerance on q, v and p; 0 takes rtol
-  long max_steps = 5'000'000;
-};
-
-/// One run of IDA.  `failure` is empty, or says why and where it stopped; the state is then the last one
-/// reached.
-struct IdaRun {
-  std::string failure;
-  Sample end;  ///< q, v, p, the multipliers as forces, and the energy at the end
-  long steps = 0;
-  long residual_evaluations = 0;
-  long jacobian_evaluations = 0;
-  long newton_iterations = 0;
-  long error_test_failures = 0;
-  double cpu_seconds = 0.0;  ///< thread time of the start and the integration, without set-up
-
-  bool ok() const { return failure.empty(); }
-};
 
 /// The continuous implicit Lagrangian system (Leok and Ohsawa (4.7)) as F(t, y, ẏ) = 0 with y = (q, v, p, Λ,
 /// M), in the posing with multipliers as derivatives (index 1):
@@ -74,6 +52,6 @@ class ImplicitLagrangianDae {
 /// Integrates the system above from the scene's start to `t_end` with SUNDIALS IDA and the analytic Jacobian.
 /// The start is made consistent by the acceleration system of core. Throws Misuse for a bad scene, start, end
 /// or option; what a user's function throws passes through.
-IdaRun integrate_with_ida(const Scene& scene, double t_end, const IdaOptions& options);
+ReferenceRun integrate_with_ida(const Scene& scene, double t_end, const ReferenceOptions& options);
 
 }  // namespace diracstep

@@ -113,6 +113,28 @@ inline std::shared_ptr<const Scene> driven() {
   return std::make_shared<const Scene>(scene);
 }
 
+/// A degenerate circuit: an inductor in series with two capacitors in parallel, both non-linear, and a
+/// driving voltage in the loop that they form.  Charge going round that loop has no inertia.
+inline std::shared_ptr<const Scene> degenerate_circuit() {
+  Scene scene;
+  scene.name = "degenerate circuit";
+  scene.coordinates = {"qL", "q1", "q2"};
+  scene.lagrangian = lagrangian<3>([](const auto& q, const auto& v, const auto& t) {
+    using std::sin;
+    return 0.5 * v[0] * v[0] - 0.5 * q[1] * q[1] - 0.1 * q[1] * q[1] * q[1] * q[1] - 0.5 * q[2] * q[2] -
+           q[2] * q[2] * q[2] / 15.0 + 0.3 * sin(t) * q[2];
+  });
+  scene.constraints = {pfaffian<3, 1>(
+      []<class T>(const std::array<T, 3>&) {
+        return std::array<std::array<T, 3>, 1>{{{T(1.0), T(-1.0), T(-1.0)}}};
+      },
+      {"node"})};
+  scene.start = {0.0, Vector(3), Vector(3)};
+  scene.start.q << 0.0, 0.5, 0.5;  // 0.5 + 0.4/8 = 0.5 + 0.2/4
+  scene.start.v << 0.3, 0.3, 0.0;
+  return std::make_shared<const Scene>(scene);
+}
+
 /// A force that depends on q and v and is no gradient.
 struct Drag {
   template <class T>
@@ -127,6 +149,22 @@ inline std::shared_ptr<const Scene> forced(const std::shared_ptr<const Scene>& s
   copy.name += ", forced";
   copy.force = force<3>(Drag{});
   return std::make_shared<const Scene>(copy);
+}
+
+/// Lotka–Volterra, a phase-space Lagrangian θ(q)·v − H(q) in a gauge where no component of θ vanishes; data
+/// of JuliaGNI/GeometricProblems.jl, src/lotka_volterra_2d.jl.
+inline std::shared_ptr<const Scene> phase_space() {
+  Scene scene;
+  scene.name = "phase space";
+  scene.coordinates = {"prey", "predators"};
+  scene.lagrangian = lagrangian<2>([](const auto& q, const auto& v) {
+    using std::log;
+    return (q[1] + log(q[1]) / q[0]) * v[0] + q[0] * v[1] + q[0] + q[1] - log(q[0]) - 2.0 * log(q[1]);
+  });
+  scene.start = {0.0, Vector(2), Vector(2)};
+  scene.start.q << 2.0, 1.0;
+  scene.start.v << 2.0, 1.0;
+  return std::make_shared<const Scene>(scene);
 }
 
 inline const std::array<std::shared_ptr<const Scene>, 4>& every_constraint_class() {

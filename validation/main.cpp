@@ -33,6 +33,25 @@ int tell(const CLI::App& app, const CLI::ParseError& error) {
   return misused;
 }
 
+/// --plugin before or after every verb; the plugins are there when the verb runs.
+void take_plugins(CLI::App& app, Session& session) {
+  const auto add = [](CLI::App& to, std::vector<std::string>& files) {
+    const char* const text =
+        "Load a plugin; may be repeated. Also taken: every *.so in the\ndirectories of DIRACSTEP_PLUGIN_PATH";
+    return to.add_option("--plugin", files, text)->type_name("FILE.so")->allow_extra_args(false);
+  };
+  const CLI::Option* const before = add(app, session.plugin_files);
+  for (CLI::App* verb : app.get_subcommands({})) {
+    add(*verb, session.plugin_files);
+    // Here the files after the verb are in the session, and those before it only in their option.
+    verb->parse_complete_callback([&session, before] {
+      const std::vector<std::string> files = before->results();
+      session.plugin_files.insert(session.plugin_files.begin(), files.begin(), files.end());
+      load_plugins(session);
+    });
+  }
+}
+
 int execute(CLI::App& app, const Session& session, int count, char** arguments) {
   try {
     app.parse(count, arguments);
@@ -69,6 +88,8 @@ int main(int count, char** arguments) {
   add_orders(app, session);
   add_plan(app, session);
   add_run(app, session);
+  add_stability(app, session);
   add_study(app, session);
+  take_plugins(app, session);
   return execute(app, session, count, arguments);
 }

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <diracstep/core/composition.hpp>
 #include <diracstep/validation/law_scenes.hpp>
 #include <diracstep/validation/order_table.hpp>
+#include <diracstep/validation/stage_membership.hpp>
 
 namespace diracstep {
 
@@ -11,13 +13,28 @@ namespace {
 
 constexpr double defect_step = 0.05;
 
-bool takes(const Registry& registry, const TableMethod& method, const OrderScene& scene) {
-  return !(scene.scene->force && registry.method(method.name).info.type == GeneratingType::four);
+/// Of compositions: the leading errors of order 10 are below round-off where they begin to dominate.
+constexpr int highest_visible_order = 8;
+
+bool degenerate(const OrderScene& scene) { return scene.scene->lagrangian->structure().y_hessian_zero; }
+
+/// Type 4 takes no forces; phase-space Lagrangians are for the Gauss-Lobatto family.
+bool takes(const Method& method, const OrderScene& scene) {
+  if (degenerate(scene)) return method.stages > 0;
+  return !(scene.scene->force && method.info.type == GeneratingType::four);
+}
+
+double membership(const Registry& registry, const Method& method, const OrderScene& scene,
+                  const IntegratorOptions& options) {
+  constexpr long steps = 20;
+  if (method.rows_inside && scene.scene->rows() > 0)
+    return stage_membership_residual(registry, scene.scene, options, steps);
+  return membership_residual(registry, scene.scene, options, steps);
 }
 
 std::string number(double value) { return std::isfinite(value) ? fmt::format("{:.1e}", value) : "–"; }
 
-std::string cell(const MeasuredOrder& measured) {
+std::string cell(const OrderMeasurement& measured) {
   if (std::isfinite(measured.order)) return fmt::format("{:.2f}", measured.order);
   return measured.failure.empty() ? "–" : "**failed**";
 }
@@ -31,7 +48,9 @@ std::vector<TableMethod> table_methods(const Registry& registry) {
     methods.push_back({name, info.order});
     if (info.order == 1 && !info.self_adjoint) methods.push_back({name, 2});
     if (name == "type1/midpoint")
-      for (const int order : {4, 6, 8}) methods.push_back({name, order});
+      for (const int order : composition_orders)
+        if (order > info.order && order <= highest_visible_order) methods.push_back({name, order});
+    if (name == "type1/trapezoidal" || name == "type2/euler") methods.push_back({name, 4});
   }
   return methods;
 }
@@ -40,14 +59,16 @@ OrderTableRow measure_row(const Registry& registry, const TableMethod& method,
                           const std::vector<OrderScene>& scenes) {
   OrderTableRow row{method.name, method.order, {}, 0.0, 0.0, 0.0};
   const IntegratorOptions options{.method = method.name, .order = method.order, .step = defect_step};
-  const MethodInfo info = registry.method(method.name).info;
+  const Method known = registry.method(method.name);
+  const MethodInfo& info = known.info;
   const bool composed = method.order != info.order;
   for (const OrderScene& scene : scenes) {
-    MeasuredOrder measured{std::nan(""), 0.0, 0.0, {}};
-    if (takes(registry, method, scene)) measured = measure_order(registry, scene, options);
+    OrderMeasurement measured{std::nan(""), 0.0, 0.0, {}};
+    if (takes(known, scene)) measured = measure_order(registry, scene, options);
     row.measured.push_back(measured);
-    if (composed || scene.scene->force) continue;
-    const double residual = membership_residual(registry, scene.scene, options, 20);
+    if (!composed && info.constrained_order > 0) row.claimed.push_back(claimed_order(info, *scene.scene));
+    if (composed || scene.scene->force || degenerate(scene)) continue;
+    const double residual = membership(registry, known, scene, options);
     row.membership_residual = std::max(row.membership_residual, residual);
     if (std::isnan(residual)) row.membership_residual = residual;
   }
@@ -60,9 +81,12 @@ OrderTableRow measure_row(const Registry& registry, const TableMethod& method,
 }
 
 bool holds(const OrderTableRow& row) {
-  return std::ranges::all_of(row.measured, [&](const MeasuredOrder& m) {
-    return m.failure.empty() && (std::isnan(m.order) || std::abs(m.order - row.order) <= 0.2);
-  });
+  for (std::size_t k = 0; k < row.measured.size(); ++k) {
+    const OrderMeasurement& measured = row.measured[k];
+    const int claimed = row.claimed.empty() ? row.order : row.claimed[k];
+    if (!measured.failure.empty() || std::abs(measured.order - claimed) > 0.2) return false;
+  }
+  return true;
 }
 
 std::string order_table_markdown(const std::vector<OrderTableRow>& rows,
@@ -76,7 +100,7 @@ std::string order_table_markdown(const std::vector<OrderTableRow>& rows,
   text += fmt::format(" reversal | symplecticity | membership |\n{}---|---|---|\n", rule);
   for (const OrderTableRow& row : rows) {
     text += fmt::format("| `{}` | {} |", row.method, row.order);
-    for (const MeasuredOrder& measured : row.measured) text += fmt::format(" {} |", cell(measured));
+    for (const OrderMeasurement& measured : row.measured) text += fmt::format(" {} |", cell(measured));
     text += fmt::format(" {} | {} | {} |\n", number(row.reversal_defect), number(row.symplecticity_defect),
                         number(row.membership_residual));
   }

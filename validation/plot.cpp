@@ -15,8 +15,8 @@ namespace diracstep {
 
 namespace {
 
-/// Okabe and Ito's colours, told apart with any colour vision, without black, which is IDA's, and without
-/// yellow.
+/// Okabe and Ito's colours, told apart with any colour vision, without black and grey, which are the
+/// yardsticks', and without yellow.
 constexpr std::array<std::string_view, 6> colours{"#0072B2", "#D55E00", "#009E73",
                                                   "#CC79A7", "#E69F00", "#56B4E9"};
 constexpr std::array<int, 6> markers{7, 5, 9, 13, 11, 15};
@@ -59,13 +59,6 @@ struct Curve {
   std::string data;  // lines "cpu error"
 };
 
-/// A gnuplot string that is taken as it stands.
-std::string gnuplot_text(std::string_view text) {
-  std::string all = "'";
-  for (const char c : text) all += c == '\'' ? std::string("''") : std::string(1, c);
-  return all + "'";
-}
-
 Curve curve(const Study& study, const std::string& method, int order, std::string label, std::string look) {
   Curve drawn{std::move(label), std::move(look), {}};
   for (const StudyRow& row : study.rows)
@@ -98,6 +91,8 @@ std::vector<Curve> curves(const Study& study) {
   }
   all.push_back(curve(study, ida_method, 0, "IDA",
                       "linewidth 2 dashtype solid pointtype 4 pointsize 0.95 linecolor '#000000'"));
+  all.push_back(curve(study, erk_method, 0, "explicit RK 8",
+                      "linewidth 2 dashtype (6,4) pointtype 8 pointsize 0.95 linecolor '#707070'"));
   std::erase_if(all, [](const Curve& drawn) { return drawn.data.empty(); });
   return all;
 }
@@ -134,13 +129,27 @@ std::string run_gnuplot(const std::string& script) {
   return fmt::format("gnuplot failed with status {}", WIFEXITED(status) ? WEXITSTATUS(status) : status);
 }
 
-std::string file_name(std::string name) {
-  std::ranges::replace_if(
-      name, [](char c) { return c == '/' || c == '\\'; }, '_');
-  return name;
+}  // namespace
+
+std::string gnuplot_text(std::string_view text) {
+  std::string all = "'";
+  for (const char c : text) all += c == '\'' ? std::string("''") : std::string(1, c);
+  return all + "'";
 }
 
-}  // namespace
+std::string render(const std::string& picture, const std::string& stem, std::size_t width,
+                   std::size_t height) {
+  std::string script;
+  for (const auto& [ending, settings] : terminals)
+    script += fmt::format("reset\nset terminal {}\nset output {}\n{}unset output\n", settings(width, height),
+                          gnuplot_text(stem + ending), picture);
+  const std::string failure = run_gnuplot(script);
+  if (!failure.empty()) return failure;
+  for (const auto& [ending, settings] : terminals)
+    if (std::error_code error; !std::filesystem::file_size(stem + ending, error))
+      return fmt::format("gnuplot did not write {}{}", stem, ending);
+  return {};
+}
 
 std::string work_precision_script(const Study& study) {
   const std::vector<Curve> all = curves(study);
@@ -159,23 +168,109 @@ std::string work_precision_script(const Study& study) {
   return script + "\n";
 }
 
+std::string file_name(std::string scene) {
+  std::ranges::replace_if(
+      scene, [](char c) { return c == '/' || c == '\\'; }, '_');
+  return scene;
+}
+
+namespace {
+
+std::string block(std::size_t number, const std::vector<double>& x, const std::vector<double>& y) {
+  std::string data = fmt::format("$curve{} << EOD\n", number);
+  for (std::size_t i = 0; i < std::min(x.size(), y.size()); ++i)
+    data += fmt::format("{:.9e} {:.9e}\n", x[i], y[i]);
+  return data + "EOD\n";
+}
+
+std::vector<double> component(const std::vector<Vector>& points, Eigen::Index i) {
+  std::vector<double> values;
+  for (const Vector& point : points) values.push_back(point[i]);
+  return values;
+}
+
+constexpr double drawn_zero = 1e-18;  // a change of exactly zero has no logarithm
+
+std::string history_script(const History& history, const std::string& scene) {
+  std::vector<std::pair<std::string, std::vector<double>>> curves{{"energy", history.energy}};
+  if (!history.constraint.empty()) curves.emplace_back("rows", history.constraint);
+  for (const History::Change& invariant : history.invariants)
+    if (curves.size() < colours.size()) curves.emplace_back(invariant.name, invariant.values);
+  std::string script(style), plots;
+  script += fmt::format(
+      "unset logscale x\nset format x '%g'\nset xlabel 't'\nset ylabel 'relative change, or violation'\n"
+      "set title {} noenhanced\n",
+      gnuplot_text(
+          fmt::format("{}: {} order {}, step {:.3g}", scene, history.method, history.order, history.step)));
+  for (std::size_t i = 0; i < curves.size(); ++i) {
+    for (double& value : curves[i].second) value = std::max(std::abs(value), drawn_zero);
+    script += block(i, history.time, curves[i].second);
+    plots += fmt::format("{}$curve{} with lines linewidth 1.5 linecolor '{}' title {}",
+                         i == 0 ? "plot " : ", ", i, colours[i], gnuplot_text(curves[i].first));
+  }
+  return script + plots + "\n";
+}
+
+std::string motion_script(const History& history, const std::string& scene) {
+  const bool plane = history.coordinates.size() > 1;
+  const std::vector<double> first = component(history.q, 0);
+  std::string script(style);
+  script += fmt::format("unset logscale\nset format '%g'\nunset key\nset title {} noenhanced\n",
+                        gnuplot_text(scene));
+  script += fmt::format("set xlabel {} noenhanced\nset ylabel {} noenhanced\n",
+                        gnuplot_text(plane ? history.coordinates[0] : "t"),
+                        gnuplot_text(history.coordinates[plane ? 1 : 0]));
+  script += plane ? block(0, first, component(history.q, 1)) : block(0, history.time, first);
+  return script + fmt::format("plot $curve0 with lines linewidth 1.5 linecolor '{}'\n", colours[0]);
+}
+
+constexpr double summary_error = 1e-6;
+
+}  // namespace
+
 std::string draw_work_precision(const Study& study, const std::filesystem::path& directory) {
   const std::size_t keys = curves(study).size();
   if (keys == 0) return study.scene + ": no run succeeded, so there is nothing to draw";
-  const std::string stem = (directory / file_name(study.scene)).string();
-  const std::string picture = work_precision_script(study);
-  std::string script;
   const std::size_t width = methods_of(study).size() > 1 ? 980 : 720;  // the key names the methods then
   const std::size_t height = std::max<std::size_t>(480, 90 + 28 * keys);
-  for (const auto& [ending, settings] : terminals)
-    script += fmt::format("reset\nset terminal {}\nset output {}\n{}unset output\n", settings(width, height),
-                          gnuplot_text(stem + ending), picture);
-  const std::string failure = run_gnuplot(script);
-  if (!failure.empty()) return failure;
-  for (const auto& [ending, settings] : terminals)
-    if (std::error_code error; !std::filesystem::file_size(stem + ending, error))
-      return fmt::format("gnuplot did not write {}{}", stem, ending);
-  return {};
+  return render(work_precision_script(study), (directory / file_name(study.scene)).string(), width, height);
+}
+
+std::string draw_history(const History& history, const std::string& scene,
+                         const std::filesystem::path& directory) {
+  const std::string stem = (directory / file_name(scene)).string();
+  const std::string failure = render(history_script(history, scene), stem + "-history", 760, 420);
+  return failure.empty() ? render(motion_script(history, scene), stem + "-motion", 520, 420) : failure;
+}
+
+std::string draw_summary(const std::vector<Study>& studies, const std::filesystem::path& directory) {
+  std::string ida, erk, names;
+  std::size_t place = 0;
+  for (const Study& study : studies)
+    for (const AtError& at : study.at_error) {
+      if (!at.best || at.error != summary_error) continue;
+      if (at.ratio) ida += fmt::format("{:.6e} {}\n", *at.ratio, place);
+      if (at.erk_ratio) erk += fmt::format("{:.6e} {}\n", *at.erk_ratio, place);
+      names += fmt::format("{}{} {}", place == 0 ? "" : ", ", gnuplot_text(study.scene), place);
+      ++place;
+    }
+  if (ida.empty() && erk.empty())
+    return "no study reaches 1e-6 on both sides, so there is no summary to draw";
+  const std::string script =
+      std::string(style) +
+      fmt::format(
+          "unset logscale y\nset format y '%s'\nset format x '%g'\nset yrange [{}:-0.7]\nset ytics ({}) "
+          "noenhanced\n"
+          "set ylabel ''\nset xlabel 'time of the yardstick over ours at the error 1e-6: right of 1 ours is "
+          "faster'\n"
+          "set arrow from 1, graph 0 to 1, graph 1 nohead linewidth 1.5 linecolor '#404040'\n"
+          "$ida << EOD\n{}EOD\n$erk << EOD\n{}EOD\n",
+          static_cast<double>(place) - 0.3, names, ida.empty() ? "NaN NaN\n" : ida,
+          erk.empty() ? "NaN NaN\n" : erk) +
+      "plot $ida with points pointtype 5 pointsize 1.2 linecolor '#000000' title 'IDA', $erk with points "
+      "pointtype 9 "
+      "pointsize 1.3 linecolor '#D55E00' title 'explicit RK 8'\n";
+  return render(script, (directory / "summary").string(), 860, std::max<std::size_t>(260, 120 + 34 * place));
 }
 
 }  // namespace diracstep

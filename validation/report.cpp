@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <diracstep/validation/build_facts.hpp>
 #include <diracstep/validation/report.hpp>
 #include <iterator>
 #include <nlohmann/json.hpp>
@@ -20,14 +21,6 @@ std::string short_number(double value) {
   return value < 100.0 ? fmt::format("{:#.3g}", value) : fmt::format("{:.0f}", value);
 }
 
-/// 1.23e-05 s as "12.3 µs".
-std::string time_cell(double seconds) {
-  if (!std::isfinite(seconds) || seconds <= 0.0) return "-";
-  if (seconds < 1e-3) return short_number(seconds * 1e6) + " µs";
-  if (seconds < 1.0) return short_number(seconds * 1e3) + " ms";
-  return short_number(seconds) + " s";
-}
-
 /// How far the times lie from their median: "-3 % +8 % of 5".
 std::string spread_cell(const CpuSeconds& cpu) {
   if (cpu.repeats < 2) return cpu.repeats == 0 ? "-" : "one run";
@@ -36,7 +29,7 @@ std::string spread_cell(const CpuSeconds& cpu) {
 }
 
 std::string status_cell(const StudyRow& row) {
-  if (!row.is_ida() || !std::isfinite(row.self_error)) return row.status;
+  if (!row.is_yardstick() || !std::isfinite(row.self_error)) return row.status;
   return fmt::format("{}, by its own estimate {:.0e}", row.status, row.self_error);
 }
 
@@ -45,10 +38,10 @@ std::size_t width(std::string_view text) {
 }
 
 Cells row_cells(const StudyRow& row) {
-  return {row.is_ida() ? "IDA" : row.method,
-          row.is_ida() ? "" : fmt::format("{}", row.order),
-          row.is_ida() ? fmt::format("rtol {:g}", row.rtol)
-                       : (std::isfinite(row.step) ? fmt::format("{:.4g}", row.step) : "-"),
+  return {row.method == ida_method ? "IDA" : row.method,
+          row.is_yardstick() ? "" : fmt::format("{}", row.order),
+          row.is_yardstick() ? fmt::format("rtol {:g}", row.rtol)
+                             : (std::isfinite(row.step) ? fmt::format("{:.4g}", row.step) : "-"),
           fmt::format("{}", row.steps),
           error_cell(row.error_q),
           error_cell(row.error_p),
@@ -84,12 +77,13 @@ bool has_run(const Study& study, const std::string& method, int order) {
 
 std::string comparison_table(const Study& study) {
   const auto cell = [](const std::optional<double>& seconds) { return seconds ? time_cell(*seconds) : "-"; };
-  std::vector<Cells> cells{{"error", "method", "order", "CPU", "IDA", "IDA / ours", ""}};
+  const auto ratio = [](const std::optional<double>& r) { return r ? fmt::format("{:.2f}", *r) : "-"; };
+  std::vector<Cells> cells{{"error", "method", "order", "CPU", "IDA", "IDA / ours", "erk", "erk / ours", ""}};
   for (const AtError& at : study.at_error) {
     if (!has_run(study, at.method, at.order)) continue;
     cells.push_back({fmt::format("{:.0e}", at.error), at.method, fmt::format("{}", at.order),
-                     cell(at.cpu_seconds), cell(at.ida_cpu_seconds),
-                     at.ratio ? fmt::format("{:.2f}", *at.ratio) : "-", at.best ? "fastest of ours" : ""});
+                     cell(at.cpu_seconds), cell(at.ida_cpu_seconds), ratio(at.ratio),
+                     cell(at.erk_cpu_seconds), ratio(at.erk_ratio), at.best ? "fastest of ours" : ""});
   }
   return aligned(cells);
 }
@@ -99,7 +93,7 @@ Json number(const std::optional<double>& value) { return value ? number(*value) 
 
 Json row_json(const StudyRow& row, Momentum momentum) {
   Json json{{"method", row.method}};
-  if (row.is_ida()) {
+  if (row.is_yardstick()) {
     json["rtol"] = row.rtol;
   } else {
     json["order"] = row.order;
@@ -109,7 +103,7 @@ Json row_json(const StudyRow& row, Momentum momentum) {
   json["status"] = row.status;
   json["error_q"] = number(row.error_q);
   json["error_p"] = number(row.error_p);
-  if (row.is_ida()) json["self_error"] = number(row.self_error);
+  if (row.is_yardstick()) json["self_error"] = number(row.self_error);
   json["constraint"] = number(row.constraint);
   json["energy_error"] = number(row.energy_error);
   const CpuSeconds& cpu = row.cpu_seconds;
@@ -140,7 +134,9 @@ Json at_error_json(const AtError& at) {
           {"best", at.best},
           {"cpu_seconds", number(at.cpu_seconds)},
           {"ida_cpu_seconds", number(at.ida_cpu_seconds)},
-          {"ratio", number(at.ratio)}};
+          {"ratio", number(at.ratio)},
+          {"erk_cpu_seconds", number(at.erk_cpu_seconds)},
+          {"erk_ratio", number(at.erk_ratio)}};
 }
 
 Json study_json(const Study& study) {
@@ -165,12 +161,12 @@ Json study_json(const Study& study) {
 std::string csv_number(double value) { return std::isfinite(value) ? fmt::format("{:.17g}", value) : ""; }
 
 std::string csv_line(const Study& study, const StudyRow& row) {
-  const bool ida = row.is_ida(), timed = row.cpu_seconds.repeats > 0;
+  const bool yardstick = row.is_yardstick(), timed = row.cpu_seconds.repeats > 0;
   const auto time = [&](double seconds) { return timed ? csv_number(seconds) : std::string(); };
   const Cells fields{csv_field(study.scene),
                      csv_field(row.method),
-                     ida ? "" : fmt::format("{}", row.order),
-                     ida ? "" : name(study.momentum),
+                     yardstick ? "" : fmt::format("{}", row.order),
+                     yardstick ? "" : name(study.momentum),
                      csv_number(row.step),
                      csv_number(row.rtol),
                      csv_field(row.status),
@@ -218,6 +214,32 @@ std::string study_table(const Study& study) {
                      comparison_table(study), study.interrupted ? "\ninterrupted\n" : "");
 }
 
+std::string at_error_markdown(const Study& study) {
+  std::vector<MeasuredOrder> series = study.measured_orders;
+  std::erase_if(series, [&](const MeasuredOrder& m) { return !has_run(study, m.method, m.order); });
+  std::string text =
+      fmt::format("## `{}`, t = {:g} to {:g}\n\n| error |", study.scene, study.t_start, study.t_end);
+  std::string rule = "|---|";
+  for (const MeasuredOrder& m : series) {
+    text += fmt::format(" `{}`, order {} |", m.method, m.order);
+    rule += "---|";
+  }
+  text += " IDA |\n" + rule + "---|\n";
+  for (const double error : compared_errors) {
+    text += fmt::format("| {:.0e} |", error);
+    std::optional<double> ida;
+    for (const MeasuredOrder& m : series)
+      for (const AtError& at : study.at_error) {
+        if (at.error != error || at.method != m.method || at.order != m.order) continue;
+        const std::string cell = at.cpu_seconds ? time_cell(*at.cpu_seconds) : "-";
+        text += at.best ? " **" + cell + "** |" : " " + cell + " |";
+        ida = at.ida_cpu_seconds;
+      }
+    text += fmt::format(" {} |\n", ida ? time_cell(*ida) : "-");
+  }
+  return text + '\n';
+}
+
 std::string studies_csv(const std::vector<Study>& studies) {
   std::string text =
       "scene,method,order,momentum,step,rtol,status,error_q,error_p,self_error,constraint,energy_error,"
@@ -230,9 +252,17 @@ std::string studies_csv(const std::vector<Study>& studies) {
 }
 
 std::string studies_json(const std::vector<Study>& studies) {
-  Json json{{"studies", Json::array()}};
+  Json json{{"studies", Json::array()}, {"build", Json::object()}};
+  for (const auto& [key, value] : build_facts()) json["build"][key] = value;
   for (const Study& study : studies) json["studies"].push_back(study_json(study));
   return json.dump(2, ' ', false, Json::error_handler_t::replace);
+}
+
+std::string time_cell(double seconds) {
+  if (!std::isfinite(seconds) || seconds <= 0.0) return "-";
+  if (seconds < 1e-3) return short_number(seconds * 1e6) + " µs";
+  if (seconds < 1.0) return short_number(seconds * 1e3) + " ms";
+  return short_number(seconds) + " s";
 }
 
 std::string csv_field(std::string_view text) {

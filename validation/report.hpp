@@ -10,11 +10,18 @@ namespace diracstep {
 /// A study as tables for a person: the rows, the measured orders, and the time to reach an error.
 std::string study_table(const Study& study);
 
+/// CPU time at the compared errors as a Markdown table with its heading: methods side by side, the fastest
+/// bold.
+std::string at_error_markdown(const Study& study);
+
 /// All rows of all studies, one line each, with a header; a number that does not apply is left empty.
 std::string studies_csv(const std::vector<Study>& studies);
 
-/// {"studies": [...]}; a number that does not apply or is not finite is null.
+/// {"studies": [...], "build": {...}}; a number that does not apply or is not finite is null.
 std::string studies_json(const std::vector<Study>& studies);
+
+/// 1.23e-05 s as "12.3 µs"; "-" for a time that is not finite.
+std::string time_cell(double seconds);
 
 /// A field of a CSV file, quoted where it must be.
 std::string csv_field(std::string_view text);

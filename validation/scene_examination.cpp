@@ -316,7 +316,7 @@ std::vector<std::string> advise(const CatalogueScene& entry, const Examination& 
     advice.emplace_back("linear: every step has the same Jacobian");
   else if (structure.separable && structure.y_hessian_constant && scene.constraints.empty() && !scene.force)
     advice.emplace_back("separable: type1/trapezoidal is explicit and cheap where nothing is stiff");
-  advice.emplace_back("type1/midpoint at --order 4, 6 or 8 for accuracy; smaller orders for coarse answers");
+  advice.emplace_back("without --method GL(3), order 6; --order 8 to 12 for errors below 1e-6");
   if (scene.dimension() + scene.rows() > 40)
     advice.emplace_back("large: the step uses sparse matrices (KLU)");
   if (scene.force)

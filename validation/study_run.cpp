@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <ctime>
+#include <diracstep/validation/explicit_reference.hpp>
 #include <diracstep/validation/ida_reference.hpp>
 #include <diracstep/validation/study_run.hpp>
 #include <diracstep/validation/work_precision.hpp>
@@ -15,12 +15,6 @@ constexpr double long_run = 0.3;          // CPU seconds above which a run is re
 constexpr double own_warm_up = 1.0;       // … above which it is not run once more to warm up
 constexpr double reference_rtol = 1e-13;  // of IDA, where a scene has no reference
 constexpr long steps_between_looks = 4096;
-
-double thread_seconds() {
-  std::timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
 
 CpuSeconds summary(std::vector<double> seconds) {
   std::ranges::sort(seconds);
@@ -41,7 +35,7 @@ CpuSeconds repeat(Run run, int repeats) {
   return summary(std::move(seconds));
 }
 
-double largest_violation(const ConstraintRows& rows, const Sample& end) {
+double violation(const ConstraintRows& rows, const Sample& end) {
   Vector a(rows.pattern().nonzeros()), residual(rows.rows()), phi = Vector::Zero(rows.rows());
   rows.coefficients(end.time, end.q, a, residual);
   rows.pattern().multiply_add(a.data(), end.v.data(), residual.data());
@@ -50,8 +44,8 @@ double largest_violation(const ConstraintRows& rows, const Sample& end) {
 }
 
 Truth true_end_by_ida(const Scene& scene, double t_end) {
-  const IdaRun fine = integrate_with_ida(scene, t_end, {.rtol = reference_rtol});
-  const IdaRun coarse = integrate_with_ida(scene, t_end, {.rtol = 10.0 * reference_rtol});
+  const ReferenceRun fine = integrate_with_ida(scene, t_end, {.rtol = reference_rtol});
+  const ReferenceRun coarse = integrate_with_ida(scene, t_end, {.rtol = 10.0 * reference_rtol});
   Truth truth{.kind = ida_method,
               .how = fmt::format("IDA at rtol {:g}, beside {:g}", reference_rtol, 10.0 * reference_rtol),
               .missing = fine.ok() ? "" : "no reference: IDA stopped: " + fine.failure,
@@ -85,6 +79,12 @@ double Truth::distance(const Sample& end) const {
   return std::max(relative_error(end.q, q), relative_error(end.p, p));
 }
 
+double largest_violation(const Scene& scene, const Sample& at) {
+  double largest = 0.0;
+  for (const auto& rows : scene.constraints) largest = std::max(largest, violation(*rows, at));
+  return largest;
+}
+
 Truth true_end(const CatalogueScene& scene, double t_end) {
   const auto point = scene.reference.at ? scene.reference.at(t_end) : std::nullopt;
   const auto complete = completed(scene.scene);
@@ -102,9 +102,7 @@ Truth true_end(const CatalogueScene& scene, double t_end) {
 
 void judge(StudyRow& row, const Scene& scene, const Sample& end, const Truth& truth) {
   const double energy = scene.energy(scene.start.time, scene.start.q, scene.start.v);
-  row.constraint = 0.0;
-  for (const auto& rows : scene.constraints)
-    row.constraint = std::max(row.constraint, largest_violation(*rows, end));
+  row.constraint = largest_violation(scene, end);
   row.energy_error = std::abs(end.energy - energy) / std::max(std::abs(energy), 1.0);
   if (truth.missing.empty()) {
     row.error_q = relative_error(end.q, truth.q);
@@ -115,6 +113,23 @@ void judge(StudyRow& row, const Scene& scene, const Sample& end, const Truth& tr
   else if (!truth.missing.empty())
     row.status = truth.missing;
 }
+
+namespace {
+
+/// The counts of the work and the errors, or why there are none.
+void conclude(StudyRow& row, const Work& work, const std::string& failure, const Scene& scene,
+              const Sample& end, const Truth& truth) {
+  row.steps = work.steps;
+  row.newton_iterations = work.iterations;
+  row.residual_evaluations = work.residual_evaluations;
+  row.jacobian_evaluations = work.jacobian_evaluations;
+  if (failure.empty())
+    judge(row, scene, end, truth);
+  else
+    row.status = failure;
+}
+
+}  // namespace
 
 StudyRow run_ours(Integrator& integrator, long steps, Momentum momentum, int repeats, const Truth& truth,
                   const Look& look) {
@@ -129,26 +144,46 @@ StudyRow run_ours(Integrator& integrator, long steps, Momentum momentum, int rep
   const IntegratorOptions& options = integrator.options();
   StudyRow row{.method = options.method, .order = options.order, .step = options.step};
   row.cpu_seconds = repeat(once, repeats);
-  const Work& work = integrator.work();
-  row.steps = work.steps;
-  row.newton_iterations = work.iterations;
-  row.residual_evaluations = work.residual_evaluations;
-  row.jacobian_evaluations = work.jacobian_evaluations;
-  if (failure.empty())
-    judge(row, integrator.scene(), end, truth);
-  else
-    row.status = failure;
+  conclude(row, integrator.work(), failure, integrator.scene(), end, truth);
   return row;
 }
 
-StudyRow run_ida(const Scene& scene, double t_end, double rtol, int repeats, const Truth& truth,
-                 Sample& end) {
-  IdaRun run;
+StudyRow run_variable(AdaptiveIntegrator& integrator, double t_end, Momentum momentum, int repeats,
+                      const Truth& truth, const Look& look) {
+  Sample end;
+  std::string failure;
   const auto once = [&] {
-    run = integrate_with_ida(scene, t_end, {.rtol = rtol});
+    double looking = 0.0;
+    long observed = 0;
+    const double before = thread_seconds();
+    integrator.reset();
+    const RunReport report = run(integrator, t_end, momentum, steps_between_looks, [&](const Sample& sample) {
+      end = sample;
+      const double pause = thread_seconds();
+      if (look && observed++ > 0) look();
+      looking += thread_seconds() - pause;
+      return true;
+    });
+    failure = report.last.failure;
+    return failure.empty() ? thread_seconds() - before - looking : -1.0;
+  };
+  const IntegratorOptions& options = integrator.options();
+  StudyRow row{
+      .method = options.method + variable_steps, .order = options.order, .step = integrator.adaptive().eps};
+  row.cpu_seconds = repeat(once, repeats);
+  conclude(row, integrator.work(), failure, integrator.integrator().scene(), end, truth);
+  return row;
+}
+
+StudyRow run_yardstick(const std::string& method, const Scene& scene, double t_end, double rtol, int repeats,
+                       const Truth& truth, Sample& end) {
+  const auto integrate = method == erk_method ? integrate_explicitly : integrate_with_ida;
+  ReferenceRun run;
+  const auto once = [&] {
+    run = integrate(scene, t_end, {.rtol = rtol});
     return run.ok() ? run.cpu_seconds : -1.0;
   };
-  StudyRow row{.method = ida_method, .rtol = rtol};
+  StudyRow row{.method = method, .rtol = rtol};
   row.cpu_seconds = repeat(once, repeats);
   row.steps = run.steps;
   row.newton_iterations = run.newton_iterations;

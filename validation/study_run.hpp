@@ -1,5 +1,6 @@
 #pragma once
 
+#include <diracstep/core/adaptive_integrator.hpp>
 #include <diracstep/core/integrator.hpp>
 #include <diracstep/validation/scene_catalogue.hpp>
 #include <functional>
@@ -16,22 +17,26 @@ struct CpuSeconds {
   int repeats = 0;
 };
 
-/// The method name of IDA's rows.
+/// The method names of the yardsticks: SUNDIALS IDA, and ARKODE's explicit Runge–Kutta method of order 8.
 inline constexpr const char* ida_method = "ida";
+inline constexpr const char* erk_method = "erk";
+
+/// What the method names of rows with variable steps end in.
+inline constexpr const char* variable_steps = " adaptive";
 
 /// One run of a study.  A number that does not apply or was not reached is NaN.
 struct StudyRow {
   static constexpr double none = std::numeric_limits<double>::quiet_NaN();
 
   std::string method;
-  int order = 0;       ///< 0 for IDA
-  double step = none;  ///< ours: the step size, fitted to the interval
-  double rtol = none;  ///< IDA's
+  int order = 0;       ///< 0 for a yardstick
+  double step = none;  ///< ours: the step size, fitted to the interval, or eps of variable steps
+  double rtol = none;  ///< a yardstick's
   std::string status = "ok";
   double error_q = none;
   double error_p = none;
-  double self_error = none;    ///< IDA's: how far its result is from that of the next tighter tolerance
-  double constraint = none;    ///< largest |φ(q)| and |A(q)v + b| at the end
+  double self_error = none;  ///< a yardstick's: how far its result is from that of the next tighter tolerance
+  double constraint = none;  ///< largest |φ(q)| and |A(q)v + b| at the end
   double energy_error = none;  ///< |E(end) − E(start)| / max(|E(start)|, 1)
   CpuSeconds cpu_seconds = {};
   long steps = 0;
@@ -40,9 +45,9 @@ struct StudyRow {
   long jacobian_evaluations = 0;
 
   bool ok() const { return status == "ok"; }
-  bool is_ida() const { return method == ida_method; }
+  bool is_yardstick() const { return method == ida_method || method == erk_method; }
   /// False for a method or order that the scene does not admit; nothing was run then.
-  bool fits() const { return is_ida() || step == step; }
+  bool fits() const { return is_yardstick() || step == step; }
   double error() const { return error_q > error_p ? error_q : error_p; }
 };
 
@@ -61,8 +66,11 @@ struct Truth {
 /// The scene's reference at t_end with p = ∂L/∂v, or IDA's result at the tolerance 1e-13 where there is none.
 Truth true_end(const CatalogueScene& scene, double t_end);
 
+/// Largest |φ(q)| and |A(q)v + b| at a point.
+double largest_violation(const Scene& scene, const Sample& at);
+
 /// Fills in the errors, the violation of the rows and the change of the energy at the end of a run.  Like
-/// run_ida it needs a scene with a Lagrangian, see completed().
+/// run_yardstick it needs a scene with a Lagrangian, see completed().
 void judge(StudyRow& row, const Scene& scene, const Sample& end, const Truth& truth);
 
 /// Called now and then within a run of ours, outside the time taken; may throw to end it.
@@ -74,7 +82,13 @@ using Look = std::function<void()>;
 StudyRow run_ours(Integrator& integrator, long steps, Momentum momentum, int repeats, const Truth& truth,
                   const Look& look = {});
 
-/// The same for IDA; `end` receives where it got to.
-StudyRow run_ida(const Scene& scene, double t_end, double rtol, int repeats, const Truth& truth, Sample& end);
+/// The same with variable steps to t_end; the survey of the pace belongs to the construction.  The row's
+/// method ends in `variable_steps` and its step is eps.
+StudyRow run_variable(AdaptiveIntegrator& integrator, double t_end, Momentum momentum, int repeats,
+                      const Truth& truth, const Look& look = {});
+
+/// The same for a yardstick, by its method name; `end` receives where it got to.
+StudyRow run_yardstick(const std::string& method, const Scene& scene, double t_end, double rtol, int repeats,
+                       const Truth& truth, Sample& end);
 
 }  // namespace diracstep

@@ -62,23 +62,24 @@ class QuadratureLagrangian final : public GeneratingFunction {
   QuadratureLagrangian(std::shared_ptr<const Lagrangian> lagrangian, StepRule rule)
       : GeneratingFunction(GeneratingType::one, lagrangian->pattern()),
         lagrangian_(std::move(lagrangian)),
-        nodes_(step_nodes(rule)),
+        rule_(rule),
         mirror_(pattern().transposed_positions()) {
     const int n = dimension();
     for (Vector* column : {&q_, &v_, &lq_, &lv_}) column->resize(n);
     for (Vector* values : {&lqq_, &lqv_, &lvv_}) values->resize(pattern().nonzeros());
     const PhaseStructure& structure = lagrangian_->structure();
-    const bool at_ends = std::ranges::all_of(nodes_, [](StepNode node) { return node.c != 0.5; });
+    const bool at_ends =
+        std::ranges::all_of(rule_.nodes(), [](StepNode node) { return node.c == 0.0 || node.c == 1.0; });
     if (!at_ends || !structure.separable || !structure.y_hessian_constant || !structure.y_hessian_diagonal)
       return;
     const Vector mass = SeparableEnds::mass_of(*lagrangian_);
     if ((mass.array() != 0.0).all() && mass.allFinite())
-      explicit_ = std::make_unique<SeparableEnds>(*lagrangian_, nodes_, mass);
+      explicit_ = std::make_unique<SeparableEnds>(*lagrangian_, rule_.nodes(), mass);
   }
 
   double value(Interval step, ConstColumnsRef y) override {
     double sum = 0.0;
-    for (const StepNode& node : nodes_) {
+    for (const StepNode& node : rule_.nodes()) {
       move_to(node, step, y);
       sum += node.weight * lagrangian_->value(t_, q_, v_);
     }
@@ -88,7 +89,7 @@ class QuadratureLagrangian final : public GeneratingFunction {
   void gradient(Interval step, ConstColumnsRef y, ColumnsRef g) override {
     const double h = step.size;
     g.setZero();
-    for (const StepNode& node : nodes_) {
+    for (const StepNode& node : rule_.nodes()) {
       move_to(node, step, y);
       lagrangian_->gradient(t_, q_, v_, lq_, lv_);
       g.col(0) += node.weight * (h * (1.0 - node.c) * lq_ - lv_);
@@ -99,7 +100,7 @@ class QuadratureLagrangian final : public GeneratingFunction {
   void hessian(Interval step, ConstColumnsRef y, ColumnsRef blocks) override {
     const double h = step.size;
     blocks.setZero();
-    for (const StepNode& node : nodes_) {
+    for (const StepNode& node : rule_.nodes()) {
       const double c = node.c, d = 1.0 - node.c, w = node.weight;
       move_to(node, step, y);
       lagrangian_->hessian(t_, q_, v_, lqq_, lqv_, lvv_);
@@ -122,7 +123,7 @@ class QuadratureLagrangian final : public GeneratingFunction {
   }
 
   std::shared_ptr<const Lagrangian> lagrangian_;
-  std::span<const StepNode> nodes_;
+  StepRule rule_;
   std::vector<int> mirror_;
   std::unique_ptr<SeparableEnds> explicit_;
   double t_ = 0.0;

@@ -1,9 +1,13 @@
 #include <Eigen/LU>
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <diracstep/core/errors.hpp>
 #include <diracstep/solvers/detail/linear_solver.hpp>
 #include <limits>
 #include <stdexcept>
+#include <utility>
+#include <vector>
 #ifdef DIRACSTEP_WITH_KLU
 #include <klu.h>
 #endif
@@ -11,6 +15,63 @@
 namespace diracstep::detail {
 
 namespace {
+
+/// Elimination by columns with row exchanges, for few unknowns: of fixed size N, or of any size for N = 0.
+/// Multipliers that vanish, of which saddle-point matrices have many, are skipped.
+template <int N>
+class SmallLu final : public LinearSolver {
+ public:
+  explicit SmallLu(int size)
+      : size_(size), lu_(static_cast<std::size_t>(size) * size), inverse_pivots_(size), exchanges_(size) {}
+
+  bool factor(const double* values) override {
+    const int n = size();
+    std::copy_n(values, n * n, lu_.data());
+    const double round_off = std::numeric_limits<double>::epsilon() * n;
+    for (int k = 0; k < n; ++k) {
+      double* const pivot_column = column(k);
+      int pivot = k;
+      for (int i = k + 1; i < n; ++i)
+        if (std::abs(pivot_column[i]) > std::abs(pivot_column[pivot])) pivot = i;
+      double largest = 0.0;
+      for (int i = 0; i < n; ++i) largest = std::max(largest, std::abs(values[i + k * n]));
+      if (!(std::abs(pivot_column[pivot]) > round_off * largest)) return false;
+      exchanges_[static_cast<std::size_t>(k)] = pivot;
+      if (pivot != k)
+        for (int j = 0; j < n; ++j) std::swap(column(j)[k], column(j)[pivot]);
+      const double inverse = inverse_pivots_[static_cast<std::size_t>(k)] = 1.0 / pivot_column[k];
+      for (int i = k + 1; i < n; ++i) pivot_column[i] *= inverse;
+      for (int j = k + 1; j < n; ++j) subtract(pivot_column, k, column(j)[k], column(j));
+    }
+    return true;
+  }
+
+  void solve(double* b) override {
+    const int n = size();
+    for (int k = 0; k < n; ++k) std::swap(b[k], b[exchanges_[static_cast<std::size_t>(k)]]);
+    for (int k = 0; k < n; ++k) subtract(column(k), k, b[k], b);
+    for (int k = n - 1; k >= 0; --k) {
+      b[k] *= inverse_pivots_[static_cast<std::size_t>(k)];
+      for (int i = 0; i < k; ++i) b[i] -= column(k)[i] * b[k];
+    }
+  }
+
+  const char* name() const override { return "dense LU"; }
+
+ private:
+  int size() const { return N > 0 ? N : size_; }
+  double* column(int j) { return lu_.data() + static_cast<std::ptrdiff_t>(j) * size(); }
+
+  /// to −= factor · from, below row k.
+  void subtract(const double* from, int k, double factor, double* to) const {
+    if (factor == 0.0) return;
+    for (int i = k + 1; i < size(); ++i) to[i] -= factor * from[i];
+  }
+
+  int size_;
+  std::vector<double> lu_, inverse_pivots_;
+  std::vector<int> exchanges_;
+};
 
 class DenseLu final : public LinearSolver {
  public:
@@ -93,6 +154,10 @@ class Klu final : public LinearSolver {
     factor_afresh(fresh_values_.data());
   }
 
+  bool holds(const double* values) const override {
+    return numeric_ != nullptr && fresh_values_ == Eigen::Map<const Vector>(values, fresh_values_.size());
+  }
+
   const char* name() const override { return "KLU"; }
 
  private:
@@ -118,10 +183,31 @@ class Klu final : public LinearSolver {
 
 #endif
 
+/// Up to this size plain loops are faster than Eigen's blocks.
+constexpr int largest_small = 32;
+constexpr std::size_t largest_fixed = 12;
+
+template <int N>
+std::unique_ptr<LinearSolver> small_lu(int size) {
+  return std::make_unique<SmallLu<N>>(size);
+}
+
+template <std::size_t... N>
+constexpr auto small_lu_of_each_size(std::index_sequence<N...>) {
+  return std::array{&small_lu<static_cast<int>(N)>...};
+}
+
+std::unique_ptr<LinearSolver> make_dense_lu(int size) {
+  static constexpr auto make = small_lu_of_each_size(std::make_index_sequence<largest_fixed + 1>());
+  if (size > largest_small) return std::make_unique<DenseLu>(size);
+  const auto length = static_cast<std::size_t>(size);
+  return make.at(length <= largest_fixed ? length : 0)(size);
+}
+
 }  // namespace
 
 std::unique_ptr<LinearSolver> make_linear_solver(const SparsityPattern& pattern) {
-  if (pattern.is_dense()) return std::make_unique<DenseLu>(pattern.rows());
+  if (pattern.is_dense()) return make_dense_lu(pattern.rows());
 #ifdef DIRACSTEP_WITH_KLU
   return std::make_unique<Klu>(pattern);
 #else

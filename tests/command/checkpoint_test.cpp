@@ -79,13 +79,18 @@ TEST_F(CheckpointCommand, WorkOfAResumedRunIsThatOfTheWhole) {
 
 TEST_F(CheckpointCommand, OtherRunsAreRefusedWithBothValues) {
   const std::string control = " --resume '" + path("c") + "'";
-  ASSERT_EQ(run("run knife_edge --step 0.1 --end 1 --checkpoint '" + path("c") + "'").status, 0);
-  expect_misuse("run knife_edge --step 0.05 --end 2" + control, {"step is 0.1", "here it is 0.05"});
-  expect_misuse("run knife_edge --step 0.1 --end 2 --set m=2" + control, {"its m is 1", "here it is 2"});
+  ASSERT_EQ(run("run knife_edge --method type1/midpoint --step 0.1 --end 1 --checkpoint '" + path("c") + "'")
+                .status,
+            0);
+  expect_misuse("run knife_edge --method type1/midpoint --step 0.05 --end 2" + control,
+                {"step is 0.1", "here it is 0.05"});
+  expect_misuse("run knife_edge --method type1/midpoint --step 0.1 --end 2 --set m=2" + control,
+                {"its m is 1", "here it is 2"});
   expect_misuse("run knife_edge --step 0.1 --end 2 --method type1/gl:2" + control,
                 {"type1/midpoint", "type1/gl:2"});
   expect_misuse("run kepler_e06 --step 0.1 --end 2" + control, {"knife_edge", "kepler_e06"});
-  expect_misuse("run knife_edge --step 0.1 --end 2 --out " + path("k.csv") + control, {"trajectory is none"});
+  expect_misuse("run knife_edge --method type1/midpoint --step 0.1 --end 2 --out " + path("k.csv") + control,
+                {"trajectory is none"});
 }
 
 TEST_F(CheckpointCommand, DamagedFilesAreRefused) {
@@ -124,19 +129,24 @@ TEST_F(CheckpointCommand, ThatCannotBeWrittenIsAnError) {
   expect_misuse("run knife_edge --checkpoint-every 5", {"--checkpoint FILE"});
   expect_misuse("run knife_edge --checkpoint c --checkpoint-every=-5", {"-5"});
   expect_misuse("run knife_edge --checkpoint c --out c", {"both 'c'"});
+  expect_misuse("run knife_edge --adaptive --checkpoint c",
+                {"--checkpoint", "--adaptive", "fixed steps only"});
+  expect_misuse("run knife_edge --error 1e-6 --resume c", {"--resume", "--error"});
 }
 
 TEST_F(CheckpointCommand, RetriesAreReported) {
-  const Outcome outcome = run("run kepler_e06 --step 0.5 --end 5 --substeps 8 --json");
+  const Outcome outcome =
+      run("run kepler_e06 --method type1/midpoint --step 0.5 --end 5 --substeps 8 --json");
   ASSERT_EQ(outcome.status, 0) << outcome.err;
   const Json retries = Json::parse(outcome.out)["retries"];
   for (const char* key :
        {"line_searches", "plain_guesses", "previous_solutions", "continuations", "other_branches"})
     EXPECT_TRUE(retries[key].is_number()) << key;
   EXPECT_GE(retries["divided_steps"].get<int>(), 1);
-  EXPECT_NE(run("run kepler_e06 --step 0.5 --end 5 --substeps 8").out.find("divided steps"),
-            std::string::npos);
-  EXPECT_EQ(run("run kepler_e06 --step 0.5 --end 5").status, 1);
+  EXPECT_NE(
+      run("run kepler_e06 --method type1/midpoint --step 0.5 --end 5 --substeps 8").out.find("divided steps"),
+      std::string::npos);
+  EXPECT_EQ(run("run kepler_e06 --method type1/midpoint --step 0.5 --end 5").status, 1);
   expect_misuse("run kepler_e06 --substeps 0", {"substeps = 0", "1 or more"});
 }
 

@@ -34,6 +34,16 @@ TEST_F(RunCommand, NumbersInTheCsvReadBackExactly) {
   EXPECT_EQ(std::strtod(last[10].c_str(), nullptr), end["lambda"]["blade"].get<double>());
 }
 
+TEST_F(RunCommand, ADegenerateCircuitHasAColumnForEachRowOfItsOwn) {
+  ASSERT_EQ(run("run lc_circuit --step 0.1 --end 1 --out " + path("c.csv")).status, 0);
+  const auto all = lines(contents(path("c.csv")));
+  EXPECT_EQ(
+      all.front(),
+      "t,qL,qC1,qC2,qC3,v_qL,v_qC1,v_qC2,v_qC3,p_qL,p_qC1,p_qC2,p_qC3,lambda_node_a,lambda_node_b,energy");
+  for (const std::string& line : all) EXPECT_EQ(fields(line).size(), 16U) << line;
+  EXPECT_EQ(fields(all[1]).back(), "0.625");
+}
+
 TEST_F(RunCommand, KeepsEachKthPointAndTheLast) {
   ASSERT_EQ(run("run knife_edge --step 0.1 --end 1 --every 4 --out " + path("k.csv")).status, 0);
   std::vector<double> times;
@@ -84,7 +94,8 @@ TEST_F(RunCommand, SetChangesAParameter) {
 }
 
 TEST_F(RunCommand, NonConvergenceIsToldAndKeepsWhatWasComputed) {
-  const Outcome outcome = run("run pendulum_cartesian --step 0.2 --every 4 --out " + path("p.csv"));
+  const Outcome outcome =
+      run("run pendulum_cartesian --method type1/midpoint --step 0.2 --every 4 --out " + path("p.csv"));
   EXPECT_EQ(outcome.status, 1);
   for (const char* word : {"no convergence", "momentum residual", "constraint residual"})
     EXPECT_NE(outcome.err.find(word), std::string::npos) << word << '\n' << outcome.err;

@@ -1,4 +1,5 @@
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "run_command.hpp"
 
@@ -42,6 +43,21 @@ TEST_F(SceneVerbs, CheckFailsForAStartOffTheRows) {
     if (finding["what"] != "consistency of the start") continue;
     EXPECT_NE(finding["detail"].dump().find("hoop"), std::string::npos) << finding;
   }
+}
+
+TEST_F(SceneVerbs, CheckRunsEverySceneAgainstItsPublishedValues) {
+  const Outcome outcome = run("check --scenes --json");
+  EXPECT_EQ(outcome.status, 0) << outcome.out;
+  const Json cases = Json::parse(outcome.out)["cases"];
+  std::set<std::string> scenes;
+  for (const Json& one : cases) {
+    EXPECT_TRUE(one["passed"].get<bool>()) << one;
+    EXPECT_FALSE(one["source"].get<std::string>().empty()) << one;
+    scenes.insert(one["scene"].get<std::string>());
+  }
+  EXPECT_EQ(scenes.size(), 26U);
+  expect_misuse("check", {"--scenes"});
+  expect_misuse("check --scenes knife_edge", {"--scenes"});
 }
 
 TEST_F(SceneVerbs, CheckNamesDependentRows) {

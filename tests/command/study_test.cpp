@@ -21,7 +21,7 @@ TEST_F(StudyCommand, JsonHasTheKeysOfTheContract) {
   EXPECT_EQ(study["unknowns"], 4);
   EXPECT_EQ(study["reference"]["kind"], "exact");
   EXPECT_TRUE(study["reference"]["self_error"].is_number());
-  ASSERT_EQ(study["rows"].size(), 8u);
+  ASSERT_EQ(study["rows"].size(), 10u);
   for (const Json& row : study["rows"]) {
     EXPECT_EQ(row["status"], "ok");
     for (const char* key : {"error_q", "error_p", "constraint", "energy_error", "steps", "newton_iterations",
@@ -30,19 +30,23 @@ TEST_F(StudyCommand, JsonHasTheKeysOfTheContract) {
     for (const char* key : {"median", "min", "max"})
       EXPECT_GT(row["cpu_seconds"][key].get<double>(), 0.0) << key;
     EXPECT_EQ(row["cpu_seconds"]["repeats"], 2);
-    const bool ida = row["method"] == "ida";
-    EXPECT_EQ(row.contains("rtol"), ida);
-    EXPECT_EQ(row.contains("self_error"), ida);
-    for (const char* key : {"order", "momentum", "step"}) EXPECT_EQ(row.contains(key), !ida) << key;
+    const bool yardstick = row["method"] == "ida" || row["method"] == "erk";
+    EXPECT_EQ(row.contains("rtol"), yardstick);
+    EXPECT_EQ(row.contains("self_error"), yardstick);
+    for (const char* key : {"order", "momentum", "step"}) EXPECT_EQ(row.contains(key), !yardstick) << key;
   }
   ASSERT_EQ(study["measured_order"].size(), 2u);
+  const Json build = Json::parse(outcome.out)["build"];
+  for (const char* key : {"diracstep", "sundials", "compiler", "processor"})
+    EXPECT_FALSE(build[key].get<std::string>().empty()) << key;
   EXPECT_NEAR(study["measured_order"][0]["slope"].get<double>(), 2.0, 0.1);
   EXPECT_NEAR(study["measured_order"][1]["slope"].get<double>(), 4.0, 0.1);
-  ASSERT_EQ(study["at_error"].size(), 6u);
+  ASSERT_EQ(study["at_error"].size(), 8u);
   for (const Json& at : study["at_error"])
-    for (const char* key : {"error", "method", "order", "cpu_seconds", "ida_cpu_seconds", "ratio"})
+    for (const char* key : {"error", "method", "order", "cpu_seconds", "ida_cpu_seconds", "ratio",
+                            "erk_cpu_seconds", "erk_ratio"})
       EXPECT_TRUE(at.contains(key)) << key;
-  EXPECT_TRUE(study["at_error"].back()["cpu_seconds"].is_null()) << "1e-9 is out of reach here";
+  EXPECT_TRUE(study["at_error"].back()["cpu_seconds"].is_null()) << "1e-12 is out of reach here";
 }
 
 TEST_F(StudyCommand, WritesTablesAndPictures) {
@@ -53,13 +57,34 @@ TEST_F(StudyCommand, WritesTablesAndPictures) {
   const Json json = Json::parse(contents(path("a b/it's/study.json")));
   EXPECT_EQ(json["studies"].size(), 2u);
   const auto csv = lines(contents(path("a b/it's/study.csv")));
-  EXPECT_EQ(csv.size(), 17u);
+  EXPECT_EQ(csv.size(), 21u);
   EXPECT_EQ(csv[0].rfind("scene,method,order,momentum,step,rtol,status,error_q,error_p", 0), 0u);
   if (outcome.err.find("gnuplot was not found") != std::string::npos) GTEST_SKIP() << "no gnuplot here";
   for (const char* scene : {"knife_edge", "pendulum_cartesian"}) {
     EXPECT_NE(contents(path("a b/it's/" + std::string(scene) + ".svg")).find("<svg"), std::string::npos);
     EXPECT_EQ(contents(path("a b/it's/" + std::string(scene) + ".png")).substr(1, 3), "PNG");
   }
+}
+
+TEST_F(StudyCommand, ReportHoldsItsPicturesAndComparesWithAnEarlierStudy) {
+  const std::string options = " --orders 2 --steps 0.1,0.05 --rtols 1e-6 --repeat 1 --end 5";
+  ASSERT_EQ(run("study knife_edge --out " + path("old") + options).status, 0);
+  const std::string page = contents(path("old/report.html"));
+  EXPECT_NE(page.find("id=\"knife_edge\""), std::string::npos);
+  const Outcome again = run("study 'knife*' --compare " + path("old/study.json") + options);
+  EXPECT_EQ(again.status, 0) << again.err;
+  EXPECT_NE(again.err.find("comparisons within the noise"), std::string::npos) << again.err;
+  expect_misuse("study knife_edge --compare " + path("nothing.json") + options,
+                {"--compare", "nothing.json"});
+}
+
+TEST_F(StudyCommand, PatternsAndClassesChooseScenes) {
+  const std::string rest = " --orders 2 --steps 0.5 --without-ida --without-erk --repeat 1 --end 1 --json";
+  const Json studies = Json::parse(run("study 'knife_edg?' --scenes 'kepler_e06'" + rest).out)["studies"];
+  ASSERT_EQ(studies.size(), 2u);
+  EXPECT_EQ(studies[0]["scene"], "knife_edge");
+  EXPECT_EQ(studies[1]["scene"], "kepler_e06");
+  expect_misuse("study 'zz*'", {"zz*", "knife_edge"});
 }
 
 TEST_F(StudyCommand, WithoutGnuplotEverythingElseIsWritten) {
@@ -70,7 +95,8 @@ TEST_F(StudyCommand, WithoutGnuplotEverythingElseIsWritten) {
 }
 
 TEST_F(StudyCommand, FailedRunIsARowAndAMessage) {
-  const Outcome outcome = run("study pendulum_cartesian --orders 2 --steps 0.2,0.01 --without-ida --json");
+  const Outcome outcome =
+      run("study pendulum_cartesian --orders 2 --steps 0.2,0.01 --without-ida --without-erk --json");
   EXPECT_EQ(outcome.status, 1);
   EXPECT_NE(outcome.err.find("no convergence"), std::string::npos) << outcome.err;
   const Json rows = Json::parse(outcome.out)["studies"][0]["rows"];
@@ -81,7 +107,7 @@ TEST_F(StudyCommand, FailedRunIsARowAndAMessage) {
 }
 
 TEST_F(StudyCommand, OrderThatOneMethodLacksIsNoFailure) {
-  const std::string rest = " --steps 0.1,0.05 --without-ida --repeat 1 --json";
+  const std::string rest = " --steps 0.1,0.05 --without-ida --without-erk --repeat 1 --json";
   const Outcome outcome = run("study knife_edge --methods type1/midpoint,type2/euler --orders 1,2" + rest);
   EXPECT_EQ(outcome.status, 0) << outcome.err;
   EXPECT_NE(outcome.err.find("type1/midpoint order 1: no composition"), std::string::npos) << outcome.err;

@@ -46,6 +46,33 @@ TEST(ConsistentStart, TheIntegratorRefusesOrProjectsAsAsked) {
   EXPECT_EQ(integrator.plan().front().item, "start");
 }
 
+TEST(ConsistentStart, AMomentumOffTheDistributionIsProjectedAndTheDistanceTold) {
+  // With unit masses the velocity is p; the nearest one on v_x + y v_z = 0 is its Euclidean projection.
+  Scene scene = *testing::nonholonomic();
+  scene.lagrangian = lagrangian<3>([](const auto& q, const auto& v) {
+    return 0.5 * (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]) - 0.5 * q[0] * q[0];
+  });
+  const double y = scene.start.q[1];
+  const Vector p{{1.0, 2.0, 3.0}}, row{{1.0, 0.0, y}};
+  const Start start{0.0, scene.start.q, Vector(), p};
+  const ConsistentStart projected = project_start(scene, start, kinsol());
+  const double off = row.dot(p) / row.squaredNorm();
+  EXPECT_LT((projected.start.v - (p - off * row)).norm(), 1e-14);
+  EXPECT_NEAR(projected.velocity_moved, std::abs(off) * row.norm(), 1e-14);
+  EXPECT_EQ(projected.position_moved, 0.0);
+}
+
+TEST(ConsistentStart, HiddenRowsCountAsRows) {
+  const auto scene = laws::degenerate_circuit();
+  Start start = scene->start;
+  start.q[2] += 0.2;
+  const ConsistentStart projected = project_start(*scene, start, kinsol());
+  const Vector& q = projected.start.q;
+  EXPECT_NEAR(q[1] + 0.4 * std::pow(q[1], 3), q[2] + 0.2 * q[2] * q[2], 1e-13);
+  EXPECT_GT(projected.position_moved, 0.1);
+  EXPECT_LT(projected.position_moved, 0.2);
+}
+
 TEST(ConsistentStart, UnreachableConstraintsAreRefusedWithTheReason) {
   Scene scene = testing::particle("impossible");
   scene.constraints = {holonomic<3, 1>(

@@ -10,10 +10,12 @@
 namespace diracstep {
 namespace {
 
-/// Every method and its adjoint.
+/// Every method and its adjoint, and GL(s).
 std::vector<std::string> methods_and_adjoints() {
   std::vector<std::string> names = testing::every_method();
   const Registry registry = Registry::with_built_ins();
+  for (const char* type : {"type1", "type2", "type3"})
+    for (const char* stages : {"1", "3"}) names.push_back(std::string(type) + "/gl:" + stages);
   for (const std::string& name : testing::every_method()) {
     const int type = static_cast<int>(adjoint_type(registry.method(name).info.type));
     names.push_back("type" + std::to_string(type) + "/adjoint(" + name + ")");

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <diracstep/core/adaptive_integrator.hpp>
 #include <diracstep/core/run.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
 #include <limits>
@@ -300,6 +301,36 @@ TEST(Integrator, StepsAllocateNothing) {
   });
 }
 
+TEST(AdaptiveIntegrator, StepsAllocateNothing) {
+  if (!testing::counts_allocations) GTEST_SKIP() << "allocations cannot be counted here";
+  for (const auto& scene : testing::every_constraint_class())
+    for (const StepControl control : {StepControl::integrating, StepControl::in_step}) {
+      AdaptiveIntegrator integrator(scene, Registry::with_built_ins(), kinsol(),
+                                    {.method = "type1/gl:3", .step = 0.1, .compensated_sums = true},
+                                    {.eps = 0.2, .control = control});
+      for (int k = 0; k < 30; ++k) ASSERT_TRUE(integrator.step().ok());
+      const long before = testing::allocations;
+      for (int k = 0; k < 20; ++k) ASSERT_TRUE(integrator.step().ok());
+      EXPECT_EQ(testing::allocations - before, 0) << scene->name;
+    }
+}
+
+TEST(Integrator, FixedPointStepsAndKeptJacobiansAllocateNothing) {
+  if (!testing::counts_allocations) GTEST_SKIP() << "allocations cannot be counted here";
+  for (const auto& scene : testing::every_constraint_class())
+    for (const KinsolOptions& solver : {KinsolOptions{.iteration = Iteration::fixed_point},
+                                        KinsolOptions{.jacobian = JacobianPolicy::kept}}) {
+      Integrator integrator(scene, Registry::with_built_ins(), kinsol(solver),
+                            {.method = "type1/gl:3", .step = 0.05});
+      for (int k = 0; k < 20; ++k) ASSERT_TRUE(integrator.step().ok());
+      const long before = testing::allocations;
+      bool ok = true;
+      for (int k = 0; k < 40; ++k) ok = ok && integrator.step().ok();
+      EXPECT_EQ(testing::allocations - before, 0) << scene->name;
+      EXPECT_TRUE(ok);
+    }
+}
+
 // --- Failure
 // ----------------------------------------------------------------------------------------------------
 
@@ -420,15 +451,15 @@ TEST(Failure, ExplicitStepOutOfTheDomainIsReported) {
 }
 
 TEST(Failure, SingularJacobianIsReported) {
-  // Neither mass nor potential knows y.
+  // D1D2 L_d = -1/h + h/4 vanishes at h = 2.
   Scene scene;
-  scene.name = "idle coordinate";
-  scene.coordinates = {"x", "y"};
+  scene.name = "saddle";
+  scene.coordinates = {"x"};
   scene.lagrangian =
-      lagrangian<2>([](const auto& q, const auto& v) { return 0.5 * (v[0] * v[0] - q[0] * q[0]); });
-  scene.start = {0.0, Vector{{1.0, 0.0}}, Vector{{0.0, 0.5}}};
+      lagrangian<1>([](const auto& q, const auto& v) { return 0.5 * (v[0] * v[0] + q[0] * q[0]); });
+  scene.start = {0.0, Vector{{1.0}}, Vector{{0.5}}};
   Integrator integrator =
-      integrator_for(std::make_shared<const Scene>(scene), {.method = "type1/midpoint", .step = 0.05});
+      integrator_for(std::make_shared<const Scene>(scene), {.method = "type1/midpoint", .step = 2.0});
   const StepReport report = integrator.step();
   EXPECT_EQ(report.solve.status, SolveStatus::singular_jacobian);
   expect_parts(report.failure, {"step 0", "t = 0", "singular"});

@@ -133,8 +133,8 @@ TEST(Registry, GaussLobattoStepsHaveTwiceTheOrderOfTheirStages) {
 TEST(Registry, GaussLobattoStepsRefuseStagesTransformsAndRulesThatTheyLack) {
   expect_unknown("type1/gl:0", {"GL(0)", "1 to 20"});
   expect_unknown("type3/gl:21", {"GL(21)", "1 to 20"});
-  expect_unknown("type2/legendre(type1/gl:2)", {"type1/gl:2", "no generating function of its end points"});
-  expect_unknown("type1/adjoint(type1/gl:2)", {"type1/gl:2", "no generating function of its end points"});
+  expect_unknown("type2/legendre(type1/gl:2)", {"type1/gl:2", "nodes inside the step", "typeN/gl:S"});
+  expect_unknown("type1/adjoint(type1/gl:2)", {"type1/gl:2", "nodes inside the step", "typeN/gl:S"});
   expect_misuse([] { (void)built_ins().method("type1/gl:2").step(*testing::mixed(), true, StepRule::left); },
                 {"type1/gl:2", "its own nodes"});
 }

@@ -142,17 +142,21 @@ TEST(Scene, CompleteScenesAreLeftAsTheyAre) {
   EXPECT_EQ(completed(scene), scene);
 }
 
-TEST(Scene, MomentumStartNeedsAHamiltonianAndTheRightSize) {
+TEST(Scene, MomentumStartNeedsTheRightSize) {
   expect_refused(hamiltonian_scene(), [](Scene& s) { s.start.p.resize(1); },
                  {"'from H'", "the start p", "1", "2"});
   expect_refused(hamiltonian_scene(), [](Scene& s) { s.start.q.resize(3); },
                  {"'from H'", "the start q", "3", "2"});
-  expect_refused(*testing::unconstrained(),
-                 [](Scene& s) {
-                   s.start.p = s.start.v;
-                   s.start.v.resize(0);
-                 },
-                 {"given by p", "needs a Hamiltonian"});
+}
+
+TEST(Scene, MomentumStartOfALagrangianGivesItsVelocity) {
+  auto scene = std::make_shared<Scene>(*testing::unconstrained());
+  const Vector v = scene->start.v;
+  Vector lq(3);
+  scene->start.p.resize(3);
+  scene->lagrangian->gradient(0.0, scene->start.q, v, lq, scene->start.p);
+  scene->start.v.resize(0);
+  EXPECT_LT((completed(scene)->start.v - v).norm(), 1e-15);
 }
 
 TEST(Scene, MomentumStartOffTheDistributionIsRefused) {

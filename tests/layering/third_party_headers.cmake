@@ -4,7 +4,7 @@ set(allowed "^(solvers/.*\\.cpp|solvers/detail/.*|validation/[^/]*_reference\\.c
 set(packages sundials|sunmatrix|sunlinsol|sunnonlinsol|nvector|kinsol|idas?|cvodes?|arkode|suitesparse)
 set(third_party "[<\"]((${packages})/|(klu|amd|btf|colamd)[.]h)")
 set(errors "")
-foreach(folder core constraints solvers validation)
+foreach(folder core constraints solvers plugins c_interface validation)
   file(GLOB_RECURSE files RELATIVE ${ROOT} ${ROOT}/${folder}/*.hpp ${ROOT}/${folder}/*.cpp)
   foreach(file IN LISTS files)
     file(STRINGS ${ROOT}/${file} includes REGEX "^[ \t]*#[ \t]*include")

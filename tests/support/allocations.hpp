@@ -1,54 +1,11 @@
 #pragma once
 
-#include <atomic>
-#include <cerrno>
-#include <cstddef>
+#include <count_allocations.hpp>
 
-/// Counts every heap allocation of the program, those of libraries and of operator new included, by taking
-/// the place of glibc's malloc.  To be included in one source of a test program.  Under a sanitizer, which
-/// needs malloc for itself, nothing is counted.
-#if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-#define DIRACSTEP_COUNTS_ALLOCATIONS 1
-#else
-#define DIRACSTEP_COUNTS_ALLOCATIONS 0
-#endif
-
+/// To be included in one source of a test program.
 namespace diracstep::testing {
 
-inline constexpr bool counts_allocations = DIRACSTEP_COUNTS_ALLOCATIONS;
-inline std::atomic<long> allocations{0};
+using diracstep::allocations;
+using diracstep::counts_allocations;
 
 }  // namespace diracstep::testing
-
-#if DIRACSTEP_COUNTS_ALLOCATIONS
-
-extern "C" {
-
-void* __libc_malloc(std::size_t size);                           // NOLINT
-void* __libc_calloc(std::size_t count, std::size_t size);        // NOLINT
-void* __libc_realloc(void* block, std::size_t size);             // NOLINT
-void* __libc_memalign(std::size_t alignment, std::size_t size);  // NOLINT
-
-void* malloc(std::size_t size) {
-  ++diracstep::testing::allocations;
-  return __libc_malloc(size);
-}
-void* calloc(std::size_t count, std::size_t size) {
-  ++diracstep::testing::allocations;
-  return __libc_calloc(count, size);
-}
-void* realloc(void* block, std::size_t size) {
-  ++diracstep::testing::allocations;
-  return __libc_realloc(block, size);
-}
-void* aligned_alloc(std::size_t alignment, std::size_t size) {
-  ++diracstep::testing::allocations;
-  return __libc_memalign(alignment, size);
-}
-int posix_memalign(void** block, std::size_t alignment, std::size_t size) {
-  *block = aligned_alloc(alignment, size);
-  return *block != nullptr ? 0 : ENOMEM;
-}
-}
-
-#endif

@@ -46,7 +46,7 @@ TEST(Conclude, ComparesWithIdaOnlyWhereBothGetThere) {
   study.rows = {row("ours", 2, 1e-2, 1.0),  row("ours", 2, 1e-4, 100.0),   row("ours", 4, 1e-2, 1.0),
                 row("ours", 4, 1e-7, 32.0), row(ida_method, 0, 1e-2, 2.0), row(ida_method, 0, 1e-4, 200.0)};
   conclude(study);
-  ASSERT_EQ(study.at_error.size(), 6u);
+  ASSERT_EQ(study.at_error.size(), 8u);
   EXPECT_TRUE(study.at_error[0].best);
   EXPECT_EQ(study.at_error[0].order, 4);
   EXPECT_NEAR(*study.at_error[0].ratio, 10.0, 1e-9);  // IDA 20 s, order 4 32^(1/5) = 2 s
@@ -55,8 +55,8 @@ TEST(Conclude, ComparesWithIdaOnlyWhereBothGetThere) {
   EXPECT_FALSE(study.at_error[2].ida_cpu_seconds.has_value());
   EXPECT_FALSE(study.at_error[2].ratio.has_value());
   EXPECT_FALSE(study.at_error[3].cpu_seconds.has_value());
-  for (std::size_t i : {4u, 5u}) {
-    EXPECT_FALSE(study.at_error[i].cpu_seconds.has_value());  // 1e-9: nobody
+  for (std::size_t i : {4u, 5u, 6u, 7u}) {
+    EXPECT_FALSE(study.at_error[i].cpu_seconds.has_value());  // 1e-9 and 1e-12: nobody
     EXPECT_FALSE(study.at_error[i].best);
   }
   const auto json = nlohmann::json::parse(studies_json({study}));
@@ -141,16 +141,18 @@ TEST(ConvergenceStudy, BudgetEndsTheLadderAndSaysSo) {
   for (const StudyRow& row : study.rows) EXPECT_TRUE(row.ok());
 }
 
-TEST(ConvergenceStudy, IdaRowsCarryTheirOwnErrorEstimate) {
+TEST(ConvergenceStudy, RowsOfTheYardsticksCarryTheirOwnErrorEstimate) {
   StudyOptions options = short_study("knife_edge");
   options.rtols = {1e-8, 1e-5};
   const Study study = study_of("knife_edge", options);
-  std::vector<StudyRow> ida;
+  std::vector<StudyRow> yardsticks;
   for (const StudyRow& row : study.rows)
-    if (row.is_ida()) ida.push_back(row);
-  ASSERT_EQ(ida.size(), 2u);
-  EXPECT_EQ(ida[0].rtol, 1e-5);
-  for (const StudyRow& row : ida) {
+    if (row.is_yardstick()) yardsticks.push_back(row);
+  ASSERT_EQ(yardsticks.size(), 4u);
+  EXPECT_EQ(yardsticks[0].method, ida_method);
+  EXPECT_EQ(yardsticks[2].method, erk_method);
+  EXPECT_EQ(yardsticks[0].rtol, 1e-5);
+  for (const StudyRow& row : yardsticks) {
     EXPECT_TRUE(row.ok()) << row.status;
     // An estimate by a ten to a thousand times tighter run has the size of the error itself.
     EXPECT_LT(row.self_error, 10.0 * row.error());

@@ -22,8 +22,8 @@ namespace {
 constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
 constexpr double infinite = std::numeric_limits<double>::infinity();
 
-IdaOptions at(double rtol) {
-  IdaOptions options;
+ReferenceOptions at(double rtol) {
+  ReferenceOptions options;
   options.rtol = rtol;
   options.max_steps = 50'000;  // twice what the longest run needs: a broken system fails soon
   return options;
@@ -173,25 +173,27 @@ class Catalogue : public ::testing::TestWithParam<Bounds> {};
 
 TEST_P(Catalogue, ErrorFallsWithTheTolerance) {
   const CatalogueScene entry = make_scene(GetParam().scene);
-  double previous = infinite, rtol = 1e-6;
+  double first = infinite, last = infinite, rtol = 1e-6;
   for (const double bound : GetParam().error) {
-    const IdaRun run = integrate_with_ida(*entry.scene, entry.t_end, at(rtol));
+    const ReferenceRun run = integrate_with_ida(*entry.scene, entry.t_end, at(rtol));
     ASSERT_TRUE(run.ok()) << run.failure;
     EXPECT_EQ(run.end.time, entry.t_end);
     const double reached = error(entry, run.end);
     EXPECT_LT(reached, bound) << "rtol " << rtol;
-    EXPECT_LT(reached, 0.5 * previous) << "rtol " << rtol;
     // The rows are equations of the system: only the Newton iteration's tolerance is left in them.
     EXPECT_LT(row_residual(*entry.scene, run.end), rtol) << "rtol " << rtol;
-    previous = reached;
+    if (first == infinite) first = reached;
+    last = reached;
     rtol *= 1e-2;
   }
+  // A single tolerance may be lucky: the round-off of the start alone moves its error tenfold.
+  EXPECT_LT(last, 1e-2 * first);
 }
 
 TEST_P(Catalogue, EveryToleranceCompletes) {
   const CatalogueScene entry = make_scene(GetParam().scene);
   for (int digits = 1; digits <= 14; ++digits) {
-    const IdaRun run = integrate_with_ida(*entry.scene, 2.0, at(std::pow(10.0, -digits)));
+    const ReferenceRun run = integrate_with_ida(*entry.scene, 2.0, at(std::pow(10.0, -digits)));
     EXPECT_TRUE(run.ok()) << "rtol 1e-" << digits << ": " << run.failure;
     if (digits < 4) continue;
     // A wrong block of the Jacobian shows here as well; measured with the right one: at most 2.8 and 0.4 per
@@ -204,7 +206,7 @@ TEST_P(Catalogue, EveryToleranceCompletes) {
 TEST_P(Catalogue, EndIsConsistentWithItself) {
   const CatalogueScene entry = make_scene(GetParam().scene);
   const Scene& scene = *entry.scene;
-  const IdaRun run = integrate_with_ida(scene, 1.0, at(1e-8));
+  const ReferenceRun run = integrate_with_ida(scene, 1.0, at(1e-8));
   ASSERT_TRUE(run.ok()) << run.failure;
   Vector force(scene.dimension()), momentum(scene.dimension());
   scene.lagrangian->gradient(1.0, run.end.q, run.end.v, force, momentum);
@@ -226,7 +228,7 @@ INSTANTIATE_TEST_SUITE_P(Ida, Catalogue,
 TEST(IdaReference, ForceOfTheKnifeEdgeIsTheClosedForm) {
   const CatalogueScene entry = make_scene("knife_edge");
   for (const double t : {0.5, 2.0, 10.0}) {
-    const IdaRun run = integrate_with_ida(*entry.scene, t, at(1e-10));
+    const ReferenceRun run = integrate_with_ida(*entry.scene, t, at(1e-10));
     ASSERT_TRUE(run.ok()) << run.failure;
     ASSERT_EQ(run.end.lambda.size(), 1);
     const double slope = entry.parameters.at("g_sin_alpha");
@@ -243,7 +245,7 @@ TEST(IdaReference, MovingStartsOfThePendulumComplete) {
         Scene scene = *entry.scene;
         scene.start.q << std::sin(angle), -std::cos(angle);
         scene.start.v << speed * std::cos(angle), speed * std::sin(angle);
-        const IdaRun run = integrate_with_ida(scene, 0.5, at(rtol));
+        const ReferenceRun run = integrate_with_ida(scene, 0.5, at(rtol));
         ASSERT_TRUE(run.ok()) << "angle " << angle << ", speed " << speed << ": " << run.failure;
         EXPECT_LT(run.steps, 20'000) << "angle " << angle << ", speed " << speed << ", rtol " << rtol;
         EXPECT_LT(row_residual(scene, run.end), 10.0 * rtol * std::max(1.0, speed));
@@ -254,7 +256,7 @@ TEST(IdaReference, MovingStartsOfThePendulumComplete) {
 // closed forms
 
 TEST(IdaReference, FollowsAffineRowsThatDependOnTime) {
-  const IdaRun run = integrate_with_ida(driven_particle(), 5.0, at(1e-10));
+  const ReferenceRun run = integrate_with_ida(driven_particle(), 5.0, at(1e-10));
   ASSERT_TRUE(run.ok()) << run.failure;
   EXPECT_NEAR(run.end.q[0], std::cos(5.0) - 1.0, 1e-7);
   EXPECT_NEAR(run.end.q[1], 5.0, 1e-7);
@@ -263,7 +265,7 @@ TEST(IdaReference, FollowsAffineRowsThatDependOnTime) {
 }
 
 TEST(IdaReference, FollowsHolonomicRowsThatDependOnTime) {
-  const IdaRun run = integrate_with_ida(bead_on_turning_line(), 2.0, at(1e-10));
+  const ReferenceRun run = integrate_with_ida(bead_on_turning_line(), 2.0, at(1e-10));
   ASSERT_TRUE(run.ok()) << run.failure;
   const double r = std::cosh(2.0), rate = std::sinh(2.0), c = std::cos(2.0), s = std::sin(2.0);
   EXPECT_NEAR(run.end.q[0], r * c, 1e-7);
@@ -274,7 +276,7 @@ TEST(IdaReference, FollowsHolonomicRowsThatDependOnTime) {
 }
 
 TEST(IdaReference, FollowsALagrangianThatDependsOnTime) {
-  const IdaRun run = integrate_with_ida(damped_oscillator(), 3.0, at(1e-10));
+  const ReferenceRun run = integrate_with_ida(damped_oscillator(), 3.0, at(1e-10));
   ASSERT_TRUE(run.ok()) << run.failure;
   const double w = std::sqrt(0.75), decay = std::exp(-1.5);
   const double q = decay * (std::cos(3.0 * w) + std::sin(3.0 * w) / (2.0 * w));
@@ -292,7 +294,7 @@ TEST(IdaReference, TakesAHamiltonianAndAMomentumInstead) {
   });
   scene.start.p = scene.start.v;
   scene.start.v = {};
-  const IdaRun run = integrate_with_ida(scene, 3.0, at(1e-10));
+  const ReferenceRun run = integrate_with_ida(scene, 3.0, at(1e-10));
   ASSERT_TRUE(run.ok()) << run.failure;
   EXPECT_NEAR(run.end.q[0], std::cos(3.0), 1e-7);
   EXPECT_NEAR(run.end.p[0], -std::sin(3.0), 1e-7);
@@ -300,7 +302,7 @@ TEST(IdaReference, TakesAHamiltonianAndAMomentumInstead) {
 
 TEST(IdaReference, SolvesLargeScenesOnASparsePattern) {
   const Scene scene = tied_oscillators();
-  const IdaRun run = integrate_with_ida(scene, 2.0, at(1e-10));
+  const ReferenceRun run = integrate_with_ida(scene, 2.0, at(1e-10));
   ASSERT_TRUE(run.ok()) << run.failure;
   for (int i = 0; i < tied; ++i) {
     const double stiffness = 2.0 * (i / 2) + 1.5;  // the mean of the pair
@@ -316,8 +318,8 @@ TEST(IdaReference, FollowsForces) {
   Scene scene = make<1>(formula, {}, {1.0}, {0.0});
   scene.force = force<1>(
       []<class T>(const std::array<T, 1>&, const std::array<T, 1>& v) { return std::array<T, 1>{-v[0]}; });
-  const IdaRun run = integrate_with_ida(scene, 3.0, at(1e-10));
-  const IdaRun same = integrate_with_ida(damped_oscillator(), 3.0, at(1e-10));
+  const ReferenceRun run = integrate_with_ida(scene, 3.0, at(1e-10));
+  const ReferenceRun same = integrate_with_ida(damped_oscillator(), 3.0, at(1e-10));
   ASSERT_TRUE(run.ok()) << run.failure;
   EXPECT_NEAR(run.end.q[0], same.end.q[0], 1e-7);
   EXPECT_NEAR(run.end.v[0], same.end.v[0], 1e-7);
@@ -325,10 +327,10 @@ TEST(IdaReference, FollowsForces) {
 
 TEST(IdaReference, AbsoluteToleranceIsUsed) {
   const CatalogueScene entry = make_scene("pendulum_cartesian");
-  IdaOptions coarse = at(1e-10);
+  ReferenceOptions coarse = at(1e-10);
   coarse.atol = 1e-4;
-  const IdaRun fine = integrate_with_ida(*entry.scene, 2.0, at(1e-10));
-  const IdaRun run = integrate_with_ida(*entry.scene, 2.0, coarse);
+  const ReferenceRun fine = integrate_with_ida(*entry.scene, 2.0, at(1e-10));
+  const ReferenceRun run = integrate_with_ida(*entry.scene, 2.0, coarse);
   ASSERT_TRUE(run.ok()) << run.failure;
   EXPECT_LT(3 * run.steps, fine.steps);
   EXPECT_GT(error(entry, run.end), 100.0 * error(entry, fine.end));
@@ -343,11 +345,11 @@ TEST(IdaReference, BadOptionsAreMisuse) {
   for (const double t_end : {0.0, -1.0, infinite, not_a_number})
     EXPECT_THROW((void)integrate_with_ida(scene, t_end, at(1e-6)), Misuse) << t_end;
   for (const double atol : {-1e-6, infinite, not_a_number}) {
-    IdaOptions options;
+    ReferenceOptions options;
     options.atol = atol;
     EXPECT_THROW((void)integrate_with_ida(scene, 1.0, options), Misuse) << atol;
   }
-  IdaOptions no_steps;
+  ReferenceOptions no_steps;
   no_steps.max_steps = 0;
   EXPECT_THROW((void)integrate_with_ida(scene, 1.0, no_steps), Misuse);
 }
@@ -363,10 +365,10 @@ TEST(IdaReference, BadScenesAreMisuse) {
 
 TEST(IdaReference, TooManyStepsAreAFailureThatKeepsTheState) {
   const CatalogueScene entry = make_scene("pendulum_cartesian");
-  IdaOptions options = at(1e-8);
+  ReferenceOptions options = at(1e-8);
   options.max_steps = 200;
   ::testing::internal::CaptureStderr();
-  const IdaRun run = integrate_with_ida(*entry.scene, entry.t_end, options);
+  const ReferenceRun run = integrate_with_ida(*entry.scene, entry.t_end, options);
   EXPECT_EQ(::testing::internal::GetCapturedStderr(), "");
   EXPECT_FALSE(run.ok());
   EXPECT_NE(run.failure.find("IDA_TOO_MUCH_WORK at t = "), std::string::npos) << run.failure;
@@ -383,9 +385,9 @@ TEST(IdaReference, LeavingTheDomainIsAFailure) {
     const T w = 1.0 - q[0];
     return 0.5 * v[0] * v[0] - w * w * sqrt(w);
   };
-  IdaOptions options = at(1e-6);
+  ReferenceOptions options = at(1e-6);
   options.max_steps = 5'000;  // it creeps towards the boundary with ever shorter steps
-  const IdaRun run = integrate_with_ida(make<1>(formula, {}, {0.0}, {1.0}), 10.0, options);
+  const ReferenceRun run = integrate_with_ida(make<1>(formula, {}, {0.0}, {1.0}), 10.0, options);
   EXPECT_EQ(run.failure.find("IDA_"), 0U) << run.failure;
   EXPECT_GT(run.end.time, 0.1);
   EXPECT_NEAR(run.end.q[0], 1.0, 1e-4);
@@ -395,7 +397,7 @@ TEST(IdaReference, LeavingTheDomainIsAFailure) {
 TEST(IdaReference, DependentRowsAreAFailureAtTheStart) {
   Scene scene = driven_particle();
   scene.constraints.push_back(scene.constraints.front());
-  const IdaRun run = integrate_with_ida(scene, 1.0, {});
+  const ReferenceRun run = integrate_with_ida(scene, 1.0, {});
   EXPECT_EQ(run.failure.find("start: "), 0U) << run.failure;
   EXPECT_EQ(run.end.time, 0.0);
   EXPECT_EQ(run.end.q, scene.start.q);
@@ -412,8 +414,8 @@ TEST(IdaReference, ExceptionsOfTheSceneComeThrough) {
 
 TEST(IdaReference, RunsAreReproducibleBitByBit) {
   const CatalogueScene entry = make_scene("knife_edge");
-  const IdaRun one = integrate_with_ida(*entry.scene, 5.0, at(1e-9));
-  const IdaRun two = integrate_with_ida(*entry.scene, 5.0, at(1e-9));
+  const ReferenceRun one = integrate_with_ida(*entry.scene, 5.0, at(1e-9));
+  const ReferenceRun two = integrate_with_ida(*entry.scene, 5.0, at(1e-9));
   EXPECT_EQ(one.end.q, two.end.q);
   EXPECT_EQ(one.end.v, two.end.v);
   EXPECT_EQ(one.steps, two.steps);

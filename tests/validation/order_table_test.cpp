@@ -47,18 +47,37 @@ TEST(OrderTable, AOneSidedRuleForTheRowsIsFoundOut) {
   const Registry registry = Registry::with_built_ins();
   for (const OrderScene& scene : scenes()) {
     if (scene.constraint_class != "nonholonomic") continue;
-    const MeasuredOrder measured =
+    const OrderMeasurement measured =
         measure_order(registry, scene, {.method = "type1/midpoint", .constraint_rule = StepRule::left});
     EXPECT_NEAR(measured.order, 1.0, 0.1);
     EXPECT_FALSE(holds({"type1/midpoint", 2, {measured}, 0.0, 0.0, 0.0}));
   }
 }
 
+TEST(OrderTable, EveryRuleForTheRowsHasTheOrderThatIsStated) {
+  for (const OrderScene& scene : scenes()) {
+    if (scene.constraint_class != "nonholonomic") continue;
+    const std::vector<RuleRow> rows = measure_rules(Registry::with_built_ins(), scene);
+    EXPECT_EQ(rows.size(), 7U);
+    for (const RuleRow& row : rows) EXPECT_TRUE(holds(row)) << row.method << " of order " << row.order;
+    RuleRow wrong = rows[2];  // type1/midpoint with the left rule is of order 1
+    wrong.expected[0] = 2;
+    EXPECT_FALSE(holds(wrong));
+  }
+}
+
+TEST(OrderTable, DegenerateCircuitsKeepEveryOrder) {
+  const std::vector<CircuitRow> rows = measure_circuit(Registry::with_built_ins());
+  EXPECT_GT(rows.size(), 20U);
+  for (const CircuitRow& row : rows)
+    EXPECT_TRUE(holds(row)) << row.method << " of order " << row.order << " measured " << row.measured.order;
+}
+
 TEST(OrderTable, TheUnprojectedMomentumIsOneOrderLower) {
   const Registry registry = Registry::with_built_ins();
   for (const OrderScene& scene : scenes()) {
     if (scene.constraint_class != "nonholonomic") continue;
-    const MeasuredOrder measured =
+    const OrderMeasurement measured =
         measure_order(registry, scene, {.method = "type1/midpoint"}, Momentum::plus);
     EXPECT_NEAR(measured.order, 1.0, 0.1);
   }

@@ -31,11 +31,11 @@ struct Measurement {
 };
 using Measurements = std::vector<Measurement>;
 
-std::string scene_table() {
+std::string scene_table(const Session& session) {
   std::vector<std::vector<std::string>> rows{
       {"scene", "class", "coordinates", "rows", "t_end", "step", "parameters", "description"}};
-  for (const auto& name : scene_names()) {
-    const CatalogueScene entry = make_scene(name);
+  for (const auto& name : scene_names(session)) {
+    const CatalogueScene entry = make_scene(session, name);
     std::vector<std::string> parameters;
     for (const auto& [key, value] : entry.parameters)
       parameters.push_back(fmt::format("{}={:.6g}", key, value));
@@ -48,10 +48,10 @@ std::string scene_table() {
   return aligned(rows);
 }
 
-Json scene_json() {
+Json scene_json(const Session& session) {
   Json scenes = Json::array();
-  for (const auto& name : scene_names()) {
-    const CatalogueScene entry = make_scene(name);
+  for (const auto& name : scene_names(session)) {
+    const CatalogueScene entry = make_scene(session, name);
     Json parameters = Json::object();
     for (const auto& [key, value] : entry.parameters) parameters[key] = value;
     scenes.push_back({{"name", name},
@@ -73,8 +73,8 @@ Json scene_json() {
 Measurements measure(const std::string& method, const Session& session, Progress& progress) {
   constexpr double natural_steps = 11.3;  // length of the motions, no multiple of a period
   Measurements measurements;
-  for (const auto& name : scene_names()) {
-    const CatalogueScene entry = make_scene(name);
+  for (const auto& name : ::diracstep::scene_names()) {
+    const CatalogueScene entry = ::diracstep::make_scene(name);
     const double start = entry.scene->start.time;
     const double end = std::min(entry.t_end, start + natural_steps * entry.natural_step);
     if (!entry.needs.empty() || !entry.reference.at || !entry.reference.at(end)) continue;
@@ -140,6 +140,32 @@ Json method_json(const Session& session, const std::vector<Measurements>& measur
   return methods;
 }
 
+std::string plugin_table(const Session& session) {
+  if (session.plugins.empty())
+    return "no plugin is loaded; --plugin FILE.so and DIRACSTEP_PLUGIN_PATH load them\n";
+  std::vector<std::vector<std::string>> rows{
+      {"plugin", "interface", "methods", "rules", "scenes", "file", "description"}};
+  for (const Plugin& plugin : session.plugins)
+    rows.push_back({plugin.name(), fmt::format("{}", DIRACSTEP_PLUGIN_VERSION),
+                    fmt::format("{}", fmt::join(plugin.methods(), " ")),
+                    fmt::format("{}", fmt::join(plugin.rules(), " ")),
+                    fmt::format("{}", fmt::join(plugin.scenes(), " ")), plugin.path(), plugin.description()});
+  return aligned(rows);
+}
+
+Json plugin_json(const Session& session) {
+  Json plugins = Json::array();
+  for (const Plugin& plugin : session.plugins)
+    plugins.push_back({{"name", plugin.name()},
+                       {"interface", DIRACSTEP_PLUGIN_VERSION},
+                       {"file", plugin.path()},
+                       {"description", plugin.description()},
+                       {"methods", plugin.methods()},
+                       {"rules", plugin.rules()},
+                       {"scenes", plugin.scenes()}});
+  return plugins;
+}
+
 std::vector<Measurements> measure_all(const Session& session) {
   Progress progress;
   std::vector<Measurements> measured;
@@ -154,16 +180,16 @@ void list(const Options& options, Session& session) {
   Json json = Json::object();
   std::vector<std::string> tables;
   if (wanted("scenes")) {
-    json["scenes"] = scene_json();
-    tables.push_back(scene_table());
+    json["scenes"] = scene_json(session);
+    tables.push_back(scene_table(session));
   }
   if (wanted("methods")) {
     json["methods"] = method_json(session, measured);
     tables.push_back(method_table(session, measured));
   }
   if (wanted("plugins")) {
-    json["plugins"] = Json::array();
-    tables.emplace_back("no plugin is loaded\n");
+    json["plugins"] = plugin_json(session);
+    tables.push_back(plugin_table(session));
   }
   print(options.json ? json.dump(2) + '\n' : fmt::format("{}", fmt::join(tables, "\n")));
   if (!interrupted()) return;

@@ -4,11 +4,13 @@
 #include <cmath>
 #include <diracstep/core/integrator.hpp>
 #include <diracstep/validation/command/arguments.hpp>
+#include <diracstep/validation/command/variable_steps.hpp>
 #include <diracstep/validation/command/verbs.hpp>
 #include <diracstep/validation/report.hpp>
 #include <diracstep/validation/scene_catalogue.hpp>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 namespace diracstep::command {
 
@@ -16,52 +18,76 @@ namespace {
 
 struct Options {
   std::string scene;
-  std::string method = "type1/midpoint";
+  std::string method = automatic_method;
   int order = 0;
+  std::optional<std::string> rule;
+  bool adaptive = false;
+  double eps = 0.2;
   std::vector<std::string> set;
   bool json = false;
 };
 
-std::string as_json(const Integrator& integrator) {
+std::string as_json(const Integrator& integrator, const std::vector<PlanLine>& lines) {
   nlohmann::ordered_json json;
   json["scene"] = integrator.scene().name;
   json["method"] = integrator.options().method;
   json["order"] = integrator.options().order;
   json["plan"] = nlohmann::ordered_json::array();
-  for (const PlanLine& line : integrator.plan())
+  for (const PlanLine& line : lines)
     json["plan"].push_back({{"item", line.item}, {"decision", line.decision}, {"reason", line.reason}});
   return json.dump(2) + '\n';
 }
 
-std::string as_text(const Integrator& integrator) {
+std::string as_text(const Integrator& integrator, const std::vector<PlanLine>& lines) {
   std::vector<std::vector<std::string>> rows{{"item", "decision", "reason"}};
-  for (const PlanLine& line : integrator.plan()) rows.push_back({line.item, line.decision, line.reason});
+  for (const PlanLine& line : lines) rows.push_back({line.item, line.decision, line.reason});
   return fmt::format("{} with {}, order {}\n\n{}", integrator.scene().name, integrator.options().method,
                      integrator.options().order, aligned(rows));
 }
 
 void plan(const Options& options, Session& session) {
-  const CatalogueScene entry = make_scene(options.scene, parameters(options.set));
-  const Integrator integrator(entry.scene, session.registry, session.solvers,
-                              {options.method, options.order, entry.natural_step, {}});
-  print(options.json ? as_json(integrator) : as_text(integrator));
+  const CatalogueScene entry = make_scene(session, options.scene, parameters(options.set));
+  const Integrator integrator(
+      entry.scene, session.registry, session.solvers,
+      {options.method, options.order, entry.natural_step, rule(session, options.rule)});
+  std::vector<PlanLine> lines = integrator.plan();
+  if (options.adaptive) {
+    const IntegratorOptions used{.method = options.method,
+                                 .order = options.order,
+                                 .step = entry.natural_step,
+                                 .constraint_rule = rule(session, options.rule)};
+    lines = AdaptiveIntegrator(entry.scene, session.registry, session.solvers, used,
+                               {.eps = options.eps, .end = entry.t_end})
+                .plan();
+  }
+  lines.push_back(pace_line(*entry.scene, session.solvers, entry.t_end));
+  print(options.json ? as_json(integrator, lines) : as_text(integrator, lines));
 }
 
 }  // namespace
 
 void add_plan(CLI::App& app, Session& session) {
   CLI::App* verb = app.add_subcommand("plan", "What is assembled for a scene, and what is left out and why");
+  add_solver_options(*verb, session);
   const auto options = std::make_shared<Options>();
   verb->add_option("SCENE", options->scene, "A scene; see diracstep list scenes")->required();
-  verb->add_option("--method", options->method, "A method; see diracstep list methods")
+  verb->add_option(
+          "--method", options->method,
+          "A method; see diracstep list methods.  auto: GL(S) of the order asked for, or as plan says")
       ->capture_default_str();
-  verb->add_option("--order", options->order, "Compose to this order; 0 keeps the method's own")
+  verb->add_option("--order", options->order,
+                   "Order; methods of another one are composed to it.  0 keeps the method's own")
       ->capture_default_str();
+  verb->add_option("--rule", options->rule,
+                   "Rule for nonholonomic rows: left, right, midpoint, trapezoidal or one of a plugin;\n"
+                   "the method's own without it");
+  verb->add_flag("--adaptive", options->adaptive, "The plan of reversible steps of varying size");
+  verb->add_option("--eps", options->eps, "Radians of a step of varying size")->capture_default_str();
   verb->add_option("--set", options->set, "Set a parameter of the scene; may be repeated")
       ->type_name("NAME=VALUE")
       ->allow_extra_args(false);
   verb->add_flag("--json", options->json, "One JSON document on standard output");
-  verb->footer("Example:  diracstep plan knife_edge --method type1/midpoint");
+  verb->footer("Example:  diracstep plan knife_edge --method type1/midpoint --order 4");
   verb->callback([options, &session] { plan(*options, session); });
 }
 

@@ -1,10 +1,12 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <diracstep/validation/command/interrupt.hpp>
 #include <diracstep/validation/command/run_control.hpp>
 #include <diracstep/validation/convergence_study.hpp>
+#include <diracstep/validation/energy_doubt.hpp>
 #include <diracstep/validation/progress.hpp>
 
 namespace diracstep::command {
@@ -14,6 +16,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr long steps_between_looks = 256;
+constexpr long points_looked_at = 400;  ///< for the energy
 constexpr auto between_checkpoints = std::chrono::seconds(10);
 
 class Run {
@@ -23,6 +26,8 @@ class Run {
         integrator_(integrator),
         keeping_(keeping),
         result_(result),
+        doubt_(integrator.scene()),
+        every_look_(std::max(1L, steps / points_looked_at)),
         next_checkpoint_(Clock::now() + between_checkpoints),
         progress_(static_cast<double>(integrator.work().steps) / static_cast<double>(steps)) {}
 
@@ -37,7 +42,10 @@ class Run {
       }
       ++k;
       if (k == steps_ || checkpoint_due(k)) save();
-      if (wanted(k)) keep();
+      if (wanted(k))
+        keep();
+      else if (k % every_look_ == 0)
+        look();
       if (k % steps_between_looks == 0) show(k);
     }
     if (result_.failure.empty() && k < steps_) {
@@ -46,6 +54,7 @@ class Run {
     }
     if (integrator_.time() != kept_time_) keep();
     result_.work = integrator_.work();
+    result_.doubt = doubt_.text();
   }
 
  private:
@@ -75,8 +84,14 @@ class Run {
       return;
     }
     kept_time_ = integrator_.time();
+    doubt_.see(sample);
     if (keeping_.file != nullptr) keeping_.file->write(sample);
     result_.end = std::move(sample);
+  }
+
+  /// At the energy only; a point that cannot be read is told of where it is kept.
+  void look() {
+    if (integrator_.sample(Momentum::projected, looked_at_).ok()) doubt_.see(looked_at_);
   }
 
   void show(long k) {
@@ -88,6 +103,9 @@ class Run {
   Integrator& integrator_;
   const Keeping& keeping_;
   RunResult& result_;
+  EnergyDoubt doubt_;
+  long every_look_;
+  Sample looked_at_;
   double kept_time_ = std::nan("");
   Clock::time_point next_checkpoint_;
   Progress progress_;
@@ -133,6 +151,7 @@ std::vector<std::pair<std::string, std::string>> identity(const CatalogueScene& 
   run.emplace_back("order", std::to_string(options.order));
   run.emplace_back("step", fmt::format("{:.17g}", options.step));
   run.emplace_back("substeps", std::to_string(options.substeps));
+  run.emplace_back("compensated sums", options.compensated_sums ? "yes" : "no");
   run.emplace_back("trajectory", to_file ? fmt::format("every {}", keeping.every) : "none");
   run.emplace_back("momentum", diracstep::name(keeping.momentum));
   return run;

@@ -13,10 +13,10 @@ namespace diracstep::command {
 /// What a run keeps on its way.
 struct Keeping {
   Momentum momentum = Momentum::projected;
-  long every = 1;                                             ///< each so many points go to the file
-  TrajectoryFile* file = nullptr;                             ///< none: only the end is read
+  long every = 1;                                                  ///< each so many points go to the file
+  TrajectoryFile* file = nullptr;                                  ///< none: only the end is read
   std::string checkpoint = {};                                     ///< path, or empty
-  long checkpoint_every = 0;                                  ///< steps; 0: every ten seconds
+  long checkpoint_every = 0;                                       ///< steps; 0: every ten seconds
   std::vector<std::pair<std::string, std::string>> identity = {};  ///< of the run, for the checkpoint
 };
 

@@ -63,6 +63,47 @@ std::string retries_text(const Retries& retries) {
   return text + '\n';
 }
 
+std::string search_text(const ErrorControlReport& search) {
+  std::string text = search_table(search);
+  if (search.ok())
+    text += fmt::format("estimated error {:.2e}, observed order {:.1f}, {} solves in all\n", search.estimate,
+                        search.observed_order, search.work.solves);
+  return text + (search.warning.empty() ? "" : "warning: " + search.warning + "\n") + "\n";
+}
+
+Json variable_json(const VariableSteps& steps) {
+  const ControlReport& report = steps.report;
+  return {{"eps", steps.eps},
+          {"control", name(steps.control)},
+          {"smallest_step", number(report.smallest_step)},
+          {"largest_step", report.largest_step},
+          {"pace_ratio", number(report.fastest / report.slowest)},
+          {"resets", report.resets},
+          {"side_steps", report.side_steps},
+          {"accelerations", report.accelerations}};
+}
+
+Json search_json(const ErrorControlReport& search) {
+  Json json{{"adaptive", search.adaptive},
+            {"reason", search.reason},
+            {"step", search.step},
+            {"estimate", number(search.estimate)},
+            {"observed_order", number(search.observed_order)},
+            {"warning", search.warning.empty() ? Json(nullptr) : Json(search.warning)},
+            {"refusal", search.refusal.empty() ? Json(nullptr) : Json(search.refusal)},
+            {"solves", search.work.solves},
+            {"runs", Json::array()}};
+  for (const ErrorControlRun& run : search.runs)
+    json["runs"].push_back({{"step", run.step},
+                            {"steps", run.steps},
+                            {"solves", run.solves},
+                            {"difference", number(run.difference)},
+                            {"estimate", number(run.estimate)},
+                            {"observed_order", number(run.observed_order)},
+                            {"status", run.failure.empty() ? "ok" : run.failure}});
+  return json;
+}
+
 }  // namespace
 
 void compare_with_reference(RunResult& result, const CatalogueScene& entry, const Scene& scene) {
@@ -74,9 +115,13 @@ void compare_with_reference(RunResult& result, const CatalogueScene& entry, cons
 }
 
 std::string run_text(const RunResult& result, const CatalogueScene& entry, const IntegratorOptions& options) {
-  std::string text =
-      fmt::format("{}: {}, order {}, {} steps of {:g}, momentum {}\n", entry.scene->name, options.method,
-                  options.order, result.work.steps, options.step, name(result.momentum));
+  const bool fixed = !result.variable && !(result.search && result.search->adaptive);
+  std::string text = result.search ? search_text(*result.search) : "";
+  text +=
+      fmt::format("{}: {}, order {}, {} {}, momentum {}\n", entry.scene->name, options.method, options.order,
+                  result.work.steps, fixed ? fmt::format("steps of {:g}", options.step) : "variable steps",
+                  name(result.momentum));
+  if (result.variable) text += summary(*result.variable);
   if (result.has_end()) {
     text += fmt::format("\nt = {:.15g}\n{}energy: {:.15g}, changed by {:.2e}\n", result.end.time,
                         end_table(result.end, *entry.scene), result.end.energy, result.check.energy_error);
@@ -99,9 +144,11 @@ std::string run_json(const RunResult& result, const CatalogueScene& entry, const
             {"method", options.method},
             {"order", options.order},
             {"momentum", name(result.momentum)},
-            {"step", options.step},
+            {"step", result.variable || (result.search && result.search->adaptive) ? Json(nullptr)
+                                                                                   : Json(options.step)},
             {"status", result.failure.empty() ? "ok" : result.failure}};
   for (const auto& [key, value] : entry.parameters) json["parameters"][key] = number(value);
+  json["doubt"] = result.doubt.empty() ? Json(nullptr) : Json(result.doubt);
   json["end"] = end_json(result, *entry.scene);
   json["error_q"] = number(check.error_q);
   json["error_p"] = number(check.error_p);
@@ -114,6 +161,8 @@ std::string run_json(const RunResult& result, const CatalogueScene& entry, const
   json["retries"] = retries_json(result.work.retries);
   json["out"] = result.out.empty() ? Json(nullptr) : Json(result.out);
   json["points"] = result.lines;
+  if (result.variable) json["adaptive"] = variable_json(*result.variable);
+  if (result.search) json["error_control"] = search_json(*result.search);
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + '\n';
 }
 

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <diracstep/validation/command/variable_steps.hpp>
 #include <diracstep/validation/study_run.hpp>
+#include <optional>
 #include <string>
 
 namespace diracstep::command {
@@ -11,9 +13,12 @@ struct RunResult {
   Momentum momentum = Momentum::projected;
   Sample end;  ///< the last point that could be read; empty columns where there is none
   Work work;
-  StudyRow check;   ///< errors against the reference at that time, rows and energy
-  std::string out;  ///< the file written, if any
-  long lines = 0;   ///< points in it
+  std::optional<VariableSteps> variable;     ///< where the steps varied
+  std::optional<ErrorControlReport> search;  ///< where an error was asked for
+  StudyRow check;                            ///< errors against the reference at that time, rows and energy
+  std::string doubt;                         ///< empty, or why the points are not to be believed
+  std::string out;                           ///< the file written, if any
+  long lines = 0;                            ///< points in it
 
   bool has_end() const { return end.q.size() > 0; }
 };

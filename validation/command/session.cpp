@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <CLI/App.hpp>
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
@@ -16,6 +17,23 @@ namespace {
 }
 
 }  // namespace
+
+void add_solver_options(CLI::App& verb, Session& session) {
+  verb.add_option_function<std::string>(
+      "--solver",
+      [&session](const std::string& name) {
+        session.solver_options.iteration = iteration(name);
+        session.solvers = kinsol(session.solver_options);
+      },
+      "How a step is solved: newton; fixed-point where the step has a splitting; automatic");
+  verb.add_option_function<std::string>(
+      "--jacobian",
+      [&session](const std::string& name) {
+        session.solver_options.jacobian = jacobian_policy(name);
+        session.solvers = kinsol(session.solver_options);
+      },
+      "When Newton's method takes a new Jacobian: automatic, fresh, per-step, kept");
+}
 
 void say(std::string_view message) { fmt::print(stderr, "diracstep: {}\n", message); }
 

@@ -1,9 +1,17 @@
 #pragma once
 
 #include <diracstep/core/registry.hpp>
+#include <diracstep/plugins/loaded_plugin.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
+#include <diracstep/validation/scene_catalogue.hpp>
+#include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
+
+namespace CLI {
+class App;
+}
 
 namespace diracstep::command {
 
@@ -15,9 +23,28 @@ inline constexpr int misused = 2;
 /// What the verbs share.
 struct Session {
   Registry registry = Registry::with_built_ins();
+  KinsolOptions solver_options = {};
   SolverFactory solvers = kinsol();
+  std::vector<std::string> plugin_files;  ///< as given by --plugin
+  std::vector<Plugin> plugins;            ///< those and the ones on DIRACSTEP_PLUGIN_PATH
   int exit_status = done;
 };
+
+/// Loads the plugins on DIRACSTEP_PLUGIN_PATH, telling of those that cannot be loaded and going on, and then
+/// the files of the session; throws Misuse where one of these cannot be loaded.
+void load_plugins(Session& session);
+
+/// A scene of a plugin or of the catalogue, or a file; throws Misuse as diracstep::make_scene does.
+CatalogueScene make_scene(const Session& session, const std::string& name, const Parameters& changes = {});
+
+/// Names of the catalogue's scenes and of those of plugins.
+std::vector<std::string> scene_names(const Session& session);
+
+/// The rule for nonholonomic rows that was asked for by name, if one was.
+std::optional<StepRule> rule(const Session& session, const std::optional<std::string>& name);
+
+/// Adds --solver and --jacobian, which change the session's solvers when the command line is read.
+void add_solver_options(CLI::App& verb, Session& session);
 
 /// A message for a person, on standard error.
 void say(std::string_view message);

@@ -2,72 +2,95 @@
 
 #include <CLI/App.hpp>
 #include <algorithm>
-#include <cerrno>
-#include <cstring>
 #include <diracstep/core/errors.hpp>
+#include <diracstep/validation/build_facts.hpp>
 #include <diracstep/validation/command/arguments.hpp>
 #include <diracstep/validation/command/interrupt.hpp>
+#include <diracstep/validation/command/output_file.hpp>
+#include <diracstep/validation/command/scene_selection.hpp>
 #include <diracstep/validation/command/verbs.hpp>
 #include <diracstep/validation/plot.hpp>
 #include <diracstep/validation/progress.hpp>
 #include <diracstep/validation/report.hpp>
+#include <diracstep/validation/study_comparison.hpp>
+#include <diracstep/validation/study_page.hpp>
 #include <filesystem>
+#include <fstream>
 #include <memory>
 #include <optional>
+#include <sstream>
 
 namespace diracstep::command {
 
 namespace {
 
-/// What a study without scenes runs: one of each constraint class with a closed form.
-const std::vector<std::string> published_scenes{"kepler_e06", "pendulum_cartesian", "knife_edge",
-                                                "nonholonomic_particle_free"};
+/// What a study without scenes runs: scenes of every constraint class, in a few minutes.
+const std::vector<std::string> fair_selection{"kepler_e06",         "stiff_spring_pendulum",
+                                              "pendulum_cartesian", "double_pendulum",
+                                              "knife_edge",         "chaplygin_sleigh",
+                                              "contact_oscillator", "nonholonomic_particle_free",
+                                              "lotka_volterra_2d",  "toda_200"};
 
 struct Options {
   std::vector<std::string> scenes;
   std::optional<std::string> methods;
   std::optional<std::string> orders, steps, rtols;
-  bool without_ida = false;
+  bool without_ida = false, without_erk = false;
+  bool adaptive = false;
   int repeat = 5;
   double budget = 1.0;
   std::optional<double> end;
   std::string momentum = "projected";
-  std::string out;
+  std::string out, compare, more_scenes, table;
   std::vector<std::string> set;
   bool json = false;
 };
 
-/// Replaces a file; what went wrong, or empty.
-std::string write_file(const std::filesystem::path& path, const std::string& text) {
-  std::FILE* file = std::fopen(path.c_str(), "w");
-  if (file == nullptr) return fmt::format("'{}' cannot be written: {}", path.string(), std::strerror(errno));
-  const bool written =
-      std::fwrite(text.data(), 1, text.size(), file) == text.size() && std::fflush(file) == 0;
-  const int error = errno;
-  if (std::fclose(file) == 0 && written) return {};
-  return fmt::format("'{}' could not be written in full: {}", path.string(),
-                     std::strerror(written ? errno : error));
+/// Where a study of no named scenes leaves its report.
+const std::string default_directory = "diracstep-study";
+
+constexpr const char* explanation =
+    "# CPU time to an error\n\n"
+    "Written by `diracstep study SCENE... --methods A,B,... --table FILE`: the thread's CPU time at which "
+    "the relative\n"
+    "error (maximum norm, q and projected p) at the end of the motion reaches each level, read off the lower "
+    "envelope of\n"
+    "error against time by log-log interpolation. A dash: the method does not get there, or is below the "
+    "level with the\n"
+    "coarsest step it was run with. The fastest of ours is bold. One run on one machine: compare within a "
+    "table.\n\n";
+
+std::string tables(const std::vector<Study>& studies) {
+  std::string text = explanation;
+  for (const Study& study : studies) text += at_error_markdown(study);
+  return text;
 }
 
-/// The directory of --out: study.csv, study.json and the pictures, renewed after each scene.
+/// The directory of --out: study.csv, study.json, the pictures and report.html, renewed after each scene.
 class OutputDirectory {
  public:
-  explicit OutputDirectory(const std::string& path) : path_(path) {
-    std::error_code error;
-    std::filesystem::create_directories(path_, error);
-    if (error) throw Misuse(fmt::format("--out: '{}' cannot be made: {}", path, error.message()));
+  explicit OutputDirectory(const std::string& path) : path_(output_directory(path)) {
     if (const auto failure = write_tables({}); !failure.empty()) throw Misuse("--out: " + failure);
   }
 
   /// Empty, or what could not be written.
-  std::string write(const std::vector<Study>& studies) const {
+  std::string write(const std::vector<Study>& studies, const std::vector<PageEntry>& page) const {
     const std::string failure = write_tables(studies);
-    if (const auto no_picture = draw_work_precision(studies.back(), path_); !no_picture.empty())
-      say(no_picture);
-    return failure;
+    tell(draw_work_precision(page.back().study, path_));
+    if (!page.back().history.time.empty())
+      tell(draw_history(page.back().history, page.back().study.scene, path_));
+    tell(draw_summary(studies, path_));
+    const std::string no_page = write_file(path_ / "report.html", study_page(page, path_));
+    return failure.empty() ? no_page : failure;
   }
 
+  std::string report() const { return (path_ / "report.html").string(); }
+
  private:
+  static void tell(const std::string& failure) {
+    if (!failure.empty()) say(failure);
+  }
+
   std::string write_tables(const std::vector<Study>& studies) const {
     const std::string csv = write_file(path_ / "study.csv", studies_csv(studies));
     const std::string json = write_file(path_ / "study.json", studies_json(studies) + '\n');
@@ -86,7 +109,9 @@ StudyOptions study_options(const Options& options) {
   if (options.orders) study.orders = whole_numbers("--orders", *options.orders);
   if (options.steps) study.steps = numbers("--steps", *options.steps);
   if (options.rtols) study.rtols = numbers("--rtols", *options.rtols);
-  if (options.without_ida) study.rtols.clear();
+  if (options.without_ida) std::erase(study.yardsticks, ida_method);
+  if (options.without_erk) std::erase(study.yardsticks, erk_method);
+  study.adaptive = options.adaptive;
   study.repeats = options.repeat;
   study.run_budget = options.budget;
   study.t_end = options.end;
@@ -95,7 +120,7 @@ StudyOptions study_options(const Options& options) {
 }
 
 std::string label(const StudyRow& row) {
-  if (row.is_ida()) return fmt::format("IDA, rtol {:g}", row.rtol);
+  if (row.is_yardstick()) return fmt::format("{}, rtol {:g}", row.method, row.rtol);
   const std::string step = row.fits() ? fmt::format(", step {:g}", row.step) : "";
   return fmt::format("{} order {}{}", row.method, row.order, step);
 }
@@ -103,7 +128,7 @@ std::string label(const StudyRow& row) {
 /// Whether a failed row is a failure of the study.  It is where the user chose the step or the tolerance; on
 /// a ladder, which looks for the largest possible step, only where no other row of the same kind succeeded.
 bool counts(const StudyRow& failed_row, const Study& study, const Options& options) {
-  const bool chosen = (failed_row.is_ida() ? options.rtols : options.steps).has_value();
+  const bool chosen = (failed_row.is_yardstick() ? options.rtols : options.steps).has_value();
   if (chosen && failed_row.fits()) return true;
   return std::ranges::none_of(study.rows, [&](const StudyRow& row) {
     return row.ok() && row.method == failed_row.method &&
@@ -122,11 +147,15 @@ bool tell_failures(const Study& study, const Options& options) {
   return failure;
 }
 
-std::vector<CatalogueScene> chosen_scenes(const Options& options) {
+std::vector<CatalogueScene> chosen_scenes(const Options& options, const Session& session) {
+  std::vector<std::string> words = options.scenes;
+  if (!options.more_scenes.empty())
+    for (const std::string& word : names("--scenes", options.more_scenes)) words.push_back(word);
+  if (words.empty()) words = fair_selection;
   std::vector<CatalogueScene> scenes;
   const Parameters changes = parameters(options.set);
-  for (const auto& scene : options.scenes.empty() ? published_scenes : options.scenes)
-    scenes.push_back(make_scene(scene, changes));
+  for (const auto& word : words)
+    for (CatalogueScene& scene : scenes_meant(session, word, changes)) scenes.push_back(std::move(scene));
   return scenes;
 }
 
@@ -140,23 +169,53 @@ Study one_study(const CatalogueScene& scene, const StudyOptions& options, const 
                            });
 }
 
+std::string read_file(const std::string& path) {
+  std::ifstream file(path);
+  const std::string text = (std::ostringstream() << file.rdbuf()).str();
+  if (text.empty()) throw Misuse(fmt::format("--compare: '{}' cannot be read, or is empty", path));
+  return text;
+}
+
+PageEntry page_entry(const Study& study, const CatalogueScene& scene, const Session& session) {
+  History history =
+      study.interrupted ? History{} : record_history(scene, session.registry, session.solvers, study);
+  return {study, std::move(history), scene.kind, scene.description, scene.source};
+}
+
+/// Where the report goes: --out, or a default where no scenes are named.
+std::optional<OutputDirectory> report_directory(const Options& options) {
+  const bool nothing_named = options.scenes.empty() && options.more_scenes.empty();
+  if (!options.out.empty()) return OutputDirectory(options.out);
+  if (nothing_named) return OutputDirectory(default_directory);
+  return {};
+}
+
 void study(const Options& options, Session& session) {
-  const std::vector<CatalogueScene> scenes = chosen_scenes(options);
+  const std::vector<CatalogueScene> scenes = chosen_scenes(options, session);
   const StudyOptions chosen = study_options(options);
-  std::optional<OutputDirectory> out;
-  if (!options.out.empty()) out.emplace(options.out);
+  const std::string before = options.compare.empty() ? "" : read_file(options.compare);
+  const std::optional<OutputDirectory> out = report_directory(options);
+  for (const auto& [name, value] : build_facts()) say(name + ": " + value);
   std::vector<Study> studies;
+  std::vector<PageEntry> page;
   for (const CatalogueScene& scene : scenes) {
     if (interrupted()) break;
     studies.push_back(one_study(scene, chosen, session, studies.size() + 1, scenes.size()));
     if (tell_failures(studies.back(), options)) session.exit_status = failed;
     if (!options.json) print(study_table(studies.back()) + '\n');
-    const std::string failure = out ? out->write(studies) : "";
+    std::string failure;
+    if (out) {
+      page.push_back(page_entry(studies.back(), scene, session));
+      failure = out->write(studies, page);
+    }
+    if (failure.empty() && !options.table.empty()) failure = write_file(options.table, tables(studies));
     if (failure.empty()) continue;
     say(failure);
     session.exit_status = failed;
   }
   if (options.json) print(studies_json(studies) + '\n');
+  if (!before.empty()) say(comparison_table(compare_studies(studies, before)));
+  if (out) say("the report of this study: " + out->report());
   if (!interrupted()) return;
   say("interrupted; what was finished is there");
   session.exit_status = failed;
@@ -165,16 +224,24 @@ void study(const Options& options, Session& session) {
 }  // namespace
 
 void add_study(CLI::App& app, Session& session) {
-  CLI::App* verb = app.add_subcommand("study", "Error against run time, with SUNDIALS IDA beside it");
+  CLI::App* verb = app.add_subcommand(
+      "study", "Error against run time, beside SUNDIALS IDA and an explicit Runge–Kutta method");
+  add_solver_options(*verb, session);
   const auto options = std::make_shared<Options>();
-  verb->add_option("SCENE", options->scenes, "Scenes, all without any; see diracstep list scenes");
+  verb->add_option("SCENE", options->scenes,
+                   "Scenes, patterns such as 'kepler*', or classes such as holonomic;\na fair selection "
+                   "without any, with its report in diracstep-study/");
+  verb->add_option("--scenes", options->more_scenes, "The same, as a list A,B,…");
   verb->add_option(
       "--methods", options->methods,
       "Methods, A,B,…; without it type1/midpoint,\nand GL(3), GL(4), GL(6) where no orders are given either");
   verb->add_option("--orders", options->orders, "Orders, 2,4,…; without it all that fit");
   verb->add_option("--steps", options->steps, "Step sizes, H1,H2,…; a ladder without it");
-  verb->add_option("--rtols", options->rtols, "Tolerances of IDA; 1e-4,1e-5,…,1e-12 without it");
+  verb->add_option("--rtols", options->rtols, "Tolerances of the yardsticks; 1e-4,1e-5,…,1e-14 without it");
+  verb->add_flag("--adaptive", options->adaptive,
+                 "Also reversible variable steps, with a ladder of eps (in the column of the steps)");
   verb->add_flag("--without-ida", options->without_ida, "No runs of IDA");
+  verb->add_flag("--without-erk", options->without_erk, "No runs of the explicit Runge–Kutta method");
   verb->add_option("--repeat", options->repeat, "Timed runs of each row")->capture_default_str();
   verb->add_option("--budget", options->budget, "CPU seconds that a run of a ladder may take")
       ->capture_default_str();
@@ -182,8 +249,13 @@ void add_study(CLI::App& app, Session& session) {
   verb->add_option("--momentum", options->momentum,
                    "Representative of the momentum: plus, minus or projected")
       ->capture_default_str();
-  verb->add_option("--out", options->out, "Directory for study.csv, study.json, SCENE.svg and SCENE.png")
+  verb->add_option("--out", options->out, "Directory for report.html, study.csv, study.json and the pictures")
       ->type_name("DIR");
+  verb->add_option("--compare", options->compare,
+                   "An earlier study.json: tells what got faster, slower, more or less exact")
+      ->type_name("OLD.json");
+  verb->add_option("--table", options->table, "Markdown file: CPU time of each method at the compared errors")
+      ->type_name("FILE");
   verb->add_option("--set", options->set, "Set a parameter of the scenes; may be repeated")
       ->type_name("NAME=VALUE")
       ->allow_extra_args(false);

@@ -31,12 +31,12 @@ OutputFile opened(const std::string& path, OutputFile::Mode mode) {
 }  // namespace
 
 TrajectoryFile::TrajectoryFile(const std::string& path, const Scene& scene)
-    : file_(opened(path, OutputFile::Mode::fresh)) {
+    : rows_(scene.rows()), file_(opened(path, OutputFile::Mode::fresh)) {
   put(header(scene));
 }
 
 TrajectoryFile::TrajectoryFile(const std::string& path, const Scene& scene, Mark mark)
-    : file_(opened(path, OutputFile::Mode::existing)), mark_(mark) {
+    : rows_(scene.rows()), file_(opened(path, OutputFile::Mode::existing)), mark_(mark) {
   const std::string expected = header(scene);
   if (file_.size() < mark.bytes || mark.bytes < static_cast<long>(expected.size()))
     throw Misuse(
@@ -55,8 +55,11 @@ TrajectoryFile::~TrajectoryFile() {
 
 void TrajectoryFile::write(const Sample& sample) {
   std::string line = fmt::format("{:.17g}", sample.time);
-  for (const Vector* column : {&sample.q, &sample.v, &sample.p, &sample.lambda})
-    for (const double value : *column) fmt::format_to(std::back_inserter(line), ",{:.17g}", value);
+  const auto add = [&line](const auto& column) {
+    for (const double value : column) fmt::format_to(std::back_inserter(line), ",{:.17g}", value);
+  };
+  for (const Vector* column : {&sample.q, &sample.v, &sample.p}) add(*column);
+  add(sample.lambda.head(rows_));
   fmt::format_to(std::back_inserter(line), ",{:.17g}\n", sample.energy);
   put(line);
   ++mark_.lines;

@@ -38,6 +38,7 @@ class TrajectoryFile {
   void put(const std::string& line);
   void flush();
 
+  Eigen::Index rows_;  ///< of the scene; an integrator may know more, which are left out
   OutputFile file_;
   std::string waiting_;
   Mark mark_;

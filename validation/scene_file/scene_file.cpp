@@ -114,6 +114,8 @@ Start start_of(const LoadedScene& loaded) {
 class References {
  public:
   explicit References(LoadedScenePtr loaded) : loaded_(std::move(loaded)) {
+    const auto lagrangian = file_lagrangian(loaded_);
+    momentum_of_position_ = lagrangian && lagrangian->structure().y_hessian_zero;
     const SceneDocument& document = loaded_->program->document;
     for (std::size_t i = 0; i < document.references.size(); ++i)
       if (holds(document.references[i])) valid_.push_back(i);
@@ -178,10 +180,12 @@ class References {
     return state;
   }
 
-  /// The whole state, where the reference gives all of it.
+  /// The whole state, where the reference gives all of it.  Where L is linear in v the position is the state:
+  /// p = ∂L/∂v(q), and v = 0 stands for a velocity that is not stated.
   std::optional<ReferencePoint> point(std::size_t i, double t) const {
     const auto n = loaded_->layout.dimension();
-    ReferencePoint point{Vector::Constant(n, unknown), Vector::Constant(n, unknown)};
+    ReferencePoint point{Vector::Constant(n, unknown),
+                         Vector::Constant(n, momentum_of_position_ ? 0.0 : unknown)};
     for (const auto& component : state(i, t).components)
       (component.velocity ? point.v : point.q)[component.index] = component.value;
     if (!point.q.allFinite() || !point.v.allFinite()) return std::nullopt;
@@ -198,6 +202,7 @@ class References {
   }
 
   LoadedScenePtr loaded_;
+  bool momentum_of_position_ = false;  ///< a Lagrangian linear in v
   std::vector<std::size_t> valid_;
 };
 

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <diracstep/validation/scene_file/scene_functions.hpp>
 
@@ -269,6 +270,13 @@ class FilePhaseFunction final : public Base {
     function_.run(3, call);
   }
 
+  void position_gradient_rate(double t, ConstVectorRef x, ConstVectorRef y, VectorRef fxt) const override {
+    fxt.setZero();
+    KernelCall call = at(t, x, y);
+    call.out[0] = fxt.data();
+    function_.run(4, call);
+  }
+
  private:
   static PhaseStructure structure_of(const SceneFunction& f) {
     return {f.separable, f.y_hessian_constant, f.y_hessian_diagonal, f.quadratic, f.y_hessian_zero};
@@ -294,6 +302,13 @@ class FileRows final : public ConstraintRows {
         function_(std::move(function)) {
     function_.find_positions(pattern(), false);
     function_.find_positions(curvature_pattern(), true);
+  }
+
+  bool constant() const override {
+    return std::ranges::all_of(function_.function().pieces, [](const Piece& piece) {
+      return std::ranges::all_of(std::array{std::size_t{2}, std::size_t{3}, annihilator_kernel},
+                                 [&](std::size_t number) { return piece.kernels[number].empty(); });
+    });
   }
 
   void position(double t, ConstVectorRef q, VectorRef phi) const override {

@@ -1,0 +1,153 @@
+#include <cmath>
+#include <diracstep/core/errors.hpp>
+#include <diracstep/solvers/detail/jacobian_factors.hpp>
+#include <iterator>
+#include <limits>
+
+namespace diracstep::detail {
+
+namespace {
+
+/// Up to this size a new Jacobian costs less than the iterations it saves.
+constexpr int largest_fresh = 11;
+/// Where so many further iterations at the pace of the last one would not do, a new Jacobian is taken.
+constexpr int patience = 6;
+constexpr double done = 1e-14;
+/// Where an old Jacobian fails, so many solves do without one before it is tried again.
+constexpr int fresh_starts_after_failure = 16;
+/// So many different step sizes keep factors of their own: those of a symmetric composition of 31 stages, and
+/// of Suzuki's composition where factors take much memory.
+constexpr std::size_t most_parameters = 16, most_parameters_of_large = 2;
+constexpr int large = 10000;
+
+constexpr double none = std::numeric_limits<double>::quiet_NaN();
+
+JacobianPolicy resolved(JacobianPolicy policy, int size) {
+  if (policy != JacobianPolicy::automatic) return policy;
+  return size <= largest_fresh ? JacobianPolicy::fresh : JacobianPolicy::kept;
+}
+
+}  // namespace
+
+JacobianFactors::JacobianFactors(NonlinearProblem& problem, JacobianPolicy policy)
+    : problem_(problem),
+      policy_(resolved(policy, problem.size())),
+      constant_(policy != JacobianPolicy::fresh && !std::isnan(problem.constant_jacobian_parameter())) {
+  factors_.reserve(most_parameters);
+  current_ = &add();
+}
+
+JacobianFactors::Factors& JacobianFactors::add() {
+  factors_.push_back(
+      {none, make_linear_solver(problem_.pattern()), Vector::Zero(problem_.pattern().nonzeros()), false});
+  return factors_.back();
+}
+
+void JacobianFactors::reset() {
+  factors_.resize(1);
+  factors_.front().parameter = none;
+  factors_.front().factored = false;
+  factors_.front().solver->reset();
+  current_ = &factors_.front();
+  usable_ = false;
+  fresh_starts_ = 0;
+}
+
+void JacobianFactors::save(Snapshot& to) const {
+  if (!keeps_factors()) return factors_.front().solver->save(to);
+  to.put(static_cast<double>(factors_.size()));
+  to.put(static_cast<double>(current_ - factors_.data()));
+  to.put(usable_ ? 1.0 : 0.0);
+  to.put(fresh_starts_);
+  for (const Factors& kept : factors_) {
+    kept.solver->save(to);
+    to.put(kept.factored ? 1.0 : 0.0);
+    if (!kept.factored) continue;
+    to.put(kept.values);
+    if (constant_) to.put(kept.parameter);
+  }
+}
+
+void JacobianFactors::restore(Snapshot& from) {
+  reset();
+  if (!keeps_factors()) return factors_.front().solver->restore(from);
+  const long most = most_parameters;
+  const long count = from.whole_number(most), current = from.whole_number(most);
+  if (count < 1 || current >= count) throw Misuse("the snapshot has no factors of a Jacobian");
+  usable_ = from.whole_number(1) == 1;
+  fresh_starts_ = static_cast<int>(from.whole_number(fresh_starts_after_failure));
+  while (std::ssize(factors_) < count) add();
+  current_ = factors_.data() + current;
+  for (Factors& kept : factors_) {
+    kept.solver->restore(from);
+    kept.factored = from.whole_number(1) == 1;
+    if (!kept.factored) continue;
+    from.read(kept.values);
+    if (constant_) kept.parameter = from.number();
+    if (!kept.solver->holds(kept.values.data())) (void)kept.solver->factor(kept.values.data());
+  }
+}
+
+/// Takes the factors of this parameter; false where they are still to be made.
+bool JacobianFactors::select(double parameter) {
+  for (Factors& kept : factors_)
+    if (kept.parameter == parameter) {
+      current_ = &kept;
+      return true;
+    }
+  const bool first = std::isnan(factors_.front().parameter);
+  const std::size_t most = problem_.size() < large ? most_parameters : most_parameters_of_large;
+  if (!first && factors_.size() < most) add();
+  factors_.back().parameter = parameter;
+  current_ = &factors_.back();
+  return false;
+}
+
+void JacobianFactors::begin() {
+  evaluations_ = iterations_ = 0;
+  if (fresh_starts_ > 0) --fresh_starts_;
+}
+
+bool JacobianFactors::wanted(double norm) {
+  if (!usable_) return true;
+  const bool too_slow = iterations_ > 0 && norm * std::pow(norm / last_norm_, patience) > done;
+  switch (policy_) {
+    case JacobianPolicy::per_step:
+      return iterations_ == 0 || too_slow;
+    case JacobianPolicy::kept:
+      if (too_slow && evaluations_ == 0) fresh_starts_ = fresh_starts_after_failure;
+      return too_slow || (iterations_ == 0 && fresh_starts_ > 0);
+    default:
+      return true;
+  }
+}
+
+JacobianFactors::Outcome JacobianFactors::prepare(ConstVectorRef x, double norm) {
+  const bool wanted_now =
+      constant_ ? !select(problem_.constant_jacobian_parameter()) || !usable_ : wanted(norm);
+  last_norm_ = norm;
+  ++iterations_;
+  if (!wanted_now) return Outcome::ready;
+  ++evaluations_;
+  usable_ = false;
+  current_->factored = false;
+  problem_.jacobian(x, current_->values);
+  if (!current_->values.allFinite()) return Outcome::not_finite;
+  current_->factored = true;
+  usable_ = current_->solver->factor(current_->values.data());
+  return usable_ ? Outcome::ready : Outcome::singular;
+}
+
+std::string JacobianFactors::policy() const {
+  if (constant_) return "constant Jacobian, factored once for each step size";
+  switch (policy_) {
+    case JacobianPolicy::per_step:
+      return "a new Jacobian in each solve";
+    case JacobianPolicy::kept:
+      return "a Jacobian kept for as long as it converges";
+    default:
+      return "a new Jacobian in each iteration";
+  }
+}
+
+}  // namespace diracstep::detail

@@ -1,0 +1,120 @@
+#include <gtest/gtest.h>
+
+#include <diracstep/constraints/discrete.hpp>
+
+#include "misuse.hpp"
+#include "scenes.hpp"
+#include "stepping.hpp"
+
+namespace diracstep {
+namespace {
+
+using testing::expect_misuse;
+using testing::samples_of;
+
+/// (x1 − x0) + y_mid (z1 − z0), the midpoint rule for v_x + y v_z = 0.
+auto midpoint_rows() {
+  return discrete_rows<3, 1>([]<class T>(const std::array<T, 3>& q0, const std::array<T, 3>& q1) {
+    return std::array<T, 1>{q1[0] - q0[0] + 0.5 * (q0[1] + q1[1]) * (q1[2] - q0[2])};
+  });
+}
+
+void expect_same_motion(const std::shared_ptr<const Scene>& scene, IntegratorOptions options,
+                        const std::shared_ptr<const DiscreteRows>& own, double tolerance) {
+  const auto built_in = samples_of(scene, options, 100);
+  options.constraint_rule = own;
+  const auto mine = samples_of(scene, options, 100);
+  for (std::size_t k = 0; k < mine.size(); ++k)
+    ASSERT_LT((mine[k].q - built_in[k].q).lpNorm<Eigen::Infinity>(), tolerance)
+        << scene->name << " step " << k;
+}
+
+TEST(OwnDiscreteConstraint, AMidpointRuleWrittenOutIsTheBuiltInOne) {
+  expect_same_motion(testing::nonholonomic(), {.method = "type1/midpoint", .step = 0.05}, midpoint_rows(),
+                     1e-12);
+  expect_same_motion(testing::nonholonomic(), {.method = "type1/midpoint", .order = 4, .step = 0.1},
+                     midpoint_rows(), 1e-12);
+  expect_same_motion(testing::forced(testing::nonholonomic()), {.method = "type1/midpoint", .step = 0.05},
+                     midpoint_rows(), 1e-12);
+}
+
+TEST(OwnDiscreteConstraint, StandsInForTheNonholonomicRowsAmongOthers) {
+  const auto rows = discrete_rows<3, 1>([]<class T>(const std::array<T, 3>& q0, const std::array<T, 3>& q1) {
+    return std::array<T, 1>{q1[0] - q0[0] + (2.0 + 0.5 * (q0[1] + q1[1])) * (q1[2] - q0[2])};
+  });
+  expect_same_motion(testing::mixed(), {.method = "type1/midpoint", .step = 0.05}, rows, 1e-12);
+}
+
+TEST(OwnDiscreteConstraint, AffineRowsTakeTheTimeAndTheStep) {
+  Scene scene = testing::particle("pushed");
+  scene.constraints = {affine<3, 1>(
+      []<class T>(const std::array<T, 3>& q) {
+        return std::array<std::array<T, 3>, 1>{{{T(1.0), T(0.0), q[1]}}};
+      },
+      []<class T>(const std::array<T, 3>&, const T& t) { return std::array<T, 1>{-0.3 * t}; })};
+  scene.start.v[0] = -scene.start.q[1] * scene.start.v[2];
+  const auto rows = discrete_rows<3, 1>(
+      []<class T>(const std::array<T, 3>& q0, const std::array<T, 3>& q1, double t, double h) {
+        return std::array<T, 1>{q1[0] - q0[0] + 0.5 * (q0[1] + q1[1]) * (q1[2] - q0[2]) -
+                                h * 0.3 * (t + 0.5 * h)};
+      });
+  expect_same_motion(std::make_shared<const Scene>(scene), {.method = "type1/midpoint", .step = 0.05}, rows,
+                     1e-12);
+}
+
+template <class F>
+void expect_refused(F formula, std::initializer_list<std::string> parts) {
+  const IntegratorOptions options{.step = 0.1, .constraint_rule = discrete_rows<3, 1>(formula)};
+  expect_misuse([&] { Integrator(testing::nonholonomic(), Registry::with_built_ins(), kinsol(), options); },
+                parts);
+}
+
+TEST(OwnDiscreteConstraint, OneOfOtherRowsIsRefusedWithTheRequirementItFails) {
+  expect_refused(
+      []<class T>(const std::array<T, 3>& q0, const std::array<T, 3>& q1) {
+        return std::array<T, 1>{q1[0] - q0[0] + q0[1] * (q1[2] - q0[2]) + 1e-3};
+      },
+      {"diagonal", "(4.17)", "0.001"});
+  expect_refused(
+      []<class T>(const std::array<T, 3>& q0, const std::array<T, 3>& q1) {
+        return std::array<T, 1>{q1[0] - q0[0] + 1.01 * q0[1] * (q1[2] - q0[2])};
+      },
+      {"annihilator", "(4.18)"});
+  expect_refused(
+      []<class T>(const std::array<T, 3>& q0, const std::array<T, 3>& q1) {
+        return std::array<T, 1>{(q1[0] - q0[0] + q0[1] * (q1[2] - q0[2])) * (q1[0] - q0[0])};
+      },
+      {"span", "(4.19)"});
+  expect_refused(
+      []<class T>(const std::array<T, 3>& q0, const std::array<T, 3>& q1, double, double h) {
+        return std::array<T, 1>{q1[0] - q0[0] + q0[1] * (q1[2] - q0[2]) + 0.2 * h};
+      },
+      {"misses the term b", "0.2"});
+}
+
+/// The midpoint rows with a derivative by hand that forgets where y is.
+class Forgetful final : public DiscreteRows {
+ public:
+  Forgetful() : DiscreteRows(SparsityPattern::dense(1, 3)) {}
+  void residual(Interval, ConstVectorRef q0, ConstVectorRef q1, VectorRef c) const override {
+    c[0] = q1[0] - q0[0] + 0.5 * (q0[1] + q1[1]) * (q1[2] - q0[2]);
+  }
+  void end_derivative(Interval, ConstVectorRef q0, ConstVectorRef q1, VectorRef d) const override {
+    d << 1.0, 0.0, 0.5 * (q0[1] + q1[1]);
+  }
+};
+
+TEST(OwnDiscreteConstraint, AWrongDerivativeOrSizeIsRefused) {
+  IntegratorOptions options{.step = 0.1, .constraint_rule = std::make_shared<const Forgetful>()};
+  expect_misuse([&] { Integrator(testing::nonholonomic(), Registry::with_built_ins(), kinsol(), options); },
+                {"differs from differences"});
+  options.constraint_rule = midpoint_rows();
+  expect_misuse([&] { Integrator(testing::unconstrained(), Registry::with_built_ins(), kinsol(), options); },
+                {"number of rows"});
+  options = {.method = "type1/left", .order = 2, .step = 0.1, .constraint_rule = midpoint_rows()};
+  expect_misuse([&] { Integrator(testing::nonholonomic(), Registry::with_built_ins(), kinsol(), options); },
+                {"self-adjoint"});
+}
+
+}  // namespace
+}  // namespace diracstep

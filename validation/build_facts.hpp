@@ -1,0 +1,13 @@
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace diracstep {
+
+/// What run times depend on: name and value of the library's version, the SUNDIALS that is linked, the
+/// compiler and the processor.
+std::vector<std::pair<std::string, std::string>> build_facts();
+
+}  // namespace diracstep

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <diracstep/validation/convergence_study.hpp>
+#include <string>
+#include <vector>
+
+namespace diracstep {
+
+/// One run looked at on the way: what should stay, over time.
+struct History {
+  std::string method;  ///< empty where there is no run to look at
+  int order = 0;
+  double step = 0.0;
+  std::vector<std::string> coordinates;
+  std::vector<double> time;
+  std::vector<Vector> q;
+  std::vector<double> energy;      ///< |E(t) − E(0)| / max(|E(0)|, 1)
+  std::vector<double> constraint;  ///< largest |φ(q)| and |A(q)v + b|; empty for a scene without rows
+  struct Change {
+    std::string name;
+    std::vector<double> values;  ///< |I(t) − I(0)| / max(|I(0)|, 1)
+  };
+  std::vector<Change> invariants;  ///< of the scene
+  std::vector<PlanLine> plan;      ///< what the integrator does and leaves out
+  std::string failure;             ///< empty, or why the run stopped
+};
+
+/// The run of a study with steps of one size that comes nearest to the error 1e-6 from below, repeated with
+/// about `points` points kept, and with half as many steps at least; where none is that exact, the most exact
+/// one.
+History record_history(const CatalogueScene& scene, const Registry& registry, const SolverFactory& solvers,
+                       const Study& study, long points = 400);
+
+}  // namespace diracstep
