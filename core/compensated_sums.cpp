@@ -1,24 +1,60 @@
 #include <diracstep/core/compensated_sums.hpp>
+#include <limits>
 
 namespace diracstep {
 
+namespace {
+
+/// So many doubles hold a long double: two with the 64 bits of x87, three with 113.
+constexpr int doubles_of_extended = (std::numeric_limits<long double>::digits + 52) / 53;
+
+}  // namespace
+
 CompensatedSums::CompensatedSums(int stages, int dimension)
     : table(extended_gauss_lobatto_tableau(stages)), sum_(Extended::Zero(dimension)) {
-  for (Extended* column : {&start_.q, &start_.p, &end_.q, &end_.p}) column->setZero(dimension);
-  end_q_.setZero(dimension);
-  end_p_ = end_q_;
+  for (Extended* column : remainders()) column->setZero(dimension);
+  for (Vector* column : points()) column->setZero(dimension);
 }
 
 void CompensatedSums::forget() {
-  for (Extended* column : {&start_.q, &start_.p, &end_.q, &end_.p}) column->setZero();
+  for (Extended* column : remainders()) column->setZero();
+}
+
+void CompensatedSums::keep() {
+  kept_ = end_;
+  kept_q_ = end_q_;
+  kept_p_ = end_p_;
+}
+
+void CompensatedSums::save(Snapshot& to) const {
+  for (const Extended* column : {&start_.q, &start_.p, &end_.q, &end_.p, &kept_.q, &kept_.p})
+    for (long double rest : *column)
+      for (int k = 0; k < doubles_of_extended; ++k) {
+        const auto leading = static_cast<double>(rest);
+        to.put(leading);
+        rest -= leading;
+      }
+  for (const Vector* column : {&end_q_, &end_p_, &kept_q_, &kept_p_}) to.put(*column);
+}
+
+void CompensatedSums::restore(Snapshot& from) {
+  for (Extended* column : remainders())
+    for (long double& entry : *column) {
+      entry = 0.0L;
+      for (int k = 0; k < doubles_of_extended; ++k) entry += from.number();
+    }
+  for (Vector* column : points()) from.read(*column);
 }
 
 void CompensatedSums::begin(const Vector& q0, const Vector& p0, const Vector& last_q0,
                             const Vector& last_p0) {
   if (q0 == end_q_ && p0 == end_p_) {
-    start_.q = end_.q;
-    start_.p = end_.p;
-  } else if (!(q0 == last_q0 && p0 == last_p0)) {  // else the same step once more
+    start_ = end_;
+  } else if (q0 == last_q0 && p0 == last_p0) {
+    return;  // the same step once more
+  } else if (q0 == kept_q_ && p0 == kept_p_) {
+    start_ = kept_;
+  } else {
     start_.q.setZero();
     start_.p.setZero();
   }

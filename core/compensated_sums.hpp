@@ -1,6 +1,8 @@
 #pragma once
 
+#include <array>
 #include <diracstep/core/gauss_lobatto_tableau.hpp>
+#include <diracstep/core/snapshot.hpp>
 #include <diracstep/core/types.hpp>
 
 namespace diracstep {
@@ -19,6 +21,12 @@ class CompensatedSums {
   ExtendedGaussLobattoTableau table;
 
   void forget();
+
+  /// Keeps the remainder at the end of the step just taken, so that attempts at the next one which fail leave
+  /// no trace.
+  void keep();
+  void save(Snapshot& to) const;
+  void restore(Snapshot& from);
 
   /// A step begins at (q0,p0) after one that began at (last_q0,last_p0): takes over the remainder that
   /// belongs to the point.
@@ -41,7 +49,7 @@ class CompensatedSums {
 
  private:
   using Extended = Eigen::Matrix<long double, Eigen::Dynamic, 1>;
-  /// What rounding has dropped at a point; the point itself is known by its bits.
+  /// What rounding has dropped at a point, which is known by its bits.
   struct Remainder {
     Extended q, p;
   };
@@ -56,8 +64,14 @@ class CompensatedSums {
   }
   static void round(const Vector& from, const Extended& change, Vector& to, Extended& remainder);
 
-  Remainder start_, end_;
-  Vector end_q_, end_p_;
+  /// The columns of all remainders, and the points of those at ends.
+  std::array<Extended*, 6> remainders() {
+    return {&start_.q, &start_.p, &end_.q, &end_.p, &kept_.q, &kept_.p};
+  }
+  std::array<Vector*, 4> points() { return {&end_q_, &end_p_, &kept_q_, &kept_p_}; }
+
+  Remainder start_, end_, kept_;
+  Vector end_q_, end_p_, kept_q_, kept_p_;
   Extended sum_;
 };
 

@@ -45,6 +45,9 @@ class GaussLobattoStep final : public StepProblem {
     affine_ = lagrangian_->structure().quadratic && !force_ &&
               std::ranges::all_of(scene.constraints, [](const auto& block) { return block->constant(); });
     last_x_.setZero(size());
+    kept_.multipliers.setZero(m_ * s_);
+    q0_.setZero(n_);
+    p0_.setZero(n_);
     const auto holonomic = [](const auto& block) { return block->holonomic(); };
     const auto kinds = std::ranges::count_if(scene.constraints, holonomic);
     if (dense && (kinds == 0 || kinds == std::ssize(scene.constraints)))
@@ -72,12 +75,36 @@ class GaussLobattoStep final : public StepProblem {
     return true;
   }
 
+  void keep() override {
+    kept_.known = true;
+    kept_.force = max_norm(lq_);
+    kept_.curvature = curvature_;
+    kept_.row_curvature = row_curvature_;
+    kept_.multipliers = last_x_.tail(m_ * s_);
+    if (sums_) sums_->keep();
+  }
   void reset() override {
-    for (Columns* columns : {&lq_, &lqq_}) columns->setZero();
-    last_x_.setZero();
     if (sums_) sums_->forget();
-    curvature_ = row_curvature_ = 0.0;
+    kept_ = {.multipliers = Vector::Zero(m_ * s_)};
     hessians_known_ = mass_known_ = false;
+  }
+  void save(Snapshot& to) const override {
+    to.put(kept_.known ? 1.0 : 0.0);
+    for (const double size : {kept_.force, kept_.curvature, kept_.row_curvature}) to.put(size);
+    to.put(kept_.multipliers);
+    if (!sums_) return;
+    to.put(q0_);
+    to.put(p0_);
+    sums_->save(to);
+  }
+  void restore(Snapshot& from) override {
+    kept_.known = from.whole_number(1) == 1;
+    for (double* size : {&kept_.force, &kept_.curvature, &kept_.row_curvature}) *size = from.number();
+    from.read(kept_.multipliers);
+    if (!sums_) return;
+    from.read(q0_);
+    from.read(p0_);
+    sums_->restore(from);
   }
   double constant_jacobian_parameter() const override { return affine_ ? step_.size : std::nan(""); }
 
@@ -101,6 +128,9 @@ class GaussLobattoStep final : public StepProblem {
     q0_ = q0;
     p0_ = p0;
     splitting_known_ = false;
+    force_size_ = kept_.force;
+    curvature_ = kept_.curvature;
+    row_curvature_ = kept_.row_curvature;
     for (Rows& rows : rows_) rows.evaluate_impulse_rows(step_.start, q0_, 0);
     update_scales();
     last_x_[0] = std::nan("");
@@ -109,7 +139,7 @@ class GaussLobattoStep final : public StepProblem {
   void guess(const Vector& v0, VectorRef x) override {
     for (int i = 0; i < s_; ++i) x.segment(n_ * i, n_) = v0;
     x.tail(m_ * s_).setZero();
-    if (lqq_.col(0).isZero(0.0)) sample_start(v0);
+    if (!kept_.known) sample_start(v0);
   }
 
   void residual(ConstVectorRef x, VectorRef f) override {
@@ -235,7 +265,7 @@ class GaussLobattoStep final : public StepProblem {
         rows.block->pattern().transposed_multiply_add(
             rows.at_lobatto.col(j).data(), x.data() + row_of(j) + rows.first, impulses_.col(j).data());
       }
-    blocks_[0].scale = std::max(blocks_[0].scale, (sums_ ? last_bit : 1.0) * impulse_scale(x));
+    blocks_[0].scale = std::max(blocks_[0].scale, (sums_ ? last_bit : 1.0) * impulse_scale(x.tail(m_ * s_)));
   }
 
   void evaluate_rows_at_gauss() {
@@ -362,14 +392,14 @@ class GaussLobattoStep final : public StepProblem {
     for (std::size_t k = 0; k < places.size(); ++k) values[places[k]] += factor * block[k];
   }
 
-  /// Size of the impulses at x, and of what they lose to the round-off of positions.
-  double impulse_scale(ConstVectorRef x) const {
+  /// Size of the impulses of such multipliers, and of what they lose to the round-off of positions.
+  double impulse_scale(ConstVectorRef multipliers) const {
     double largest = 0.0;
     for (const Rows& rows : rows_) {
       const auto places = rows.block->pattern().row_indices();
       for (int j = 0; j < s_; ++j) {
-        const double *const a = rows.at_lobatto.col(0).data(), *const lambda =
-                                                                   x.data() + row_of(j) + rows.first;
+        const double* const a = rows.at_lobatto.col(0).data();
+        const double* const lambda = multipliers.data() + m_ * j + rows.first;
         for (std::size_t k = 0; k < places.size(); ++k)
           largest = std::max(largest, std::abs(a[k] * lambda[places[k]]));
       }
@@ -381,8 +411,10 @@ class GaussLobattoStep final : public StepProblem {
   void sample_start(const Vector& v0) {
     lagrangian_->gradient(step_.start, q0_, v0, lq_.col(0), lv_.col(0));
     lagrangian_->hessian(step_.start, q0_, v0, lqq_.col(0), lqv_.col(0), lvv_.col(0));
-    curvature_ = std::max(curvature_, max_norm(lqq_.col(0)));
     const double before = blocks_[0].scale;  // of impulses nothing is known yet
+    force_size_ = max_norm(lq_.col(0));
+    curvature_ = max_norm(lqq_.col(0));
+    last_x_[0] = std::nan("");
     update_scales();
     blocks_[0].scale = std::max(blocks_[0].scale, before);
   }
@@ -394,8 +426,8 @@ class GaussLobattoStep final : public StepProblem {
     const double size = max_norm(q0_), velocity = size / h;
     one_forms_ = 0.0;
     for (const Rows& rows : rows_) one_forms_ = std::max(one_forms_, max_norm(rows.at_lobatto.col(0)));
-    double momentum = max_norm(p0_) + h * max_norm(lq_) + h * curvature_ * size;
-    if (m_ > 0) momentum += impulse_scale(last_x_);
+    double momentum = max_norm(p0_) + h * force_size_ + h * curvature_ * size;
+    if (m_ > 0) momentum += impulse_scale(kept_.multipliers);
     blocks_[0].scale = usable_scale(momentum);
     if (m_ > 0) blocks_[1].scale = usable_scale(one_forms_ * velocity);
     // What an iteration leaves of the residual is no random error: it is a smooth function of the state and
@@ -426,8 +458,15 @@ class GaussLobattoStep final : public StepProblem {
   Columns lq_, lv_;        ///< ∂L/∂q + f and ∂L/∂v at the Gauss nodes
   Columns impulses_;       ///< A(Q~_j)ᵀ λ_j
   Columns lqq_, lqv_, lvv_, fq_, fv_;
+  /// Sizes in the last step kept, by which the next one judges round-off.
+  struct Kept {
+    bool known = false;
+    double force = 0.0, curvature = 0.0, row_curvature = 0.0;
+    Vector multipliers = {};
+  };
+  Kept kept_;
   double one_forms_ = 0.0, row_curvature_ = 0.0;  ///< of A(q0) and of ∂(Aᵀλ)/∂q
-  double curvature_ = 0.0;                        ///< largest second derivative ∂²L/∂q² met
+  double force_size_ = 0.0, curvature_ = 0.0;     ///< of ∂L/∂q and ∂²L/∂q²
   std::optional<StageSplitting> splitting_;       ///< small scenes with rows of one kind
   bool splitting_known_ = false, mass_known_ = false;
   bool affine_ = false;  ///< the residual is affine in the unknowns

@@ -74,6 +74,8 @@ Integrator::Integrator(Preparation preparation, const Registry& registry, const 
       velocity_problem_(*scene_, dense_),
       acceleration_problem_(*scene_, dense_) {
   require_step(options_.step);
+  if (options_.substeps < 1)
+    throw Misuse("substeps = " + std::to_string(options_.substeps) + "; 1 or more is needed");
   if (options_.constraint_rule && options_.constraint_rule->own)
     require_discretisation(*options_.constraint_rule->own, scene_->constraints, scene_->start.time,
                            scene_->start.q);
@@ -87,6 +89,7 @@ Integrator::Integrator(Preparation preparation, const Registry& registry, const 
   plan_stages(registry, solvers);
   if (options_.compensated_sums) compensate();
   velocity_unknowns_.setZero(velocity_problem_.size());
+  start_velocity_.setZero(scene_->dimension());
   acceleration_unknowns_.setZero(acceleration_problem_.size());
   reset(scene_->start);
 }
@@ -111,8 +114,11 @@ Integrator::Part Integrator::make_part(const Method& method, bool mirror_rule,
   const auto step = [&](const std::optional<ConstraintRule>& rule) {
     return method.step(*scene_, dense_, rule, options_.force_degenerate);
   };
-  Part part{other_rule ? step(mirrored(given->nodes)) : step(given), nullptr};
-  if (part.problem->size() > 0) part.solver = solvers(*part.problem);
+  Part part{other_rule ? step(mirrored(given->nodes)) : step(given), nullptr, nullptr};
+  if (part.problem->size() > 0) {
+    part.solver = solvers(*part.problem);
+    part.continuation = std::make_unique<StepContinuation>(*part.problem, *part.solver);
+  }
   return part;
 }
 
@@ -174,6 +180,7 @@ void Integrator::reset(const Start& start) {
   if (!p_.allFinite())
     throw Misuse("scene '" + scene_->name + "': the momentum ∂L/∂v is not finite at the start");
   forget();
+  on_a_motion_ = false;
   work_ = {};
 }
 
@@ -188,6 +195,7 @@ void Integrator::restart(double time, ConstVectorRef q, ConstVectorRef p, ConstV
   p_ = p;
   v_ = v;
   forget();
+  on_a_motion_ = true;
 }
 
 /// Nothing of the steps so far shows in the next ones.
@@ -200,8 +208,9 @@ void Integrator::forget() {
   }
 }
 
-void Integrator::count(const SolveReport& report) {
-  ++work_.solves;
+void Integrator::count(const SolveReport& report, long solves) {
+  work_.solves += solves;
+  work_.retries.line_searches += report.line_searches;
   work_.iterations += report.iterations;
   work_.residual_evaluations += report.residual_evaluations;
   work_.jacobian_evaluations += report.jacobian_evaluations;
@@ -211,25 +220,26 @@ SolveReport Integrator::solve_stage(std::size_t number, double t, const Vector& 
                                     Guess guess) {
   Stage& stage = stages_[number];
   Part& part = parts_[stage.part];
-  part.problem->begin({t, stage.fraction * size_}, q, p);
+  const Interval step{t, stage.fraction * size_};
+  part.problem->begin(step, q, p);
   if (!part.solver) return {};
-  const bool repeated = guess == Guess::last_solution;
-  const bool predicted = repeated || stage.predictor.ready();
-  if (predicted && !repeated)
+  if (guess == Guess::predicted && !stage.predictor.ready()) guess = Guess::plain;
+  if (guess == Guess::predicted)
     stage.predictor.predict(stage.solution);
-  else if (!predicted)
+  else if (guess == Guess::plain)
     part.problem->guess(v_, stage.solution);
-  SolveReport report = part.solver->solve(stage.solution);
+  guess_ = stage.solution;
+  const SolveReport report = part.solver->solve(stage.solution);
   count(report);
-  if (report.ok() || !predicted) return report;
-  part.problem->guess(v_, stage.solution);
-  report = part.solver->solve(stage.solution);
-  count(report);
-  return report;
+  if (report.ok() && !doubtful(stage, step, q, p, report)) return report;
+  return retry_stage(stage, step, q, p, guess, report);
 }
 
 StepReport Integrator::failed(const SolveReport& report, const StepProblem& problem, double time) {
   first_stage_solved_ = false;  // the problem holds the data of the stage that failed
+  v_ = before_.v;
+  for (Part& part : parts_)
+    if (part.solver) part.solver->reset();  // pivots chosen for a matrix that led nowhere
   std::ostringstream message;
   message << "step " << work_.steps << " from t = " << time << ": " << describe(report.status) << " after "
           << report.iterations << " iterations";
@@ -239,6 +249,8 @@ StepReport Integrator::failed(const SolveReport& report, const StepProblem& prob
     message << separator << blocks[b].name << " residual " << report.residual_norms[b];
     separator = ", ";
   }
+  if (reached_ > 0.0 && reached_ < 1.0)
+    message << "; the solution can be followed up to a step of " << reached_ * size_;
   return {report, work_.steps, time, message.str()};
 }
 
@@ -256,9 +268,10 @@ StepReport Integrator::retry(double h) {
   q_ = before_.q;
   p_ = before_.p;
   v_ = before_.v;
+  const Guess guess = unlearned_ ? Guess::last_solution : Guess::plain;  // plain after a divided step
   first_stage_solved_ = unlearned_ = false;
   --work_.steps;
-  return take(h, Guess::last_solution);
+  return take(h, guess);
 }
 
 /// Shows the last step to the predictors: not at once, since it may be taken again.
@@ -277,9 +290,32 @@ void Integrator::advance_clock(double h) {
   clock_ = {next, change - (next - now), 0};
 }
 
-StepReport Integrator::take(double size, Guess guess) {
+/// After a step: what it leaves to the next ones.
+void Integrator::remember(int pieces) {
+  for (Part& part : parts_) part.problem->keep();
+  retryable_ = true;
+  unlearned_ = pieces == 1;
+  if (!unlearned_)  // the steps are no longer equally long
+    for (Stage& stage : stages_) stage.predictor.reset();
+}
+
+/// One step, where the options allow it and nothing else does in smaller ones.
+StepReport Integrator::take(double h, Guess guess) {
+  StepReport report = take_in_pieces(h, 1, guess);
+  for (int pieces = 2; !report.ok() && pieces <= options_.substeps; pieces *= 2) {
+    const StepReport divided = take_in_pieces(h, pieces, Guess::plain);
+    if (!divided.ok()) continue;
+    ++work_.retries.divided_steps;
+    report = divided;
+  }
+  size_ = h;
+  return report;
+}
+
+/// One step in so many equal pieces.
+StepReport Integrator::take_in_pieces(double whole, int pieces, Guess guess) {
   const double start = time();
-  size_ = size;
+  size_ = whole / pieces;
   before_.clock = clock_;
   before_.q = q_;
   before_.p = p_;
@@ -287,14 +323,16 @@ StepReport Integrator::take(double size, Guess guess) {
   retryable_ = false;
   double t = start;
   SolveReport total;
+  reached_ = 1.0;
   q_stage_ = q_;
   p_stage_ = p_;
-  for (std::size_t k = 0; k < stages_.size(); ++k) {
-    Stage& stage = stages_[k];
+  for (std::size_t k = 0; k < stages_.size() * static_cast<std::size_t>(pieces); ++k) {
+    const std::size_t number = k % stages_.size();
+    Stage& stage = stages_[number];
     StepProblem& problem = *parts_[stage.part].problem;
-    const double h = stage.fraction * size;
+    const double h = stage.fraction * size_;
     if (k > 0 || !first_stage_solved_) {
-      const SolveReport report = solve_stage(k, t, q_stage_, p_stage_, guess);
+      const SolveReport report = solve_stage(number, t, q_stage_, p_stage_, guess);
       if (!report.ok()) {
         StepReport failure = failed(report, problem, start);
         failure.failure += describe_singularity(problem, stage.solution, *scene_);
@@ -303,6 +341,7 @@ StepReport Integrator::take(double size, Guess guess) {
       total.iterations += report.iterations;
       total.residual_evaluations += report.residual_evaluations;
       total.jacobian_evaluations += report.jacobian_evaluations;
+      total.line_searches += report.line_searches;
       total.residual_norms = report.residual_norms;
     }
     problem.finish(stage.solution, q_next_, p_next_, impulse_);
@@ -317,29 +356,34 @@ StepReport Integrator::take(double size, Guess guess) {
   }
   std::swap(q_, q_stage_);
   std::swap(p_, p_stage_);
-  advance_clock(size);
+  remember(pieces);
+  advance_clock(whole);
   first_stage_solved_ = false;
-  retryable_ = unlearned_ = true;
   return {total, work_.steps++, start, {}};
+}
+
+/// The velocity in Δ_Q(q) whose momentum is p up to the annihilator.
+SolveReport Integrator::project_velocity(double t, const Vector& q, const Vector& p, Vector& v) {
+  const Eigen::Index n = q_.size();
+  velocity_solver_->reset();
+  if (phase_space_velocity_problem_) {
+    phase_space_velocity_problem_->begin(t, q);
+    v = v_;
+    return velocity_solver_->solve(v);
+  }
+  velocity_problem_.begin(t, q, p);
+  velocity_unknowns_.head(n) = v_;
+  velocity_unknowns_.tail(velocity_unknowns_.size() - n).setZero();
+  const SolveReport report = velocity_solver_->solve(velocity_unknowns_);
+  if (report.ok()) v = velocity_unknowns_.head(n);
+  return report;
 }
 
 /// v, and the forces of the rows into acceleration_unknowns_.  Reading leaves no trace in the stepping: v_
 /// stays.
 SolveReport Integrator::solve_velocity(double t, Vector& v) {
-  const Eigen::Index n = q_.size();
-  if (phase_space_velocity_problem_) {
-    phase_space_velocity_problem_->begin(t, q_);
-    v = v_;
-    velocity_solver_->reset();
-    return velocity_solver_->solve(v);
-  }
-  velocity_problem_.begin(t, q_, p_);
-  velocity_solver_->reset();
-  velocity_unknowns_.head(n) = v_;
-  velocity_unknowns_.tail(velocity_unknowns_.size() - n).setZero();
-  const SolveReport report = velocity_solver_->solve(velocity_unknowns_);
-  if (!report.ok()) return report;
-  v = velocity_unknowns_.head(n);
+  const SolveReport report = project_velocity(t, q_, p_, v);
+  if (!report.ok() || phase_space_velocity_problem_) return report;
   acceleration_problem_.begin(t, q_, v);
   acceleration_unknowns_.setZero();
   acceleration_solver_->reset();

@@ -7,6 +7,8 @@
 #include <diracstep/core/registry.hpp>
 #include <diracstep/core/saddle_point.hpp>
 #include <diracstep/core/scene.hpp>
+#include <diracstep/core/snapshot.hpp>
+#include <diracstep/core/step_continuation.hpp>
 #include <diracstep/core/step_problem.hpp>
 #include <functional>
 #include <memory>
@@ -34,13 +36,20 @@ struct IntegratorOptions {
   bool force_degenerate = false;  ///< use a method on a degenerate scene that is known to be unstable there
   bool project_start = false;     ///< move an inconsistent start onto the constraints instead of refusing it
   bool drop_dependent_rows =
-      false;                      ///< leave out rows that depend on others at the start instead of refusing
+      false;         ///< leave out rows that depend on others at the start instead of refusing
+  int substeps = 1;  ///< a step that cannot be solved is taken in 2, 4, … up to so many smaller ones
   bool compensated_sums = false;  ///< sums of a step in extended precision, what rounding drops carried on:
                                   ///< round-off in the energy then grows like a random walk, see
                                   ///< StepProblem::compensate.  Pays over very many steps
 };
 
-/// What one step did.  A failed step leaves the state as it was.
+/// What one step did.  A failed step leaves the state as it was, bit by bit; only the work done counts.
+///
+/// A system that Newton's method from the predicted guess does not solve is tried with a line search, from
+/// the plain guess, from the last solution, and by following the solution from small step sizes on
+/// (step_continuation.hpp); then, where the options allow it, the step is taken in smaller ones.  A solution
+/// far from its guess, or the first of a run, is compared with the one that smaller steps lead to, which is
+/// taken where it is another.
 struct [[nodiscard]] StepReport {
   SolveReport solve;
   long step = 0;        ///< number of the step, from 0
@@ -50,6 +59,20 @@ struct [[nodiscard]] StepReport {
   bool ok() const { return solve.ok(); }
 };
 
+/// How often a step needed more than Newton's method from its first guess.
+struct Retries {
+  long line_searches = 0;       ///< attempts of the solver with a line search
+  long plain_guesses = 0;       ///< solves from the plain guess after the predicted one failed
+  long previous_solutions = 0;  ///< solves from the last solution after that
+  long continuations = 0;       ///< solutions followed from small step sizes on
+  long other_branches = 0;      ///< … that were not the solution found before
+  long divided_steps = 0;       ///< steps taken in smaller ones
+
+  long total() const {
+    return line_searches + plain_guesses + previous_solutions + continuations + divided_steps;
+  }
+};
+
 /// Work done since the start.
 struct Work {
   long steps = 0;
@@ -57,6 +80,7 @@ struct Work {
   long iterations = 0;
   long residual_evaluations = 0;
   long jacobian_evaluations = 0;
+  Retries retries;
 };
 
 /// Everything that can be read at one point of a trajectory.
@@ -123,11 +147,18 @@ class Integrator {
 
   std::vector<PlanLine> plan() const;
 
+  /// All that the next steps depend on.  After `restore`, an integrator of the same scene and options goes on
+  /// with the same bits as the one saved.  restore() throws Misuse for a snapshot that does not fit, and then
+  /// the integrator is as after reset().  The last step before it cannot be taken again by retry().
+  Snapshot save() const;
+  void restore(Snapshot from);
+
  private:
   /// One of the two steps that a composition is made of: the method, and its adjoint where it is not its own.
   struct Part {
     std::unique_ptr<StepProblem> problem;
     std::unique_ptr<NonlinearSolver> solver;  ///< null where the step is explicit
+    std::unique_ptr<StepContinuation> continuation;
   };
   /// A fraction of the step taken with one of the parts.
   struct Stage {
@@ -157,19 +188,29 @@ class Integrator {
     double base = 0.0, rest = 0.0;
     long steps = 0;
   };
-  enum class Guess { predicted, last_solution };
-
   Part make_part(const Method& method, bool mirror_rule, const SolverFactory& solvers) const;
   void plan_stages(const Registry& registry, const SolverFactory& solvers);
+  enum class Guess { predicted, plain, last_solution };
+
+  SolveReport project_velocity(double t, const Vector& q, const Vector& p, Vector& v);
   SolveReport solve_velocity(double t, Vector& v);
+  SolveReport solve_stage(std::size_t stage, double t, const Vector& q, const Vector& p, Guess guess);
+  SolveReport solve(Part& part, Vector& x, SolveReport& total);
+  SolveReport retry_stage(Stage& stage, Interval step, const Vector& q, const Vector& p, Guess guess,
+                          SolveReport total);
+  bool doubtful(const Stage& stage, Interval step, const Vector& q, const Vector& p,
+                const SolveReport& report);
+  SolveReport follow_stage(Stage& stage, Interval step, const Vector& q, const Vector& p, SolveReport found);
+  void count(const SolveReport& report, long solves = 1);
   void forget();
   void compensate();
   void learn();
   StepReport take(double h, Guess guess);
+  StepReport take_in_pieces(double h, int pieces, Guess guess);
+  void remember(int pieces);
   void advance_clock(double h);
-  SolveReport solve_stage(std::size_t stage, double t, const Vector& q, const Vector& p, Guess guess);
-  void count(const SolveReport& report);
   StepReport failed(const SolveReport& report, const StepProblem& problem, double time);
+  void read(Snapshot& from);
 
   std::shared_ptr<const Scene> scene_;
   std::vector<PlanLine> preparation_;
@@ -188,15 +229,17 @@ class Integrator {
   Clock clock_;
   double size_ = 0.0;  ///< of the step under way, or of the last one
   Vector q_, p_;
-  Vector v_;  ///< the velocity, roughly: a guess only
-  Vector q_next_, p_next_, q_stage_, p_stage_, impulse_;
+  Vector v_;              ///< the velocity, roughly: a guess only
+  double reached_ = 1.0;  ///< part of the step that could be solved, where the last one failed
+  Vector q_next_, p_next_, q_stage_, p_stage_, impulse_, start_velocity_, guess_;
   Vector velocity_unknowns_, acceleration_unknowns_;
   struct {
     Clock clock;
     Vector q, p, v;
-  } before_;                         ///< where the last step started
-  bool retryable_ = false;           ///< before_ is known
-  bool unlearned_ = false;           ///< the predictors have not seen the last step yet
+  } before_;                  ///< where the last step started
+  bool retryable_ = false;    ///< before_ is known
+  bool unlearned_ = false;    ///< the predictors have not seen the last step yet
+  bool on_a_motion_ = false;  ///< the start was given by restart(), so that v_ is near the velocity there
   bool first_stage_solved_ = false;  ///< the first stage of the next step is solved already
   Work work_;
 };

@@ -17,6 +17,8 @@ const char* describe(SolveStatus status) {
       return "singular Jacobian";
     case SolveStatus::not_finite:
       return "a value was not finite";
+    case SolveStatus::other_branch:
+      return "the solution found is not the one that smaller steps lead to";
   }
   return "unknown status";
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <diracstep/core/snapshot.hpp>
 #include <diracstep/core/sparsity_pattern.hpp>
 #include <diracstep/core/types.hpp>
 #include <functional>
@@ -44,6 +45,7 @@ enum class SolveStatus {
   no_convergence,     ///< iterations used up or the residual no longer falls
   singular_jacobian,  ///< the linear solver met a zero pivot
   not_finite,         ///< a residual or Jacobian was NaN or infinite
+  other_branch,       ///< solved, but smaller steps do not lead to this solution (step_continuation.hpp)
 };
 
 /// One line a person can read.
@@ -55,6 +57,7 @@ struct [[nodiscard]] SolveReport {
   int iterations = 0;
   int residual_evaluations = 0;
   int jacobian_evaluations = 0;
+  int line_searches = 0;  ///< attempts with a line search, after plain Newton failed
   std::array<double, 4> residual_norms{};
 
   bool ok() const { return status == SolveStatus::ok; }
@@ -68,6 +71,9 @@ class NonlinearSolver {
   virtual SolveReport solve(VectorRef x) = 0;
   /// Forgets what it keeps between solves (pivots), so that a run repeats bit by bit.
   virtual void reset() {}
+  /// Writes and reads what is kept between solves, so that those after `restore` repeat bit by bit.
+  virtual void save(Snapshot& /*to*/) const {}
+  virtual void restore(Snapshot& /*from*/) {}
   /// What does the work, for plans and reports: "KINSOL, dense".
   virtual std::string description() const = 0;
   /// How it goes about it, for plans: "Newton's method, fresh Jacobian in each iteration".

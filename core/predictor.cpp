@@ -13,6 +13,8 @@ constexpr std::size_t longest = 5;
 constexpr std::array<std::array<double, longest>, longest + 1> extrapolation{
     {{}, {1.0}, {2.0, -1.0}, {3.0, -3.0, 1.0}, {4.0, -6.0, 4.0, -1.0}, {5.0, -10.0, 10.0, -5.0, 1.0}}};
 
+constexpr long most_steps = 1L << 53;  // a double counts so far
+
 /// The rules are compared at every step of the first ones, then now and then.
 constexpr long always_until = 12, later_every = 16;
 
@@ -66,6 +68,20 @@ void Predictor::learn(ConstVectorRef solution) {
   std::rotate(history_.begin(), history_.end() - 1, history_.end());
   history_.front() = solution;
   known_ = std::min(known_ + 1, longest);
+}
+
+void Predictor::save(Snapshot& to) const {
+  to.put(static_cast<double>(learned_));
+  to.put(static_cast<double>(known_));
+  to.put(static_cast<double>(best_));
+  for (std::size_t k = 0; k < known_; ++k) to.put(history_[k]);
+}
+
+void Predictor::restore(Snapshot& from) {
+  learned_ = from.whole_number(most_steps);
+  known_ = static_cast<std::size_t>(from.whole_number(longest));
+  best_ = static_cast<std::size_t>(from.whole_number(static_cast<long>(rules_.size()) - 1));
+  for (std::size_t k = 0; k < known_; ++k) from.read(history_[k]);
 }
 
 }  // namespace diracstep

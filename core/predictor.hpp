@@ -25,6 +25,13 @@ class Predictor {
   /// Takes in the solution of a step.
   void learn(ConstVectorRef solution);
 
+  /// Whether a step was learned at all, and its solution.
+  bool begun() const { return known_ > 0; }
+  const Vector& last() const { return history_.front(); }
+
+  void save(Snapshot& to) const;
+  void restore(Snapshot& from);
+
  private:
   struct Rule {
     bool through_stages;  ///< which family

@@ -65,6 +65,8 @@ class ImplicitStep final : public StepProblem {
     hessian_.setZero(s_->pattern().nonzeros(), s_->pairs());
     last_x_.setZero(size());
     q1_.setZero(n_);
+    terms_.setZero(s_->columns());
+    multipliers_.setZero(m_);
     if (scene.force) {
       if (s_->type() == GeneratingType::four) throw Misuse("generating functions of type 4 take no forces");
       force_.emplace(scene.force, rule.nodes);
@@ -78,9 +80,24 @@ class ImplicitStep final : public StepProblem {
 
   int size() const override { return n_ + m_ + inner_; }
   int leading_unknowns() const override { return n_; }
+  void keep() override {
+    if (hessian_known_) measure_terms();
+    terms_known_ = true;
+    multipliers_ = last_x_.segment(n_, m_);
+  }
   void reset() override {
-    for (Columns* columns : {&y_, &hessian_}) columns->setZero();
-    last_x_.setZero();
+    terms_known_ = false;
+    multipliers_.setZero();
+  }
+  void save(Snapshot& to) const override {
+    to.put(terms_known_ ? 1.0 : 0.0);
+    to.put(terms_);
+    to.put(multipliers_);
+  }
+  void restore(Snapshot& from) override {
+    terms_known_ = from.whole_number(1) == 1;
+    from.read(terms_);
+    from.read(multipliers_);
   }
   const SparsityPattern& pattern() const override { return pattern_; }
   std::span<const ResidualBlock> blocks() const override { return blocks_; }
@@ -94,9 +111,10 @@ class ImplicitStep final : public StepProblem {
 
   void begin(Interval step, const Vector& q0, const Vector& p0) override {
     data_.freeze(step, q0, p0);
-    if (hessian_.isZero(0.0)) sample_hessian();
-    update_scales();
     last_x_[0] = std::nan("");
+    if (!terms_known_) sample_hessian();
+    hessian_known_ = false;
+    update_scales();
   }
 
   void guess(const Vector& v0, VectorRef x) override {
@@ -129,6 +147,7 @@ class ImplicitStep final : public StepProblem {
   void jacobian(ConstVectorRef x, VectorRef values) override {
     evaluate(x);
     s_->hessian(data_.step, y_, hessian_);
+    hessian_known_ = true;
     values.setZero();
     for (const HessianBlock& block : hessian_blocks_) {
       const double factor = block.row_factor(*this) * block.column_factor(*this);
@@ -327,19 +346,24 @@ class ImplicitStep final : public StepProblem {
     if (inner_ > 0)
       s_->guess_inner(data_.step, data_.q0, data_.p0, Vector::Zero(n_), y_.rightCols(s_->inner_columns()));
     s_->hessian(data_.step, y_, hessian_);
+    measure_terms();
+  }
+
+  void measure_terms() {
+    for (int i = 0; i < s_->columns(); ++i)
+      if (i != 1) terms_[i] = cancelling_terms(i);  // the end is no row
   }
 
   void update_scales() {
     const double own =
         graph_.starts_from_position ? std::abs(data_.step.size) * max_norm(data_.p0) : max_norm(data_.q0);
     // The impulse, as large as it was in the last step.
-    const double impulse =
-        graph_.starts_from_position && m_ > 0 ? data_.impulse_scale(last_x_.segment(n_, m_)) : 0.0;
-    blocks_[0].scale = usable_scale(std::max({own, impulse, std::abs(row_factor()) * cancelling_terms(0)}));
+    const double impulse = graph_.starts_from_position && m_ > 0 ? data_.impulse_scale(multipliers_) : 0.0;
+    blocks_[0].scale = usable_scale(std::max({own, impulse, std::abs(row_factor()) * terms_[0]}));
     if (m_ > 0) blocks_[1].scale = data_.constraint_scale();
     if (inner_ == 0) return;
     double largest = 0.0;
-    for (int i = 2; i < s_->columns(); ++i) largest = std::max(largest, cancelling_terms(i));
+    for (int i = 2; i < s_->columns(); ++i) largest = std::max(largest, terms_[i]);
     blocks_.back().scale = usable_scale(largest);
   }
 
@@ -371,6 +395,9 @@ class ImplicitStep final : public StepProblem {
   std::vector<ResidualBlock> blocks_;
   Vector last_x_, q1_;
   Columns y_, gradient_, hessian_;
+  Vector terms_;        ///< size of the terms of each column of the gradient, in the last step kept
+  Vector multipliers_;  ///< in that step
+  bool terms_known_ = false, hessian_known_ = false;
 };
 
 /// The graph is solved for its end by S itself; what is left is c(q0, q1(p0 + A(q0)ᵀλ)) = 0 for hλ.

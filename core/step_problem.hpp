@@ -33,6 +33,9 @@ class StepProblem : public NonlinearProblem {
   /// How many unknowns come before the multipliers, whose guess hardly matters.
   virtual int leading_unknowns() const { return size(); }
 
+  /// Keeps what the next steps need of the one just finished: the sizes of terms that round-off is judged by.
+  /// Until then a step leaves no trace.
+  virtual void keep() {}
   /// From now on, sums over the stages in extended precision with coefficients to match, and q1, p1 with what
   /// rounding drops from them carried into the step that starts there (compensated addition).  Plain sums
   /// with rounded coefficients are a step that is not quite self-adjoint, whose energy drifts linearly by
@@ -41,6 +44,10 @@ class StepProblem : public NonlinearProblem {
 
   /// Forgets all that earlier steps left behind, so that a run repeats bit by bit.
   virtual void reset() {}
+
+  /// Writes and reads what was kept.
+  virtual void save(Snapshot& /*to*/) const {}
+  virtual void restore(Snapshot& /*from*/) {}
 
   /// What the unknowns are, for plans: "q1 (3), λ (1)".
   virtual std::string unknowns() const = 0;

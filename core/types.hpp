@@ -2,6 +2,10 @@
 
 #include <Eigen/Core>
 
+#ifdef __FAST_MATH__
+#error "DiracStep: compile without -ffast-math and -Ofast: the same input would no longer give the same bits"
+#endif
+
 namespace diracstep {
 
 /// Configurations, velocities, momenta, multipliers: plain columns of doubles.

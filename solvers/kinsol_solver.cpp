@@ -7,6 +7,7 @@
 #include <diracstep/solvers/detail/vector.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
 #include <exception>
+#include <limits>
 #include <string>
 #include <utility>
 
@@ -74,7 +75,10 @@ class KinsolSolver final : public NonlinearSolver {
     if (fixed_point_ && !given_up_) attempt(KIN_FP);
     if (options_.iteration == Iteration::automatic && fixed_point_) judge_fixed_point();
     if (!report_.ok()) attempt(KIN_NONE);
-    if (!report_.ok()) attempt(KIN_LINESEARCH);
+    if (!report_.ok()) {
+      ++report_.line_searches;
+      attempt(KIN_LINESEARCH);
+    }
     x = unknowns();
     return report_;
   }
@@ -83,6 +87,16 @@ class KinsolSolver final : public NonlinearSolver {
     factors_.reset();
     judged_solves_ = judged_iterations_ = 0;
     given_up_ = false;
+  }
+  void save(Snapshot& to) const override {
+    factors_.save(to);
+    for (const int count : {judged_solves_, judged_iterations_, given_up_ ? 1 : 0}) to.put(count);
+  }
+  void restore(Snapshot& from) override {
+    factors_.restore(from);
+    judged_solves_ = static_cast<int>(from.whole_number(solves_to_judge));
+    judged_iterations_ = static_cast<int>(from.whole_number(std::numeric_limits<int>::max()));
+    given_up_ = from.whole_number(1) == 1;
   }
 
   std::string description() const override { return std::string("KINSOL, ") + factors_.name(); }

@@ -37,8 +37,11 @@ std::string bar(double part) {
 
 }  // namespace
 
-Progress::Progress()
-    : terminal_(isatty(STDERR_FILENO) == 1), start_(Clock::now()), next_(start_ + quiet_at_first) {}
+Progress::Progress(double done_before)
+    : terminal_(isatty(STDERR_FILENO) == 1),
+      done_before_(done_before),
+      start_(Clock::now()),
+      next_(start_ + quiet_at_first) {}
 
 Progress::~Progress() { wipe(); }
 
@@ -48,7 +51,9 @@ void Progress::show(double part, const std::string& what) {
   part = std::clamp(part, 0.0, 1.0);
   const double elapsed = std::chrono::duration<double>(Clock::now() - start_).count();
   std::string line = fmt::format("[{}] {:3.0f} %", bar(part), 100.0 * part);
-  if (part > 0.02) line += fmt::format(", about {} left", duration(elapsed * (1.0 - part) / part));
+  const double done = part - done_before_;
+  if (done > 0.02 * (1.0 - done_before_))
+    line += fmt::format(", about {} left", duration(elapsed * (1.0 - part) / done));
   line += "  " + what;
   if (line.size() >= terminal_width()) line.resize(terminal_width() - 1);
   fmt::print(stderr, "\r{}\x1b[K", line);

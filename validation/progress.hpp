@@ -9,7 +9,8 @@ namespace diracstep {
 /// standard error is not a terminal.  The line is wiped when the object goes.
 class Progress {
  public:
-  Progress();
+  /// `done_before` is the part that was done earlier and tells nothing of the time the rest will take.
+  explicit Progress(double done_before = 0.0);
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
   ~Progress();
@@ -24,6 +25,7 @@ class Progress {
 
   bool terminal_;
   bool shown_ = false;
+  double done_before_;
   Clock::time_point start_;
   Clock::time_point next_;
 };

@@ -1,5 +1,7 @@
 #include <cmath>
+#include <diracstep/core/errors.hpp>
 #include <diracstep/solvers/detail/jacobian_factors.hpp>
+#include <iterator>
 #include <limits>
 
 namespace diracstep::detail {
@@ -32,32 +34,72 @@ JacobianFactors::JacobianFactors(NonlinearProblem& problem, JacobianPolicy polic
       policy_(resolved(policy, problem.size())),
       constant_(policy != JacobianPolicy::fresh && !std::isnan(problem.constant_jacobian_parameter())) {
   factors_.reserve(most_parameters);
-  factors_.push_back({none, make_linear_solver(problem.pattern())});
-  current_ = factors_.front().solver.get();
-  values_.setZero(problem.pattern().nonzeros());
+  current_ = &add();
+}
+
+JacobianFactors::Factors& JacobianFactors::add() {
+  factors_.push_back(
+      {none, make_linear_solver(problem_.pattern()), Vector::Zero(problem_.pattern().nonzeros()), false});
+  return factors_.back();
 }
 
 void JacobianFactors::reset() {
   factors_.resize(1);
   factors_.front().parameter = none;
+  factors_.front().factored = false;
   factors_.front().solver->reset();
-  current_ = factors_.front().solver.get();
+  current_ = &factors_.front();
   usable_ = false;
   fresh_starts_ = 0;
 }
 
+void JacobianFactors::save(Snapshot& to) const {
+  if (!keeps_factors()) return factors_.front().solver->save(to);
+  to.put(static_cast<double>(factors_.size()));
+  to.put(static_cast<double>(current_ - factors_.data()));
+  to.put(usable_ ? 1.0 : 0.0);
+  to.put(fresh_starts_);
+  for (const Factors& kept : factors_) {
+    kept.solver->save(to);
+    to.put(kept.factored ? 1.0 : 0.0);
+    if (!kept.factored) continue;
+    to.put(kept.values);
+    if (constant_) to.put(kept.parameter);
+  }
+}
+
+void JacobianFactors::restore(Snapshot& from) {
+  reset();
+  if (!keeps_factors()) return factors_.front().solver->restore(from);
+  const long most = most_parameters;
+  const long count = from.whole_number(most), current = from.whole_number(most);
+  if (count < 1 || current >= count) throw Misuse("the snapshot has no factors of a Jacobian");
+  usable_ = from.whole_number(1) == 1;
+  fresh_starts_ = static_cast<int>(from.whole_number(fresh_starts_after_failure));
+  while (std::ssize(factors_) < count) add();
+  current_ = factors_.data() + current;
+  for (Factors& kept : factors_) {
+    kept.solver->restore(from);
+    kept.factored = from.whole_number(1) == 1;
+    if (!kept.factored) continue;
+    from.read(kept.values);
+    if (constant_) kept.parameter = from.number();
+    if (!kept.solver->holds(kept.values.data())) (void)kept.solver->factor(kept.values.data());
+  }
+}
+
 /// Takes the factors of this parameter; false where they are still to be made.
 bool JacobianFactors::select(double parameter) {
-  for (const Factors& kept : factors_)
+  for (Factors& kept : factors_)
     if (kept.parameter == parameter) {
-      current_ = kept.solver.get();
+      current_ = &kept;
       return true;
     }
   const bool first = std::isnan(factors_.front().parameter);
   const std::size_t most = problem_.size() < large ? most_parameters : most_parameters_of_large;
-  if (!first && factors_.size() < most) factors_.push_back({none, make_linear_solver(problem_.pattern())});
+  if (!first && factors_.size() < most) add();
   factors_.back().parameter = parameter;
-  current_ = factors_.back().solver.get();
+  current_ = &factors_.back();
   return false;
 }
 
@@ -88,9 +130,11 @@ JacobianFactors::Outcome JacobianFactors::prepare(ConstVectorRef x, double norm)
   if (!wanted_now) return Outcome::ready;
   ++evaluations_;
   usable_ = false;
-  problem_.jacobian(x, values_);
-  if (!values_.allFinite()) return Outcome::not_finite;
-  usable_ = current_->factor(values_.data());
+  current_->factored = false;
+  problem_.jacobian(x, current_->values);
+  if (!current_->values.allFinite()) return Outcome::not_finite;
+  current_->factored = true;
+  usable_ = current_->solver->factor(current_->values.data());
   return usable_ ? Outcome::ready : Outcome::singular;
 }
 

@@ -20,7 +20,7 @@ class JacobianFactors {
   /// Factors that serve for a Newton step at x, new or old ones; `norm` is the scaled residual at x.
   Outcome prepare(ConstVectorRef x, double norm);
   /// Replaces b by the solution.
-  void solve(double* b) { current_->solve(b); }
+  void solve(double* b) { current_->solver->solve(b); }
 
   /// Jacobians taken since begin().
   int evaluations() const { return evaluations_; }
@@ -28,6 +28,9 @@ class JacobianFactors {
   bool exact() const { return policy_ == JacobianPolicy::fresh || constant_; }
   /// Forgets every factor and pivot.
   void reset();
+  /// Writes and reads all that the next solves depend on, old factors among it.
+  void save(Snapshot& to) const;
+  void restore(Snapshot& from);
 
   const char* name() const { return factors_.front().solver->name(); }
   std::string policy() const;
@@ -36,17 +39,20 @@ class JacobianFactors {
   struct Factors {
     double parameter;  ///< of a constant Jacobian; NaN for none
     std::unique_ptr<LinearSolver> solver;
+    Vector values;          ///< of the Jacobian factored last
+    bool factored = false;  ///< since reset()
   };
 
   bool wanted(double norm);
   bool select(double parameter);
+  Factors& add();
+  bool keeps_factors() const { return constant_ || policy_ != JacobianPolicy::fresh; }
 
   NonlinearProblem& problem_;
   JacobianPolicy policy_;
   bool constant_ = false;
   std::vector<Factors> factors_;  ///< one for each parameter of a constant Jacobian, else a single one
-  LinearSolver* current_;
-  Vector values_;
+  Factors* current_;              ///< one of them, which never move
   double last_norm_ = 0.0;
   int evaluations_ = 0, iterations_ = 0;
   int fresh_starts_ = 0;  ///< so many solves more begin with a new Jacobian, since an old one failed

@@ -112,7 +112,8 @@ class Klu final : public LinearSolver {
   explicit Klu(const SparsityPattern& pattern)
       : starts_(pattern.column_starts().begin(), pattern.column_starts().end()),
         rows_(pattern.row_indices().begin(), pattern.row_indices().end()),
-        size_(pattern.rows()) {
+        size_(pattern.rows()),
+        fresh_values_(pattern.nonzeros()) {
     klu_defaults(&common_);
     common_.btf = 0;
     common_.ordering = 0;
@@ -134,6 +135,35 @@ class Klu final : public LinearSolver {
         klu_refactor(starts_.data(), rows_.data(), input, symbolic_, numeric_, &common_) &&
         klu_rcond(symbolic_, numeric_, &common_) && common_.rcond > 1e-3 * fresh_rcond_)
       return true;
+    return factor_afresh(values);
+  }
+
+  void solve(double* b) override { klu_solve(symbolic_, numeric_, size_, 1, b, &common_); }
+
+  void reset() override { klu_free_numeric(&numeric_, &common_); }
+
+  /// The pivots are those of the matrix that was last factored afresh.
+  void save(Snapshot& to) const override {
+    to.put(numeric_ != nullptr ? 1.0 : 0.0);
+    if (numeric_ != nullptr) to.put(fresh_values_);
+  }
+  void restore(Snapshot& from) override {
+    reset();
+    if (from.whole_number(1) == 0) return;
+    from.read(fresh_values_);
+    factor_afresh(fresh_values_.data());
+  }
+
+  bool holds(const double* values) const override {
+    return numeric_ != nullptr && fresh_values_ == Eigen::Map<const Vector>(values, fresh_values_.size());
+  }
+
+  const char* name() const override { return "KLU"; }
+
+ private:
+  bool factor_afresh(const double* values) {
+    auto* const input = const_cast<double*>(values);  // NOLINT(cppcoreguidelines-pro-type-const-cast)
+    fresh_values_ = Eigen::Map<const Vector>(values, fresh_values_.size());
     klu_free_numeric(&numeric_, &common_);
     numeric_ = klu_factor(starts_.data(), rows_.data(), input, symbolic_, &common_);
     if (numeric_ == nullptr || !klu_rcond(symbolic_, numeric_, &common_)) return false;
@@ -141,19 +171,13 @@ class Klu final : public LinearSolver {
     return fresh_rcond_ > std::numeric_limits<double>::epsilon();
   }
 
-  void solve(double* b) override { klu_solve(symbolic_, numeric_, size_, 1, b, &common_); }
-
-  void reset() override { klu_free_numeric(&numeric_, &common_); }
-
-  const char* name() const override { return "KLU"; }
-
- private:
   std::vector<int> starts_;
   std::vector<int> rows_;
   int size_;
   klu_common common_{};
   klu_symbolic* symbolic_ = nullptr;
   klu_numeric* numeric_ = nullptr;
+  Vector fresh_values_;  ///< what the pivots in use were chosen for
   double fresh_rcond_ = 0.0;
 };
 

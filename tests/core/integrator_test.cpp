@@ -10,67 +10,27 @@
 #include <thread>
 
 #include "allocations.hpp"
+#include "combinations.hpp"
 #include "differences.hpp"
 #include "misuse.hpp"
-#include "scenes.hpp"
 #include "stepping.hpp"
 
 namespace diracstep {
 namespace {
 
+using testing::describe;
+using testing::every_kind_of_step;
 using testing::expect_misuse;
 using testing::expect_parts;
+using testing::for_every_combination;
+using testing::integrator_for;
 using testing::join;
+using testing::same_bits;
 using testing::samples_of;
-using ScenePointer = std::shared_ptr<const Scene>;
+using testing::ScenePointer;
 
 const double nan = std::numeric_limits<double>::quiet_NaN();
 const double infinity = std::numeric_limits<double>::infinity();
-
-Integrator integrator_for(const ScenePointer& scene, const IntegratorOptions& options) {
-  return {scene, Registry::with_built_ins(), kinsol(), options};
-}
-
-/// Methods that differ in how a step is made: implicit, explicit where L allows, with inner columns, with
-/// stages, composed of itself and of a pair.
-const std::vector<IntegratorOptions>& every_kind_of_step() {
-  static const std::vector<IntegratorOptions> kinds{
-      {.method = "type1/midpoint", .step = 0.05},
-      {.method = "type1/trapezoidal", .step = 0.05},
-      {.method = "type3/legendre(type1/midpoint)", .step = 0.05},
-      {.method = "type1/gl:2", .step = 0.05},
-      {.method = "type1/midpoint", .order = 4, .step = 0.05},
-      {.method = "type2/euler", .order = 2, .step = 0.05},
-  };
-  return kinds;
-}
-
-std::string describe(const ScenePointer& scene, const IntegratorOptions& options) {
-  return scene->name + ", " + options.method + ", order " + std::to_string(options.order) + ", dense limit " +
-         std::to_string(options.dense_limit);
-}
-
-/// Calls check(scene, options) for every constraint class, kind of step, and kind of matrix.
-template <class Check>
-void for_every_combination(Check check) {
-  for (const auto& scene : testing::every_constraint_class())
-    for (IntegratorOptions options : every_kind_of_step())
-      for (const int limit : {40, 0}) {
-        options.dense_limit = limit;
-        SCOPED_TRACE(describe(scene, options));
-        check(scene, options);
-      }
-}
-
-bool same_bits(const Sample& a, const Sample& b) {
-  return a.time == b.time && a.q == b.q && a.v == b.v && a.p == b.p && a.lambda == b.lambda &&
-         a.energy == b.energy;
-}
-
-bool same_bits(const std::vector<Sample>& a, const std::vector<Sample>& b) {
-  return std::equal(a.begin(), a.end(), b.begin(), b.end(),
-                    [](const Sample& x, const Sample& y) { return same_bits(x, y); });
-}
 
 double distance(const Vector& a, const Vector& b) { return (a - b).lpNorm<Eigen::Infinity>(); }
 
@@ -289,7 +249,7 @@ TEST(Integrator, ResetForgetsTheSizeOfEarlierResiduals) {
     const IntegratorOptions options{.method = method, .step = 0.01};
     Integrator used = integrator_for(shared, options), fresh = integrator_for(shared, options);
     used.reset({0.0, Vector::Constant(1, 1e12), Vector::Zero(1)});
-    ASSERT_TRUE(used.step().ok()) << method;
+    (void)used.step();  // whether round-off of this size allows a solution or not
     used.reset();
     EXPECT_TRUE(same_bits(run_of(used), run_of(fresh))) << method;
     EXPECT_EQ(used.work().iterations, fresh.work().iterations) << method;

@@ -9,10 +9,8 @@
 #include <diracstep/core/run.hpp>
 #include <diracstep/validation/command/arguments.hpp>
 #include <diracstep/validation/command/interrupt.hpp>
-#include <diracstep/validation/command/run_report.hpp>
-#include <diracstep/validation/command/trajectory_file.hpp>
+#include <diracstep/validation/command/run_control.hpp>
 #include <diracstep/validation/command/verbs.hpp>
-#include <diracstep/validation/energy_doubt.hpp>
 #include <diracstep/validation/progress.hpp>
 #include <memory>
 #include <optional>
@@ -31,6 +29,10 @@ struct Options {
   std::optional<std::string> rule;
   std::string out;
   long every = 1;
+  int substeps = 1;
+  std::string checkpoint;
+  long checkpoint_every = 0;
+  std::string resume;
   bool adaptive = false;
   double eps = 0.2;
   std::string control = "integrating";
@@ -41,78 +43,6 @@ struct Options {
   bool json = false;
 };
 
-/// Steps to the end, to a failure or to Ctrl-C, and keeps points on the way.
-class FixedTrajectory {
- public:
-  FixedTrajectory(Integrator& integrator, Momentum momentum, long every, TrajectoryFile* file,
-                  RunResult& result)
-      : integrator_(integrator),
-        momentum_(momentum),
-        every_(every),
-        file_(file),
-        result_(result),
-        doubt_(integrator.scene()) {}
-
-  void run(long steps) {
-    const long every_look = std::max(1L, steps / points_looked_at);
-    keep();
-    for (long k = 1; k <= steps && result_.failure.empty() && !interrupted(); ++k) {
-      const StepReport report = integrator_.step();
-      if (!report.ok())
-        result_.failure = report.failure;
-      else if (k == steps || (file_ != nullptr && k % every_ == 0))
-        keep();
-      else if (k % every_look == 0)
-        look();
-      if (k % steps_between_shows == 0) show(k, steps);
-    }
-    if (result_.failure.empty() && interrupted() && integrator_.work().steps < steps)
-      result_.failure = fmt::format("interrupted at t = {:.17g}", integrator_.time());
-    if (integrator_.time() != kept_time_) keep();
-    result_.work = integrator_.work();
-    result_.doubt = doubt_.text();
-  }
-
- private:
-  static constexpr long steps_between_shows = 256;
-  static constexpr long points_looked_at = 400;
-
-  void keep() {
-    Sample sample;
-    const SolveReport report = integrator_.sample(momentum_, sample);
-    if (!report.ok()) {
-      if (result_.failure.empty())
-        result_.failure =
-            fmt::format("reading the state at t = {}: {}", integrator_.time(), describe(report.status));
-      return;
-    }
-    kept_time_ = integrator_.time();
-    doubt_.see(sample);
-    if (file_ != nullptr) file_->write(sample);
-    result_.end = std::move(sample);
-  }
-
-  /// At the energy only; a point that cannot be read is told of where it is kept.
-  void look() {
-    if (integrator_.sample(Momentum::projected, looked_at_).ok()) doubt_.see(looked_at_);
-  }
-
-  void show(long k, long steps) {
-    progress_.show(static_cast<double>(k) / static_cast<double>(steps),
-                   fmt::format("step {} of {}", k, steps));
-  }
-
-  Integrator& integrator_;
-  Momentum momentum_;
-  long every_;
-  TrajectoryFile* file_;
-  RunResult& result_;
-  EnergyDoubt doubt_;
-  Sample looked_at_;
-  double kept_time_ = std::nan("");
-  Progress progress_;
-};
-
 StepGrid fitted_steps(const CatalogueScene& entry, double end, const std::optional<double>& wanted) {
   const double start = entry.scene->start.time;
   const double step = wanted.value_or(std::copysign(entry.natural_step, end - start));
@@ -121,6 +51,64 @@ StepGrid fitted_steps(const CatalogueScene& entry, double end, const std::option
     say(fmt::format("step {:g} adjusted to {:.17g}, so that {} steps end at t = {:g}", step, grid.step,
                     grid.steps, end));
   return grid;
+}
+
+void require_sense(const Options& options) {
+  const bool checkpoints = !options.checkpoint.empty() || !options.resume.empty();
+  if (options.every < 1) throw Misuse(fmt::format("--every = {}; 1 or more is needed", options.every));
+  if (!options.at.empty() && !options.adaptive) throw Misuse("--at needs --adaptive");
+  if (options.checkpoint_every < 0)
+    throw Misuse(
+        fmt::format("--checkpoint-every = {}; a number of steps is needed, or 0 for every ten seconds",
+                    options.checkpoint_every));
+  if (options.checkpoint_every > 0 && !checkpoints)
+    throw Misuse("--checkpoint-every without --checkpoint FILE");
+  if (!options.out.empty() && options.out == options.checkpoint)
+    throw Misuse(fmt::format("--out and --checkpoint are both '{}'", options.out));
+  if (checkpoints && options.adaptive)
+    throw Misuse("--checkpoint and --resume do not go with --adaptive: checkpoints cover fixed steps only");
+  if (checkpoints && options.error)
+    throw Misuse("--checkpoint and --resume do not go with --error: name the method and the step instead");
+}
+
+/// Where the file goes on: from the checkpoint, or from its beginning.
+void open_trajectory(std::optional<TrajectoryFile>& file, const Options& options, const Scene& scene,
+                     const std::optional<Checkpoint>& saved) {
+  if (options.out.empty()) return;
+  if (saved)
+    file.emplace(options.out, scene, TrajectoryFile::Mark{saved->points, saved->bytes});
+  else
+    file.emplace(options.out, scene);
+}
+
+void go_on(const Checkpoint& saved, const Options& options, Integrator& integrator) {
+  try {
+    integrator.restore(saved.state);
+  } catch (const Misuse& misuse) {
+    throw Misuse(fmt::format("--resume: '{}': {}", options.resume, misuse.what()));
+  }
+  say(fmt::format("going on from step {}, t = {:g}", integrator.work().steps, integrator.time()));
+}
+
+/// Steps of one size to the end, from the start or from a checkpoint.
+void run_fixed(const Options& options, const CatalogueScene& entry, const Session& session,
+               Integrator& integrator, long steps, std::optional<TrajectoryFile>& file, RunResult& result) {
+  Keeping keeping{.momentum = result.momentum, .every = options.every};
+  keeping.checkpoint = options.checkpoint.empty() ? options.resume : options.checkpoint;
+  keeping.checkpoint_every = options.checkpoint_every;
+  keeping.identity = identity(entry, integrator, keeping, !options.out.empty());
+  keeping.identity.emplace_back("rule", options.rule.value_or("the method's own"));
+  keeping.identity.emplace_back("solver", name(session.solver_options.iteration));
+  keeping.identity.emplace_back("Jacobian", name(session.solver_options.jacobian));
+  std::optional<Checkpoint> saved;
+  if (!options.resume.empty()) {
+    saved = read_checkpoint(options.resume);
+    require_same_run(*saved, keeping.identity, options.resume);
+    go_on(*saved, options, integrator);
+  }
+  open_trajectory(file, options, *entry.scene, saved);
+  if (file) keeping.file = &*file;
+  run_to(steps, integrator, keeping, result);
 }
 
 /// Variable steps to the end, or to the last of the times given.
@@ -152,21 +140,18 @@ void run_variable(const Options& options, const CatalogueScene& entry, AdaptiveI
 IntegratorOptions run_once(const Options& options, const CatalogueScene& entry, const Session& session,
                            IntegratorOptions chosen, double end, RunResult& result) {
   std::optional<TrajectoryFile> file;
-  const auto open = [&] {
-    if (!options.out.empty()) file.emplace(options.out, *entry.scene);
-    return file ? &*file : nullptr;
-  };
   if (options.adaptive) {
     chosen.step = std::copysign(chosen.step, end - entry.scene->start.time);
     AdaptiveIntegrator integrator(entry.scene, session.registry, session.solvers, chosen,
                                   {.eps = options.eps, .control = step_control(options.control), .end = end});
-    run_variable(options, entry, integrator, end, open(), result);
+    open_trajectory(file, options, *entry.scene, std::nullopt);
+    run_variable(options, entry, integrator, end, file ? &*file : nullptr, result);
     chosen = integrator.options();
   } else {
     const StepGrid grid = fitted_steps(entry, end, chosen.step);
     chosen.step = grid.step;
     Integrator integrator(entry.scene, session.registry, session.solvers, chosen);
-    FixedTrajectory(integrator, result.momentum, options.every, open(), result).run(grid.steps);
+    run_fixed(options, entry, session, integrator, grid.steps, file, result);
     chosen = integrator.options();
   }
   if (file) {
@@ -216,18 +201,18 @@ void report(const RunResult& result, const Options& options, const CatalogueScen
 
 void run(const Options& given, Session& session) {
   Options options = given;
+  require_sense(options);
   const CatalogueScene entry = make_scene(session, options.scene, parameters(options.set));
   RunResult result;
   result.momentum = momentum(options.momentum);
-  if (options.every < 1) throw Misuse(fmt::format("--every = {}; 1 or more is needed", options.every));
-  if (!options.at.empty() && !options.adaptive) throw Misuse("--at needs --adaptive");
   const double end =
       options.at.empty() ? options.end.value_or(entry.t_end) : numbers("--at", options.at).back();
   IntegratorOptions used{
       .method = options.method,
       .order = options.order,
       .step = options.step.value_or(std::copysign(entry.natural_step, end - entry.scene->start.time)),
-      .constraint_rule = rule(session, options.rule)};
+      .constraint_rule = rule(session, options.rule),
+      .substeps = options.substeps};
   if (options.error) {
     result.search = search(options, entry, session, end, used);
     if (!result.search->warning.empty()) say(result.search->warning);
@@ -271,6 +256,18 @@ void add_run(CLI::App& app, Session& session) {
       ->capture_default_str();
   verb->add_option("--out", options->out, "CSV file for the trajectory")->type_name("FILE");
   verb->add_option("--every", options->every, "Keep each K-th point")->type_name("K")->capture_default_str();
+  verb->add_option("--substeps", options->substeps,
+                   "Take a step that cannot be solved in 2, 4, … up to N smaller ones")
+      ->type_name("N")
+      ->capture_default_str();
+  verb->add_option("--checkpoint", options->checkpoint, "Keep all that is needed to go on in this file")
+      ->type_name("FILE");
+  verb->add_option("--checkpoint-every", options->checkpoint_every,
+                   "Write it at each K-th step; without, every ten seconds and at the end")
+      ->type_name("K");
+  verb->add_option("--resume", options->resume,
+                   "Go on from a checkpoint, with the same bits as if never interrupted")
+      ->type_name("FILE");
   verb->add_flag("--adaptive", options->adaptive, "Reversible steps of varying size");
   verb->add_option("--eps", options->eps, "Radians of a step of varying size")->capture_default_str();
   verb->add_option("--control", options->control,
@@ -291,7 +288,9 @@ void add_run(CLI::App& app, Session& session) {
       "  diracstep run knife_edge --step 0.05 --out knife_edge.csv\n"
       "  diracstep run kepler_e099 --method type1/gl:4 --adaptive --out comet.csv\n"
       "  diracstep run pendulum_cartesian --error 1e-8\n"
-      "  diracstep run kepler_e06 --order 8 --end 100 --set e=0.3 --every 10 --out orbit.csv");
+      "  diracstep run kepler_e06 --order 8 --end 100 --set e=0.3 --every 10 --out orbit.csv\n"
+      "  diracstep run kepler_e06 --end 1e6 --every 1000 --out k.csv --checkpoint k.checkpoint\n"
+      "  diracstep run kepler_e06 --end 1e6 --every 1000 --out k.csv --resume k.checkpoint");
   verb->callback([options, verb, &session] {
     options->method_given = verb->count("--method") > 0;
     run(*options, session);

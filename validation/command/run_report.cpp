@@ -5,6 +5,7 @@
 #include <diracstep/validation/convergence_study.hpp>
 #include <diracstep/validation/report.hpp>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 namespace diracstep::command {
 
@@ -41,6 +42,25 @@ std::string end_table(const Sample& end, const Scene& scene) {
   for (int r = 0; r < scene.rows(); ++r)
     text += fmt::format("force of row {}: {:.15g}\n", names[static_cast<std::size_t>(r)], end.lambda[r]);
   return text;
+}
+
+Json retries_json(const Retries& retries) {
+  return {{"line_searches", retries.line_searches},           {"plain_guesses", retries.plain_guesses},
+          {"previous_solutions", retries.previous_solutions}, {"continuations", retries.continuations},
+          {"other_branches", retries.other_branches},         {"divided_steps", retries.divided_steps}};
+}
+
+std::string retries_text(const Retries& retries) {
+  if (retries.total() == 0) return {};
+  std::string text = "retries:";
+  for (const auto& [count, what] : {std::pair{retries.line_searches, "line searches"},
+                                    {retries.plain_guesses, "plain guesses"},
+                                    {retries.previous_solutions, "previous solutions"},
+                                    {retries.continuations, "solutions followed from small steps"},
+                                    {retries.other_branches, "other solutions replaced"},
+                                    {retries.divided_steps, "divided steps"}})
+    if (count > 0) text += fmt::format("{} {} {}", text.back() == ':' ? "" : ",", count, what);
+  return text + '\n';
 }
 
 std::string search_text(const ErrorControlReport& search) {
@@ -111,9 +131,10 @@ std::string run_text(const RunResult& result, const CatalogueScene& entry, const
     if (entry.scene->rows() > 0)
       text += fmt::format("largest residual of the constraint rows: {:.2e}\n", result.check.constraint);
   }
-  return text + fmt::format("work: {} solves, {} Newton iterations, {} residuals, {} Jacobians\n",
-                            result.work.solves, result.work.iterations, result.work.residual_evaluations,
-                            result.work.jacobian_evaluations);
+  text +=
+      fmt::format("work: {} solves, {} Newton iterations, {} residuals, {} Jacobians\n", result.work.solves,
+                  result.work.iterations, result.work.residual_evaluations, result.work.jacobian_evaluations);
+  return text + retries_text(result.work.retries);
 }
 
 std::string run_json(const RunResult& result, const CatalogueScene& entry, const IntegratorOptions& options) {
@@ -137,6 +158,7 @@ std::string run_json(const RunResult& result, const CatalogueScene& entry, const
   json["newton_iterations"] = result.work.iterations;
   json["residual_evaluations"] = result.work.residual_evaluations;
   json["jacobian_evaluations"] = result.work.jacobian_evaluations;
+  json["retries"] = retries_json(result.work.retries);
   json["out"] = result.out.empty() ? Json(nullptr) : Json(result.out);
   json["points"] = result.lines;
   if (result.variable) json["adaptive"] = variable_json(*result.variable);

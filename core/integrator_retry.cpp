@@ -1,0 +1,95 @@
+#include <cmath>
+#include <diracstep/core/integrator.hpp>
+#include <diracstep/core/scales.hpp>
+
+namespace diracstep {
+
+namespace {
+
+/// A solution is looked at twice after so many Newton iterations, where it lies so far from its guess in
+/// units of the way of the step.
+constexpr int many_iterations = 5;
+/// With an old Jacobian, or with none, so many iterations gain what one of Newton's method does.
+constexpr int old_jacobian_iterations = 3;
+constexpr double far_from_guess = 0.1;
+/// Solutions so far apart are different ones.
+constexpr double another_solution = 1e-6;
+
+}  // namespace
+
+/// One more attempt at a system, counted and added up.
+SolveReport Integrator::solve(Part& part, Vector& x, SolveReport& total) {
+  const SolveReport report = part.solver->solve(x);
+  count(report);
+  total.status = report.status;
+  total.iterations += report.iterations;
+  total.line_searches += report.line_searches;
+  total.residual_evaluations += report.residual_evaluations;
+  total.jacobian_evaluations += report.jacobian_evaluations;
+  total.residual_norms = report.residual_norms;
+  return report;
+}
+
+/// Whether a solution may be another than the one smaller steps lead to: the first one of a run where it does
+/// not tend to the start as the step is halved, and any that Newton's method found far from its guess.
+bool Integrator::doubtful(const Stage& stage, Interval step, const Vector& q, const Vector& p,
+                          const SolveReport& report) {
+  Part& part = parts_[stage.part];
+  if (!std::isnan(part.problem->constant_jacobian_parameter())) return false;  // affine: one solution
+  if (!on_a_motion_ && !stage.predictor.begun() && &stage == &stages_.front()) {
+    StepContinuation::Result work;
+    if (!project_velocity(step.start, q, p, start_velocity_).ok()) return true;
+    guess_ = stage.solution;
+    const bool tends = part.continuation->tends_to_start(step, q, p, start_velocity_, guess_, work);
+    count(work.report, work.solves);
+    return !tends;
+  }
+  const int others = report.iterations - report.jacobian_evaluations;
+  return report.jacobian_evaluations + others / old_jacobian_iterations >= many_iterations &&
+         part.continuation->distance(q, stage.solution, guess_) > far_from_guess;
+}
+
+/// From a failed or doubtful solve on: the plain guess, the last solution, and at last the continuation,
+/// which also decides whether a solution found so late is the right one.
+SolveReport Integrator::retry_stage(Stage& stage, Interval step, const Vector& q, const Vector& p,
+                                    Guess guess, SolveReport total) {
+  Part& part = parts_[stage.part];
+  if (!total.ok() && guess != Guess::plain) {
+    ++work_.retries.plain_guesses;
+    part.problem->guess(v_, stage.solution);
+    (void)solve(part, stage.solution, total);
+  }
+  if (!total.ok() && guess == Guess::predicted) {
+    ++work_.retries.previous_solutions;
+    stage.solution = stage.predictor.last();
+    (void)solve(part, stage.solution, total);
+  }
+  return follow_stage(stage, step, q, p, total);
+}
+
+SolveReport Integrator::follow_stage(Stage& stage, Interval step, const Vector& q, const Vector& p,
+                                     SolveReport found) {
+  Part& part = parts_[stage.part];
+  ++work_.retries.continuations;
+  if (!project_velocity(step.start, q, p, start_velocity_).ok()) start_velocity_ = v_;
+  guess_ = stage.solution;
+  const StepContinuation::Result path = part.continuation->follow(step, q, p, start_velocity_, guess_);
+  count(path.report, path.solves);
+  found.iterations += path.report.iterations;
+  found.line_searches += path.report.line_searches;
+  found.residual_evaluations += path.report.residual_evaluations;
+  found.jacobian_evaluations += path.report.jacobian_evaluations;
+  reached_ = path.reached;
+  if (!path.report.ok()) {
+    if (found.ok() && path.reached > 0.0) found.status = SolveStatus::other_branch;
+    return found;
+  }
+  if (found.ok() && part.continuation->distance(q, guess_, stage.solution) <= another_solution) return found;
+  if (found.ok()) ++work_.retries.other_branches;
+  stage.solution = guess_;
+  found.status = SolveStatus::ok;
+  found.residual_norms = path.report.residual_norms;
+  return found;
+}
+
+}  // namespace diracstep

@@ -1,0 +1,96 @@
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <diracstep/core/errors.hpp>
+#include <diracstep/validation/output_file.hpp>
+#include <filesystem>
+#include <stdexcept>
+#include <utility>
+
+namespace diracstep {
+
+namespace {
+
+/// Makes the name of a file last: where a system stops, its folder may be older than its files.
+void sync_folder_of(const std::string& path) {
+  const auto folder = std::filesystem::path(path).parent_path();
+  const int descriptor = ::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY);
+  if (descriptor < 0) return;  // a folder that may be written but not read: nothing more can be done
+  ::fsync(descriptor);
+  ::close(descriptor);
+}
+
+}  // namespace
+
+OutputFile::OutputFile(const std::string& path, Mode mode) : path_(path) {
+  const int how = mode == Mode::fresh ? O_WRONLY | O_CREAT | O_TRUNC : O_RDWR;
+  descriptor_ = ::open(path.c_str(), how | O_CLOEXEC, 0666);  // NOLINT(cppcoreguidelines-pro-type-vararg)
+  if (descriptor_ < 0) throw Misuse(fmt::format("'{}' cannot be written: {}", path, std::strerror(errno)));
+  if (mode == Mode::existing) ::lseek(descriptor_, 0, SEEK_END);
+}
+
+OutputFile::OutputFile(OutputFile&& other) noexcept
+    : path_(std::move(other.path_)), descriptor_(std::exchange(other.descriptor_, -1)) {}
+
+OutputFile::~OutputFile() {
+  if (descriptor_ >= 0) ::close(descriptor_);
+}
+
+void OutputFile::write(std::string_view bytes) {
+  while (!bytes.empty()) {
+    const ssize_t written = ::write(descriptor_, bytes.data(), bytes.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) refuse("could not be written in full");
+    bytes.remove_prefix(static_cast<std::size_t>(written));
+  }
+}
+
+void OutputFile::sync() {
+  // EINVAL: a pipe or a device, which has nothing to synchronise
+  if (::fsync(descriptor_) != 0 && errno != EINVAL && errno != EROFS) refuse("could not be written in full");
+}
+
+void OutputFile::close() {
+  if (descriptor_ >= 0 && ::close(std::exchange(descriptor_, -1)) != 0)
+    refuse("could not be written in full");
+}
+
+void OutputFile::cut(long size) {
+  if (::ftruncate(descriptor_, size) != 0) refuse("could not be cut");
+  ::lseek(descriptor_, 0, SEEK_END);
+}
+
+long OutputFile::size() const {
+  struct stat status {};
+  if (::fstat(descriptor_, &status) != 0) refuse("could not be examined");
+  return status.st_size;
+}
+
+std::string OutputFile::beginning(long count) const {
+  std::string bytes(static_cast<std::size_t>(count), '\0');
+  const ssize_t read = ::pread(descriptor_, bytes.data(), bytes.size(), 0);
+  if (read < 0) refuse("could not be read");
+  bytes.resize(static_cast<std::size_t>(read));
+  return bytes;
+}
+
+void OutputFile::refuse(const char* what) const {
+  throw std::runtime_error(fmt::format("'{}' {}: {}", path_, what, std::strerror(errno)));
+}
+
+void replace_file(const std::string& path, std::string_view bytes) {
+  OutputFile file(path + ".new", OutputFile::Mode::fresh);
+  file.write(bytes);
+  file.sync();
+  file.close();
+  if (std::rename(file.path().c_str(), path.c_str()) != 0)
+    throw std::runtime_error(fmt::format("'{}' could not be replaced: {}", path, std::strerror(errno)));
+  sync_folder_of(path);
+}
+
+}  // namespace diracstep

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+
+namespace diracstep {
+
+/// A file that is written to the end, or not without a word: every refusal of the system is an exception.
+class OutputFile {
+ public:
+  enum class Mode {
+    fresh,     ///< emptied or made
+    existing,  ///< kept as it is, written at its end
+  };
+
+  /// Throws Misuse, naming the path and the system's reason, where the file cannot be opened.
+  OutputFile(const std::string& path, Mode mode);
+  OutputFile(const OutputFile&) = delete;
+  OutputFile& operator=(const OutputFile&) = delete;
+  OutputFile(OutputFile&& other) noexcept;
+  OutputFile& operator=(OutputFile&&) = delete;
+  ~OutputFile();
+
+  const std::string& path() const { return path_; }
+
+  /// All throw std::runtime_error, naming the path and the reason: a full disk, a quota, an unplugged device.
+  void write(std::string_view bytes);
+  void sync();  ///< on the disk, not only in the system's memory
+  void close();
+  void cut(long size);  ///< leaves the first `size` bytes and goes on there
+  long size() const;
+  /// The first `count` bytes, fewer where the file is shorter.
+  std::string beginning(long count) const;
+
+ private:
+  [[noreturn]] void refuse(const char* what) const;
+
+  std::string path_;
+  int descriptor_ = -1;
+};
+
+/// Replaces the file at `path` by `bytes` at once: whoever reads it, at whatever moment the machine stops,
+/// finds the old contents or the new ones.  A file PATH.new is used on the way.  Throws as OutputFile does.
+void replace_file(const std::string& path, std::string_view bytes);
+
+}  // namespace diracstep
