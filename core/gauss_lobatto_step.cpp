@@ -76,6 +76,7 @@ class GaussLobattoStep final : public StepProblem {
   }
 
   void keep() override {
+    if (!kept_.known && curvature_ == 0.0) second_derivatives(last_x_);  // solved without a Jacobian
     kept_.known = true;
     kept_.force = max_norm(lq_);
     kept_.curvature = curvature_;

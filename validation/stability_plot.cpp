@@ -25,6 +25,7 @@ constexpr std::string_view style = R"(set encoding utf8
 set logscale xy
 set format x '10^{%L}'
 set format y '10^{%L}'
+set yrange [*:1e-15<*]
 set border 3 linewidth 1.2 linecolor '#404040'
 set tics nomirror out scale 0.7,0.35
 set grid xtics ytics linetype 1 linewidth 0.7 linecolor '#D9D9D9' dashtype solid

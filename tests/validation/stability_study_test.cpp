@@ -282,7 +282,7 @@ const std::map<std::string, std::vector<std::string>> expected{
     {"pendulum_cartesian step*1e-6", {"A", "A", "A", "A"}},
     {"pendulum_cartesian step*1e-3", {"A", "A", "A", "A"}},
     {"pendulum_cartesian step*1e0", {"B", "A", "B", "B"}},
-    {"pendulum_cartesian step*1e1", {"t", "t", "t", "t"}},
+    {"pendulum_cartesian step*1e1", {"t", "Bt", "t", "t"}},
     {"pendulum_cartesian step*1e2", {"t", "t", "t", "t"}},
     {"knife_edge step*1e-12", {"A", "A", "A", "A"}},
     {"knife_edge step*1e-9", {"A", "A", "A", "A"}},
