@@ -109,32 +109,15 @@ void require_branches(const std::string& circuit, const std::vector<Branch>& bra
   }
 }
 
-/// Nodes that get a row: all but one of each connected part.
-std::vector<std::string> nodes_with_rows(const std::vector<Branch>& branches) {
-  std::map<std::string, std::string> part;  // of each node: a node that names its connected part
-  for (const Branch& branch : branches)
-    for (const auto& node : {branch.from, branch.to}) part.try_emplace(node, node);
-  for (const Branch& branch : branches) {
-    const std::string joined = part[branch.from], other = part[branch.to];
-    for (auto& [node, name] : part)
-      if (name == other) name = joined;
-  }
-  std::map<std::string, std::string> left_out;
-  for (const auto& [node, name] : part)
-    if (node == "ground" || node == "0" || !left_out.contains(name)) left_out[name] = node;
-  std::vector<std::string> nodes;
-  for (const auto& [node, name] : part)
-    if (left_out[name] != node) nodes.push_back(node);
-  return nodes;
-}
-
 ConstraintBlocks rows_of(const std::vector<Branch>& branches) {
   const auto n = static_cast<Eigen::Index>(branches.size());
   std::vector<std::string> names;
   std::vector<Vector> rows;
   std::vector<Waveform> offsets;
   const auto zero = [](double) { return 0.0; };
-  for (const std::string& node : nodes_with_rows(branches)) {
+  std::vector<std::pair<std::string, std::string>> ends;
+  for (const Branch& branch : branches) ends.emplace_back(branch.from, branch.to);
+  for (const std::string& node : nodes_with_rows(ends)) {
     Vector row = Vector::Zero(n);
     for (Eigen::Index i = 0; i < n; ++i) {
       const Branch& branch = branches[static_cast<std::size_t>(i)];
@@ -165,6 +148,24 @@ Branch branch_of(Kind kind, std::string& name, std::string& from, std::string& t
 }
 
 }  // namespace
+
+std::vector<std::string> nodes_with_rows(const std::vector<std::pair<std::string, std::string>>& ends) {
+  std::map<std::string, std::string> part;  // of each node: a node that names its connected part
+  for (const auto& [from, to] : ends)
+    for (const auto& node : {from, to}) part.try_emplace(node, node);
+  for (const auto& [from, to] : ends) {
+    const std::string joined = part[from], other = part[to];
+    for (auto& [node, name] : part)
+      if (name == other) name = joined;
+  }
+  std::map<std::string, std::string> left_out;
+  for (const auto& [node, name] : part)
+    if (node == "ground" || node == "0" || !left_out.contains(name)) left_out[name] = node;
+  std::vector<std::string> nodes;
+  for (const auto& [node, name] : part)
+    if (left_out[name] != node) nodes.push_back(node);
+  return nodes;
+}
 
 Branch inductor(std::string name, std::string from, std::string to, double henry) {
   return branch_of(Kind::inductor, name, from, to, henry, {});

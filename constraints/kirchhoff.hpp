@@ -3,6 +3,7 @@
 #include <diracstep/constraints/linear.hpp>
 #include <diracstep/core/scene.hpp>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace diracstep {
@@ -36,5 +37,9 @@ Branch current_source(std::string name, std::string from, std::string to, Wavefo
 /// a name given twice, a branch from a node to itself, and a value that is not positive (resistances may be
 /// zero).
 Scene circuit(const std::string& name, const std::vector<Branch>& branches);
+
+/// The nodes with a row, of a circuit given by the two ends of each branch: all but one of each connected
+/// part.
+std::vector<std::string> nodes_with_rows(const std::vector<std::pair<std::string, std::string>>& ends);
 
 }  // namespace diracstep

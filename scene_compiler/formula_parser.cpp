@@ -1,10 +1,5 @@
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <array>
-#include <cctype>
-#include <charconv>
-#include <cmath>
 #include <diracstep/scene_compiler/formula_parser.hpp>
 #include <numbers>
 #include <stdexcept>
@@ -48,16 +43,7 @@ constexpr std::array<std::string_view, 5> forms{"sum", "rate", "diff", "min", "m
 constexpr std::array<std::string_view, 12> keys{"t",      "pi",   "kind",   "digits",  "how", "with",
                                                 "source", "name", "method", "project", "for", "each"};
 
-bool is_letter(char c) { return std::isalpha(static_cast<unsigned char>(c)) != 0 || c == '_'; }
-bool is_digit(char c) { return c >= '0' && c <= '9'; }
-bool continues_character(char c) { return (static_cast<unsigned char>(c) & 0xC0u) == 0x80u; }  // UTF-8
-
 }  // namespace
-
-bool is_name(std::string_view name) {
-  return !name.empty() && name.size() <= 64 && is_letter(name[0]) &&
-         std::ranges::all_of(name, [](char c) { return is_letter(c) || is_digit(c); });
-}
 
 bool is_reserved(std::string_view name) {
   const auto is = [&](std::string_view other) { return other == name; };
@@ -65,24 +51,15 @@ bool is_reserved(std::string_view name) {
          std::ranges::any_of(functions, is, &Function::name);
 }
 
-Place FormulaText::place(std::size_t offset) const {
-  Place place = start;
-  for (std::size_t i = 0; i < std::min(offset, text.size()); ++i) {
-    if (text[i] == '\n') {
-      ++place.line;
-      place.column = 1;
-    } else if (!continues_character(text[i])) {
-      ++place.column;
-    }
-  }
-  return place;
-}
-
 /// Reads one text by recursive descent.
-class FormulaParser::Reader {
+class FormulaParser::Reader : FormulaScanner {
  public:
   Reader(FormulaParser& parser, const FormulaText& text, const Context& context)
-      : parser_(parser), graph_(parser.graph_), symbols_(parser.symbols_), text_(text), context_(context) {
+      : FormulaScanner(parser.file_, text),
+        parser_(parser),
+        graph_(parser.graph_),
+        symbols_(parser.symbols_),
+        context_(context) {
     if (text.text.size() > longest_formula)
       fail(0, "a formula of " + std::to_string(text.text.size()) + " characters; the limit is " +
                   std::to_string(longest_formula));
@@ -118,48 +95,8 @@ class FormulaParser::Reader {
   }
 
  private:
-  [[noreturn]] void fail(std::size_t offset, const std::string& message) const {
-    throw SceneError(parser_.file_, text_.place(offset), message);
-  }
-
-  void skip_spaces() {
-    while (at_ < text_.text.size() && std::isspace(static_cast<unsigned char>(text_.text[at_]))) ++at_;
-  }
-  char peek() {
-    skip_spaces();
-    return at_ < text_.text.size() ? text_.text[at_] : '\0';
-  }
-  bool follows(std::string_view token) {
-    skip_spaces();
-    return std::string_view(text_.text).substr(at_, token.size()) == token;
-  }
-  bool take(char c) {
-    if (peek() != c) return false;
-    ++at_;
-    return true;
-  }
-  std::string found() {
-    if (peek() == '\0') return "the end of the formula";
-    std::size_t end = at_ + 1;
-    if (is_letter(text_.text[at_]))
-      while (end < text_.text.size() && (is_letter(text_.text[end]) || is_digit(text_.text[end]))) ++end;
-    else
-      while (end < text_.text.size() && continues_character(text_.text[end])) ++end;
-    return fmt::format("'{}'", text_.text.substr(at_, std::min<std::size_t>(end - at_, 40)));
-  }
-  void expect(char c, const std::string& what) {
-    if (take(c)) return;
-    const std::string instead = found();
-    fail(at_, "expected " + what + ", found " + instead);
-  }
-  void expect_end() {
-    if (peek() == '\0' && at_ >= text_.text.size()) return;
-    const std::string instead = found();
-    fail(at_, "expected an operator or the end, found " + instead);
-  }
-
   Node located(Node node, std::size_t offset) {
-    symbols_.places.try_emplace(node, text_.place(offset));
+    symbols_.places.try_emplace(node, place(offset));
     return node;
   }
 
@@ -168,7 +105,8 @@ class FormulaParser::Reader {
     for (;;) {
       const char c = peek();
       if (c != '+' && c != '-') return left;
-      const std::size_t place = at_++;
+      const std::size_t place = at();
+      take(c);
       const Node right = term();
       left = located(c == '+' ? graph_.add(left, right) : graph_.subtract(left, right), place);
     }
@@ -179,7 +117,8 @@ class FormulaParser::Reader {
     for (;;) {
       const char c = peek();
       if ((c != '*' && c != '/') || follows("**")) return left;
-      const std::size_t place = at_++;
+      const std::size_t place = at();
+      take(c);
       const Node right = unary();
       left = located(c == '*' ? graph_.multiply(left, right) : graph_.divide(left, right), place);
     }
@@ -187,57 +126,27 @@ class FormulaParser::Reader {
 
   Node unary() {
     const Deeper deeper(*this);
-    const std::size_t place = at_;
+    const std::size_t place = at();
     if (take('+')) return unary();
     if (take('-')) return located(graph_.negative(unary()), place);
     const Node base = primary();
-    const bool stars = follows("**");
-    if (!stars && peek() != '^') return base;
-    const std::size_t sign = at_;
-    at_ += stars ? 2 : 1;
+    peek();
+    const std::size_t sign = at();
+    if (!take("**") && !take('^')) return base;
     return located(graph_.raise(base, unary()), sign);
   }
 
   Node primary() {
     const char c = peek();
-    const std::size_t place = at_;
-    if (is_digit(c) || (c == '.' && at_ + 1 < text_.text.size() && is_digit(text_.text[at_ + 1])))
-      return located(number(), place);
+    const std::size_t place = at();
+    if (number_follows()) return located(graph_.number(number()), place);
     if (take('(')) {
       const Node inner = expression();
       expect(')', "')'");
       return inner;
     }
-    if (is_letter(c)) return located(named(place, word()), place);
-    const std::string instead = found();
-    fail(place, "expected a number, a name or '(', found " + instead);
-  }
-
-  Node number() {
-    const char* const begin = text_.text.data() + at_;
-    const char* end = text_.text.data() + text_.text.size();
-    const std::size_t range = text_.text.find("..", at_);  // "1..N" is no number "1."
-    if (range != std::string::npos) end = text_.text.data() + range;
-    double value = 0.0;
-    const auto [stop, error] = std::from_chars(begin, end, value);
-    if (error != std::errc() || !std::isfinite(value))
-      fail(at_, "a number that cannot be read or is out of range");
-    const std::size_t place = at_;
-    at_ += static_cast<std::size_t>(stop - begin);
-    if (at_ < text_.text.size() && is_letter(text_.text[at_]))
-      fail(place, "a number directly followed by a name; write a '*' between them");
-    return graph_.number(value);
-  }
-
-  std::string word() {
-    skip_spaces();
-    std::size_t end = at_;
-    while (end < text_.text.size() &&
-           (is_letter(text_.text[end]) || (end > at_ && is_digit(text_.text[end]))))
-      ++end;
-    const std::string word = text_.text.substr(at_, end - at_);
-    at_ = end;
-    return word;
+    if (starts_name(c)) return located(named(place, word()), place);
+    fail_expecting("a number, a name or '('");
   }
 
   Node named(std::size_t place, const std::string& name) {
@@ -294,7 +203,7 @@ class FormulaParser::Reader {
   Node subscript(std::size_t place, const std::string& name, std::size_t count) {
     if (count == 0) {
       if (peek() == '[')
-        fail(at_, "'" + name + "' has no index; declare it with for = \"i = 1..N\" to repeat it");
+        fail(at(), "'" + name + "' has no index; declare it with for = \"i = 1..N\" to repeat it");
       return none;
     }
     expect('[', count == 1 ? "'[' and an index, for '" + name + "' is repeated"
@@ -346,16 +255,12 @@ class FormulaParser::Reader {
   }
 
   int loop() {
-    const std::size_t place = at_;
+    const std::size_t place = at();
     const std::string variable = word();
     if (!is_name(variable) || is_reserved(variable)) fail(place, "expected a loop variable, as in i = 1..N");
     expect('=', "'=' and a range, as in i = 1..N");
     const Node first = index(place);
-    if (!follows("..")) {
-      const std::string instead = found();
-      fail(at_, "expected '..' and the last value, as in i = 1..N, found " + instead);
-    }
-    at_ += 2;
+    if (!take("..")) fail_expecting("'..' and the last value, as in i = 1..N");
     const Node last = index(place);
     symbols_.loops.push_back({variable, first, last});
     const int id = static_cast<int>(symbols_.loops.size()) - 1;
@@ -365,10 +270,10 @@ class FormulaParser::Reader {
 
   /// Whether "name =" follows: one more loop of a sum.
   bool loop_follows() {
-    const std::size_t here = at_;
+    const std::size_t here = at();
     const std::string name = word();
     const bool is_loop = !name.empty() && peek() == '=';
-    at_ = here;
+    back_to(here);
     return is_loop;
   }
 
@@ -399,7 +304,7 @@ class FormulaParser::Reader {
   Node diff(std::size_t place) {
     const Node f = expression();
     expect(',', "',' and a coordinate");
-    const std::size_t symbol_place = at_;
+    const std::size_t symbol_place = at();
     const Node symbol = primary();
     expect(')', "')'");
     if (graph_[symbol].op != Op::coordinate && graph_[symbol].op != Op::time)
@@ -450,7 +355,7 @@ class FormulaParser::Reader {
   struct Deeper {
     explicit Deeper(Reader& r) : reader(r) {
       if (++reader.parser_.depth_ > deepest_nesting)
-        reader.fail(reader.at_, "nested deeper than " + std::to_string(deepest_nesting) + " levels");
+        reader.fail(reader.at(), "nested deeper than " + std::to_string(deepest_nesting) + " levels");
     }
     ~Deeper() { --reader.parser_.depth_; }
     Deeper(const Deeper&) = delete;
@@ -461,9 +366,7 @@ class FormulaParser::Reader {
   FormulaParser& parser_;
   FormulaGraph& graph_;
   Symbols& symbols_;
-  const FormulaText& text_;
   Context context_;
-  std::size_t at_ = 0;
 };
 
 Node FormulaParser::formula(const FormulaText& text, const Context& context) {

@@ -1,7 +1,7 @@
 #pragma once
 
 #include <diracstep/scene_compiler/formula_graph.hpp>
-#include <diracstep/scene_compiler/scene_error.hpp>
+#include <diracstep/scene_compiler/formula_scanner.hpp>
 #include <map>
 #include <string>
 #include <string_view>
@@ -10,14 +10,6 @@
 #include <vector>
 
 namespace diracstep::scene_compiler {
-
-/// A formula as it stands in a file.
-struct FormulaText {
-  std::string text;
-  Place start = {};  ///< of its first character
-
-  Place place(std::size_t offset) const;
-};
 
 /// A loop variable and its range.
 struct Loop {
@@ -91,7 +83,5 @@ class FormulaParser {
 
 /// Names that a file may not give to anything of its own.
 bool is_reserved(std::string_view name);
-/// A letter or underscore, then letters, digits and underscores; at most 64.
-bool is_name(std::string_view name);
 
 }  // namespace diracstep::scene_compiler

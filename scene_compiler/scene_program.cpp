@@ -1,22 +1,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <diracstep/scene_compiler/circuit_formulas.hpp>
 #include <diracstep/scene_compiler/piece_builder.hpp>
 #include <diracstep/scene_compiler/scene_program.hpp>
-#include <map>
-#include <numeric>
-#include <set>
+#include <diracstep/scene_compiler/sum_terms.hpp>
 #include <stdexcept>
 
 namespace diracstep::scene_compiler {
 
 namespace {
-
-/// One addend of a function, with the loops it is summed over.
-struct Term {
-  std::vector<int> loops;
-  Node node;
-};
 
 bool is_velocity(const NodeData& data) {
   return data.op == Op::coordinate && data.c == static_cast<int>(Role::second);
@@ -30,6 +23,8 @@ class SceneCompiler {
         graph_(program.graph),
         symbols_(program.symbols),
         parser_(document_.file, graph_, symbols_),
+        terms_(document_.file, graph_, symbols_),
+        circuit_(document_, graph_, symbols_, parser_),
         builder_(graph_, program.known) {}
 
   void compile() {
@@ -46,11 +41,6 @@ class SceneCompiler {
  private:
   [[noreturn]] void fail(Place place, const std::string& message) const {
     throw SceneError(document_.file, place, message);
-  }
-
-  Place place_of(Node node) const {
-    const auto found = symbols_.places.find(node);
-    return found == symbols_.places.end() ? Place{} : found->second;
   }
 
   Context mechanics(const std::string& what, char second, std::vector<int> loops = {}) const {
@@ -77,75 +67,6 @@ class SceneCompiler {
     }
   }
 
-  /// Takes a function apart into addends without sums.
-  std::vector<Term> terms_of(Node whole, const std::vector<int>& outer, const std::string& what,
-                             Place place) {
-    struct Part {
-      Node node, factor;
-      std::vector<int> loops;
-    };
-    const std::vector<Node> nodes = graph_.reachable(std::span(&whole, 1));
-    std::set<Node> with_sum;
-    for (const Node node : nodes) {
-      const NodeData& data = graph_[node];
-      const int arguments = arity(data.op);
-      if (data.op == Op::sum || (arguments >= 1 && with_sum.contains(data.a)) ||
-          (arguments == 2 && with_sum.contains(data.b)))
-        with_sum.insert(node);
-    }
-    std::vector<Term> terms;
-    std::vector<Part> parts{{whole, graph_.number(1.0), outer}};
-    while (!parts.empty()) {
-      const Part part = parts.back();
-      parts.pop_back();
-      const NodeData data = graph_[part.node];
-      const auto has_sum = [&](Node node) { return with_sum.contains(node); };
-      if (!has_sum(part.node)) {
-        terms.push_back({part.loops, graph_.multiply(part.factor, part.node)});
-      } else if (data.op == Op::sum) {
-        std::vector<int> loops = part.loops;
-        loops.push_back(data.b);
-        parts.push_back({data.a, part.factor, loops});
-        // The body may hold sums itself, which reachable() has seen.
-      } else if (data.op == Op::add || data.op == Op::subtract) {
-        const Node second = data.op == Op::add ? part.factor : graph_.negative(part.factor);
-        parts.push_back({data.b, second, part.loops});
-        parts.push_back({data.a, part.factor, part.loops});
-      } else if (data.op == Op::negative) {
-        parts.push_back({data.a, graph_.negative(part.factor), part.loops});
-      } else if (data.op == Op::multiply && !(has_sum(data.a) && has_sum(data.b))) {
-        const bool first = has_sum(data.a);
-        parts.push_back(
-            {first ? data.a : data.b, graph_.multiply(part.factor, first ? data.b : data.a), part.loops});
-      } else if (data.op == Op::divide && !has_sum(data.b)) {
-        parts.push_back({data.a, graph_.divide(part.factor, data.b), part.loops});
-      } else {
-        const Place where = place_of(part.node);
-        fail(where.line > 0 ? where : place,
-             fmt::format(
-                 "a sum may be added to others and multiplied by what holds no sum, but not stand inside a "
-                 "function, a power or a divisor ({})",
-                 what));
-      }
-    }
-    return joined(std::move(terms), outer);
-  }
-
-  /// All addends over the same outer loops alone become one, so that they share their subexpressions.
-  std::vector<Term> joined(std::vector<Term> terms, const std::vector<int>& outer) {
-    std::vector<Term> result;
-    Node plain = none;
-    for (Term& term : terms) {
-      if (graph_.is_number(term.node, 0.0)) continue;
-      if (term.loops == outer)
-        plain = plain == none ? term.node : graph_.add(plain, term.node);
-      else
-        result.push_back(std::move(term));
-    }
-    if (plain != none) result.insert(result.begin(), {outer, plain});
-    return result;
-  }
-
   bool has_velocity(std::span<const Node> roots) const {
     return std::ranges::any_of(graph_.reachable(roots), [&](Node node) { return is_velocity(graph_[node]); });
   }
@@ -153,7 +74,7 @@ class SceneCompiler {
   SceneFunction phase_function(Node whole, const std::string& what, Place place) {
     SceneFunction function{FunctionKind::phase};
     bool second = false;
-    for (Term& term : terms_of(whole, {}, what, place)) {
+    for (Term& term : terms_.of(whole, {}, what, place)) {
       second = second || has_velocity(std::span(&term.node, 1));
       Piece piece;
       piece.loops = std::move(term.loops);
@@ -173,7 +94,7 @@ class SceneCompiler {
       Node whole = document_.lagrangian
                        ? parser_.formula(*document_.lagrangian, mechanics("the Lagrangian", 'v'))
                        : graph_.number(0.0);
-      program_.lagrangian = phase_function(graph_.add(whole, circuit_lagrangian()), "the Lagrangian", place);
+      program_.lagrangian = phase_function(graph_.add(whole, circuit_.lagrangian()), "the Lagrangian", place);
     }
     if (document_.hamiltonian)
       program_.hamiltonian =
@@ -183,82 +104,6 @@ class SceneCompiler {
       fail({},
            "the scene has neither a 'lagrangian' nor a 'hamiltonian'; these keys stand above the first "
            "[table]");
-  }
-
-  // Circuits: the charges through the branches are the coordinates.
-
-  int charge(const std::string& branch, Place place) const {
-    for (std::size_t i = 0; i < symbols_.families.size(); ++i)
-      if (symbols_.families[i].name == "q" + branch) return static_cast<int>(i);
-    fail(place, fmt::format("there is no branch '{}'", branch));
-  }
-
-  Node branch_value(const FormulaText& text, const std::string& what) {
-    return parser_.formula(text, {.what = what, .time = true});
-  }
-
-  /// Σ ½ L i² + Σ M i i' − Σ q²/(2C) + Σ V q.
-  Node circuit_lagrangian() {
-    Node sum = graph_.number(0.0);
-    const Node half = graph_.number(0.5);
-    for (const auto& branch : document_.branches) {
-      const int family = charge(branch.name, branch.place);
-      const Node q = graph_.coordinate(family, none, Role::position);
-      const Node i = graph_.coordinate(family, none, Role::second);
-      const Node value = branch_value(branch.value, branch.kind + ' ' + branch.name);
-      if (branch.kind == "inductor")
-        sum = graph_.add(sum, graph_.multiply(graph_.multiply(half, value), graph_.power(i, 2)));
-      else if (branch.kind == "capacitor")
-        sum = graph_.subtract(sum, graph_.multiply(graph_.divide(half, value), graph_.power(q, 2)));
-      else if (branch.kind == "source_voltage")
-        sum = graph_.add(sum, graph_.multiply(value, q));
-    }
-    for (const auto& mutual : document_.mutuals) {
-      const Node first = graph_.coordinate(charge(mutual.first, mutual.place), none, Role::second);
-      const Node second = graph_.coordinate(charge(mutual.second, mutual.place), none, Role::second);
-      const Node value = branch_value(mutual.value, "a mutual inductance");
-      sum = graph_.add(sum, graph_.multiply(value, graph_.multiply(first, second)));
-    }
-    return sum;
-  }
-
-  /// ½ R i² of the resistors.
-  Node circuit_dissipation() {
-    Node sum = graph_.number(0.0);
-    for (const auto& branch : document_.branches) {
-      if (branch.kind != "resistor") continue;
-      const Node i = graph_.coordinate(charge(branch.name, branch.place), none, Role::second);
-      const Node value = branch_value(branch.value, "resistor " + branch.name);
-      sum = graph_.add(sum, graph_.multiply(graph_.multiply(graph_.number(0.5), value), graph_.power(i, 2)));
-    }
-    return sum;
-  }
-
-  /// Kirchhoff's current law at every node but one of each connected part: that one follows from the others.
-  std::vector<std::pair<std::string, Node>> current_laws() {
-    std::map<std::string, std::string> part;  // of each node: a node that names its connected part
-    for (const auto& branch : document_.branches)
-      for (const auto& node : {branch.from, branch.to}) part.try_emplace(node, node);
-    for (const auto& branch : document_.branches) {
-      const std::string joined = part[branch.from], other = part[branch.to];
-      for (auto& [node, name] : part)
-        if (name == other) name = joined;
-    }
-    std::map<std::string, std::string> left_out;
-    for (const auto& [node, name] : part)
-      if (node == "ground" || node == "0" || !left_out.contains(name)) left_out[name] = node;
-    std::vector<std::pair<std::string, Node>> laws;
-    for (const auto& [node, name] : part) {
-      if (left_out[name] == node) continue;
-      Node sum = graph_.number(0.0);
-      for (const auto& branch : document_.branches) {
-        const Node i = graph_.coordinate(charge(branch.name, branch.place), none, Role::second);
-        if (branch.from == node) sum = graph_.add(sum, i);
-        if (branch.to == node) sum = graph_.subtract(sum, i);
-      }
-      laws.emplace_back("node_" + node, sum);
-    }
-    return laws;
   }
 
   // Rows.
@@ -277,7 +122,7 @@ class SceneCompiler {
       rows.push_back({{row.name, loops, row.equation.start},
                       parser_.equation(row.equation, mechanics(what, 'v', loops))});
     }
-    for (const auto& [name, node] : current_laws()) rows.push_back({{name, {}, {}}, node});
+    for (const auto& [name, node] : circuit_.current_laws()) rows.push_back({{name, {}, {}}, node});
     std::vector<bool> order;  // which kinds there are, by first appearance
     for (const Row& row : rows) {
       const bool holonomic = is_holonomic(row);
@@ -303,7 +148,7 @@ class SceneCompiler {
     function.groups.push_back(row.group);
     const std::string what = "row '" + row.group.name + "'";
     bool coordinates = false;
-    for (Term& term : terms_of(row.node, row.group.loops, what, row.group.place)) {
+    for (Term& term : terms_.of(row.node, row.group.loops, what, row.group.place)) {
       for (const Node node : graph_.reachable(std::span(&term.node, 1)))
         coordinates = coordinates || graph_[node].op == Op::coordinate;
       if (term.loops.empty()) {
@@ -376,12 +221,12 @@ class SceneCompiler {
     const Node node = parser_.formula(entry.values[0], mechanics(what, 'v', family->loops));
     const Node target = graph_.coordinate(static_cast<int>(family - symbols_.families.begin()),
                                           own_index(*family), Role::position);
-    add_force_terms(function, single, terms_of(node, family->loops, what, entry.values[0].start), target);
+    add_force_terms(function, single, terms_.of(node, family->loops, what, entry.values[0].start), target);
   }
 
   /// The force −∂R/∂v of Rayleigh's function R.
   void add_dissipation(SceneFunction& function, Piece& single) {
-    Node whole = circuit_dissipation();
+    Node whole = circuit_.dissipation();
     Place place;
     if (document_.dissipation) {
       whole = graph_.add(parser_.formula(*document_.dissipation, mechanics("the dissipation", 'v')), whole);
@@ -389,7 +234,7 @@ class SceneCompiler {
     }
     if (document_.dissipation && !has_velocity(std::span(&whole, 1)))
       fail(place, "the dissipation contains no velocity v_…");
-    for (const Term& term : terms_of(whole, {}, "the dissipation", place)) {
+    for (const Term& term : terms_.of(whole, {}, "the dissipation", place)) {
       Piece repeated;
       Piece& piece = term.loops.empty() ? single : repeated;
       piece.loops = term.loops;
@@ -476,7 +321,7 @@ class SceneCompiler {
       const std::string what = "invariant '" + invariant.name + "'";
       const Node node = parser_.formula(invariant.formula, mechanics(what, program_.lagrangian ? 'v' : 'p'));
       SceneFunction function{FunctionKind::phase};
-      for (Term& term : terms_of(node, {}, what, invariant.formula.start)) {
+      for (Term& term : terms_.of(node, {}, what, invariant.formula.start)) {
         Piece piece;
         piece.loops = std::move(term.loops);
         piece.outputs = {term.node};
@@ -515,6 +360,8 @@ class SceneCompiler {
   FormulaGraph& graph_;
   Symbols& symbols_;
   FormulaParser parser_;
+  SumTerms terms_;
+  CircuitFormulas circuit_;
   PieceBuilder builder_;
 };
 

@@ -18,9 +18,7 @@ namespace {
 
 struct Options {
   std::string scene;
-  std::string method = automatic_method;
-  int order = 0;
-  std::optional<std::string> rule;
+  MethodChoice method;
   bool adaptive = false;
   double eps = 0.2;
   std::vector<std::string> set;
@@ -47,19 +45,14 @@ std::string as_text(const Integrator& integrator, const std::vector<PlanLine>& l
 
 void plan(const Options& options, Session& session) {
   const CatalogueScene entry = make_scene(session, options.scene, parameters(options.set));
-  const Integrator integrator(
-      entry.scene, session.registry, session.solvers,
-      {options.method, options.order, entry.natural_step, rule(session, options.rule)});
+  IntegratorOptions used = integrator_options(session, options.method);
+  used.step = entry.natural_step;
+  const Integrator integrator(entry.scene, session.registry, session.solvers, used);
   std::vector<PlanLine> lines = integrator.plan();
-  if (options.adaptive) {
-    const IntegratorOptions used{.method = options.method,
-                                 .order = options.order,
-                                 .step = entry.natural_step,
-                                 .constraint_rule = rule(session, options.rule)};
+  if (options.adaptive)
     lines = AdaptiveIntegrator(entry.scene, session.registry, session.solvers, used,
                                {.eps = options.eps, .end = entry.t_end})
                 .plan();
-  }
   lines.push_back(pace_line(*entry.scene, session.solvers, entry.t_end));
   print(options.json ? as_json(integrator, lines) : as_text(integrator, lines));
 }
@@ -71,21 +64,10 @@ void add_plan(CLI::App& app, Session& session) {
   add_solver_options(*verb, session);
   const auto options = std::make_shared<Options>();
   verb->add_option("SCENE", options->scene, "A scene; see diracstep list scenes")->required();
-  verb->add_option(
-          "--method", options->method,
-          "A method; see diracstep list methods.  auto: GL(S) of the order asked for, or as plan says")
-      ->capture_default_str();
-  verb->add_option("--order", options->order,
-                   "Order; methods of another one are composed to it.  0 keeps the method's own")
-      ->capture_default_str();
-  verb->add_option("--rule", options->rule,
-                   "Rule for nonholonomic rows: left, right, midpoint, trapezoidal or one of a plugin;\n"
-                   "the method's own without it");
+  add_method_options(*verb, options->method);
   verb->add_flag("--adaptive", options->adaptive, "The plan of reversible steps of varying size");
   verb->add_option("--eps", options->eps, "Radians of a step of varying size")->capture_default_str();
-  verb->add_option("--set", options->set, "Set a parameter of the scene; may be repeated")
-      ->type_name("NAME=VALUE")
-      ->allow_extra_args(false);
+  add_set_option(*verb, options->set);
   verb->add_flag("--json", options->json, "One JSON document on standard output");
   verb->footer("Example:  diracstep plan knife_edge --method type1/midpoint --order 4");
   verb->callback([options, &session] { plan(*options, session); });

@@ -56,11 +56,6 @@ std::vector<std::string> scene_names(const Session& session) {
   return names;
 }
 
-std::optional<StepRule> rule(const Session& session, const std::optional<std::string>& name) {
-  if (!name) return std::nullopt;
-  return session.registry.rule(*name);
-}
-
 CatalogueScene make_scene(const Session& session, const std::string& name, const Parameters& changes) {
   for (const Plugin& plugin : session.plugins) {
     if (std::ranges::find(plugin.scenes(), name) == plugin.scenes().end()) continue;

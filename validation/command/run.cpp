@@ -21,12 +21,10 @@ namespace {
 
 struct Options {
   std::string scene;
-  std::string method = automatic_method;
-  int order = 0;
+  MethodChoice method;
   std::optional<double> step;
   std::optional<double> end;
   std::string momentum = "projected";
-  std::optional<std::string> rule;
   std::string out;
   long every = 1;
   int substeps = 1;
@@ -38,7 +36,6 @@ struct Options {
   std::string control = "integrating";
   std::string at;
   std::optional<double> error;
-  bool method_given = false;
   std::vector<std::string> set;
   bool json = false;
 };
@@ -97,7 +94,7 @@ void run_fixed(const Options& options, const CatalogueScene& entry, const Sessio
   keeping.checkpoint = options.checkpoint.empty() ? options.resume : options.checkpoint;
   keeping.checkpoint_every = options.checkpoint_every;
   keeping.identity = identity(entry, integrator, keeping, !options.out.empty());
-  keeping.identity.emplace_back("rule", options.rule.value_or("the method's own"));
+  keeping.identity.emplace_back("rule", options.method.rule.value_or("the method's own"));
   keeping.identity.emplace_back("solver", name(session.solver_options.iteration));
   keeping.identity.emplace_back("Jacobian", name(session.solver_options.jacobian));
   std::optional<Checkpoint> saved;
@@ -167,8 +164,8 @@ IntegratorOptions run_once(const Options& options, const CatalogueScene& entry, 
 ErrorControlReport search(Options& options, const CatalogueScene& entry, const Session& session, double end,
                           IntegratorOptions& chosen) {
   ErrorControlOptions wanted{.error = *options.error};
-  if (options.method_given) wanted.method = options.method;
-  wanted.order = options.order;
+  if (options.method.given) wanted.method = options.method.name;
+  wanted.order = options.method.order;
   if (options.adaptive) wanted.adaptive = true;
   if (options.step)
     wanted.first_step = std::abs(*options.step);
@@ -177,7 +174,7 @@ ErrorControlReport search(Options& options, const CatalogueScene& entry, const S
   wanted.go_on = [] { return !interrupted(); };
   ErrorControlReport found = solve_to_error(entry.scene, session.registry, session.solvers, end, wanted);
   chosen.method = found.method;
-  chosen.order = options.order;
+  chosen.order = options.method.order;
   chosen.compensated_sums = found.compensated_sums;
   options.adaptive = found.adaptive;
   if (found.adaptive)
@@ -207,12 +204,9 @@ void run(const Options& given, Session& session) {
   result.momentum = momentum(options.momentum);
   const double end =
       options.at.empty() ? options.end.value_or(entry.t_end) : numbers("--at", options.at).back();
-  IntegratorOptions used{
-      .method = options.method,
-      .order = options.order,
-      .step = options.step.value_or(std::copysign(entry.natural_step, end - entry.scene->start.time)),
-      .constraint_rule = rule(session, options.rule),
-      .substeps = options.substeps};
+  IntegratorOptions used = integrator_options(session, options.method);
+  used.step = options.step.value_or(std::copysign(entry.natural_step, end - entry.scene->start.time));
+  used.substeps = options.substeps;
   if (options.error) {
     result.search = search(options, entry, session, end, used);
     if (!result.search->warning.empty()) say(result.search->warning);
@@ -239,16 +233,7 @@ void add_run(CLI::App& app, Session& session) {
   add_solver_options(*verb, session);
   const auto options = std::make_shared<Options>();
   verb->add_option("SCENE", options->scene, "A scene; see diracstep list scenes")->required();
-  verb->add_option(
-          "--method", options->method,
-          "A method; see diracstep list methods.  auto: GL(S) of the order asked for, or as plan says")
-      ->capture_default_str();
-  verb->add_option("--order", options->order,
-                   "Order; methods of another one are composed to it.  0 keeps the method's own")
-      ->capture_default_str();
-  verb->add_option("--rule", options->rule,
-                   "Rule for nonholonomic rows: left, right, midpoint, trapezoidal or one of a plugin;\n"
-                   "the method's own without it");
+  add_method_options(*verb, options->method);
   verb->add_option("--step", options->step, "Step size; the scene's own without it");
   verb->add_option("--end", options->end, "End time; the scene's own without it");
   verb->add_option("--momentum", options->momentum,
@@ -279,9 +264,7 @@ void add_run(CLI::App& app, Session& session) {
           "Relative error at the end; the library chooses method and step,\nand repeats the run until its "
           "estimate is below")
       ->type_name("E");
-  verb->add_option("--set", options->set, "Set a parameter of the scene; may be repeated")
-      ->type_name("NAME=VALUE")
-      ->allow_extra_args(false);
+  add_set_option(*verb, options->set);
   verb->add_flag("--json", options->json, "One JSON document on standard output");
   verb->footer(
       "Examples:\n"
@@ -291,10 +274,7 @@ void add_run(CLI::App& app, Session& session) {
       "  diracstep run kepler_e06 --order 8 --end 100 --set e=0.3 --every 10 --out orbit.csv\n"
       "  diracstep run kepler_e06 --end 1e6 --every 1000 --out k.csv --checkpoint k.checkpoint\n"
       "  diracstep run kepler_e06 --end 1e6 --every 1000 --out k.csv --resume k.checkpoint");
-  verb->callback([options, verb, &session] {
-    options->method_given = verb->count("--method") > 0;
-    run(*options, session);
-  });
+  verb->callback([options, &session] { run(*options, session); });
 }
 
 }  // namespace diracstep::command

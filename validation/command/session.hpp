@@ -1,5 +1,6 @@
 #pragma once
 
+#include <diracstep/core/integrator.hpp>
 #include <diracstep/core/registry.hpp>
 #include <diracstep/plugins/loaded_plugin.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
@@ -40,8 +41,20 @@ CatalogueScene make_scene(const Session& session, const std::string& name, const
 /// Names of the catalogue's scenes and of those of plugins.
 std::vector<std::string> scene_names(const Session& session);
 
-/// The rule for nonholonomic rows that was asked for by name, if one was.
-std::optional<StepRule> rule(const Session& session, const std::optional<std::string>& name);
+/// What --method, --order and --rule say.
+struct MethodChoice {
+  std::string name = automatic_method;
+  bool given = false;  ///< whether --method was
+  int order = 0;
+  std::optional<std::string> rule = {};  ///< for nonholonomic rows
+};
+void add_method_options(CLI::App& verb, MethodChoice& choice);
+
+/// The options of an integrator with this choice; the rule is looked up by name.
+IntegratorOptions integrator_options(const Session& session, const MethodChoice& choice);
+
+/// Adds --set NAME=VALUE, which may be repeated.
+void add_set_option(CLI::App& verb, std::vector<std::string>& assignments);
 
 /// Adds --solver and --jacobian, which change the session's solvers when the command line is read.
 void add_solver_options(CLI::App& verb, Session& session);

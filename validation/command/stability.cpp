@@ -170,9 +170,7 @@ void add_stability(CLI::App& app, Session& session) {
   verb->add_option("--methods", options->methods,
                    "Methods, A,B,…; without it one of each construction,\nwith --full every method");
   verb->add_option("--orders", options->orders, "Orders, 2,4,…; each method's own without it");
-  verb->add_option("--set", options->set, "Set a parameter of the scenes; may be repeated")
-      ->type_name("NAME=VALUE")
-      ->allow_extra_args(false);
+  add_set_option(*verb, options->set);
   verb->add_flag("--without-ida", options->without_ida, "No runs of IDA");
   verb->add_flag("--full", options->full, "More cases, longer ones, and runs of 1e7 steps: hours");
   verb->add_option("--out", options->out, "Directory for stability.json, stability.md and pictures")

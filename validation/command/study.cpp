@@ -257,9 +257,7 @@ void add_study(CLI::App& app, Session& session) {
       ->type_name("OLD.json");
   verb->add_option("--table", options->table, "Markdown file: CPU time of each method at the compared errors")
       ->type_name("FILE");
-  verb->add_option("--set", options->set, "Set a parameter of the scenes; may be repeated")
-      ->type_name("NAME=VALUE")
-      ->allow_extra_args(false);
+  add_set_option(*verb, options->set);
   verb->add_flag("--json", options->json, "One JSON document on standard output");
   verb->footer(
       "Examples:\n"

@@ -5,6 +5,7 @@
 #include <diracstep/core/consistent_start.hpp>
 #include <diracstep/core/errors.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
+#include <diracstep/validation/scene_file/defined_start.hpp>
 #include <diracstep/validation/scene_file/scene_file.hpp>
 #include <diracstep/validation/scene_file/scene_functions.hpp>
 #include <fstream>

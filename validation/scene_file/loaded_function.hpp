@@ -1,0 +1,55 @@
+#pragma once
+
+#include <diracstep/core/sparsity_pattern.hpp>
+#include <diracstep/validation/scene_file/loaded_scene.hpp>
+#include <diracstep/validation/scene_file/turns.hpp>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace diracstep {
+
+/// A function of a loaded scene, ready to be called kernel by kernel: every instance of its repeated pieces
+/// has its coordinates, its rows and its constants.
+class LoadedFunction {
+ public:
+  LoadedFunction(LoadedScenePtr scene, const scene_compiler::SceneFunction& function);
+
+  const scene_compiler::SceneFunction& function() const { return *function_; }
+  const std::vector<std::string>& row_names() const { return row_names_; }
+  int dimension() const { return scene_->layout.dimension(); }
+
+  /// (i, j) of all derivatives: rows and coordinates for rows, else coordinates twice.
+  std::vector<std::pair<int, int>> entries(bool curvature) const;
+
+  /// Finds where each instance's derivatives go in the values of `pattern`.
+  void find_positions(const SparsityPattern& pattern, bool curvature);
+
+  /// Adds kernel `number` of every piece to call.out.
+  void run(std::size_t number, scene_compiler::KernelCall call) const;
+
+ private:
+  /// A piece with all its instances laid out.
+  struct LoadedPiece {
+    const scene_compiler::Piece* piece;
+    long count = 0;
+    std::vector<int> slots = {};
+    std::vector<double> instance = {};
+    std::vector<int> positions = {}, curvature_positions = {};
+  };
+  template <class Visit>
+  void for_each_entry(const LoadedPiece& loaded, bool curvature, const Visit& visit) const;
+  void place_rows();
+  void load(const scene_compiler::Piece& piece);
+  int coordinate(const scene_compiler::Evaluator& body, std::size_t root, scene_compiler::Node leaf,
+                 const Turns& turns) const;
+
+  LoadedScenePtr scene_;
+  const scene_compiler::SceneFunction* function_;
+  const scene_compiler::CompiledKernel* table_;  ///< null where kernels are interpreted
+  std::vector<LoadedPiece> pieces_;
+  std::vector<int> first_rows_;
+  std::vector<std::string> row_names_;
+};
+
+}  // namespace diracstep
