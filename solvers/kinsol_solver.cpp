@@ -3,10 +3,9 @@
 #include <cmath>
 #include <diracstep/core/errors.hpp>
 #include <diracstep/solvers/detail/jacobian_factors.hpp>
-#include <diracstep/solvers/detail/sundials.hpp>
+#include <diracstep/solvers/detail/shells.hpp>
 #include <diracstep/solvers/detail/vector.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
-#include <exception>
 #include <limits>
 #include <string>
 #include <utility>
@@ -49,7 +48,7 @@ class KinsolSolver final : public NonlinearSolver {
     unknown_scale_.reset(require(N_VClone(x_.get()), "N_VClone"));
     residual_scale_.reset(require(N_VClone(x_.get()), "N_VClone"));
     for (Vector* column : {&guess_, &last_, &last_residual_}) column->setZero(size);
-    make_matrix_shell();
+    matrix_shell_ = detail::make_matrix_shell(context_);
     make_linear_solver_shell();
     kinsol_.reset(require(KINCreate(context_), "KINCreate"));
     sink_.attach(memory());
@@ -175,7 +174,7 @@ class KinsolSolver final : public NonlinearSolver {
     smallest_norm_ = HUGE_VAL;
     factors_.begin();
     const int code = KINSol(memory(), x_.get(), strategy_, unknown_scale_.get(), residual_scale_.get());
-    if (exception_) std::rethrow_exception(std::exchange(exception_, nullptr));
+    callbacks_.rethrow();
     long iterations = 0;
     KINGetNumNonlinSolvIters(memory(), &iterations);
     report_.iterations += static_cast<int>(iterations);
@@ -220,24 +219,13 @@ class KinsolSolver final : public NonlinearSolver {
       scale = std::fill_n(scale, block.rows, 1.0 / block.scale);
   }
 
-  /// Runs a callback's body; an exception must not cross KINSOL, so it is kept and thrown again after it.
-  template <class Body>
-  int guarded(Body body) noexcept {
-    try {
-      return body();
-    } catch (...) {
-      exception_ = std::current_exception();
-      return -1;
-    }
-  }
-
   static KinsolSolver& self(void* data) { return *static_cast<KinsolSolver*>(data); }
   static KinsolSolver& self(SUNLinearSolver solver) { return self(solver->content); }
   Eigen::Map<Vector> map(N_Vector x) const { return {data_of(x), guess_.size()}; }
 
   static int evaluate(N_Vector x, N_Vector f, void* data) {
     KinsolSolver& solver = self(data);
-    return solver.guarded([&] {
+    return solver.callbacks_.guarded([&] {
       ++solver.report_.residual_evaluations;
       solver.problem_.residual(solver.map(x), solver.last_residual_);
       solver.not_finite_ = !solver.last_residual_.allFinite();
@@ -275,7 +263,7 @@ class KinsolSolver final : public NonlinearSolver {
 
   static int jacobian(N_Vector x, N_Vector, SUNMatrix, void* data, N_Vector, N_Vector) {
     KinsolSolver& solver = self(data);
-    return solver.guarded([&] {
+    return solver.callbacks_.guarded([&] {
       using Outcome = detail::JacobianFactors::Outcome;
       const double norm = solver.factors_.exact() ? 0.0 : solver.scaled_norm();
       const Outcome outcome = solver.factors_.prepare(solver.map(x), norm);
@@ -285,28 +273,13 @@ class KinsolSolver final : public NonlinearSolver {
     });
   }
 
-  void make_matrix_shell() {
-    matrix_shell_.reset(require(SUNMatNewEmpty(context_), "SUNMatNewEmpty"));
-    matrix_shell_->ops->getid = [](SUNMatrix) { return SUNMATRIX_CUSTOM; };
-    matrix_shell_->ops->zero = [](SUNMatrix) { return 0; };
-    matrix_shell_->ops->destroy = [](SUNMatrix m) { SUNMatFreeEmpty(m); };
-  }
-
   void make_linear_solver_shell() {
-    linear_shell_.reset(require(SUNLinSolNewEmpty(context_), "SUNLinSolNewEmpty"));
-    linear_shell_->content = this;
+    linear_shell_ = detail::make_linear_solver_shell(context_, this);
     auto& ops = *linear_shell_->ops;
-    ops.gettype = [](SUNLinearSolver) { return SUNLINEARSOLVER_DIRECT; };
-    ops.getid = [](SUNLinearSolver) { return SUNLINEARSOLVER_CUSTOM; };
-    ops.initialize = [](SUNLinearSolver) { return 0; };
     ops.setup = [](SUNLinearSolver, SUNMatrix) { return 0; };  // jacobian() has done it
     ops.solve = [](SUNLinearSolver s, SUNMatrix, N_Vector x, N_Vector b, sunrealtype) {
       std::copy_n(data_of(b), self(s).guess_.size(), data_of(x));
       self(s).factors_.solve(data_of(x));
-      return 0;
-    };
-    ops.free = [](SUNLinearSolver s) {
-      SUNLinSolFreeEmpty(s);
       return 0;
     };
   }
@@ -323,7 +296,7 @@ class KinsolSolver final : public NonlinearSolver {
   detail::KinsolHandle kinsol_;
   Vector guess_, last_, last_residual_;
   SolveReport report_;
-  std::exception_ptr exception_;
+  detail::ExceptionKeeper callbacks_;
   int strategy_ = KIN_NONE;
   int judged_solves_ = 0, judged_iterations_ = 0;
   bool given_up_ = false;            ///< the fixed-point iteration was slow

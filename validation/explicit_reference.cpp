@@ -2,9 +2,8 @@
 
 #include <cstdlib>
 #include <diracstep/core/hidden_rows.hpp>
-#include <diracstep/solvers/detail/sundials.hpp>
+#include <diracstep/solvers/detail/shells.hpp>
 #include <diracstep/validation/explicit_reference.hpp>
-#include <exception>
 #include <sstream>
 #include <utility>
 
@@ -84,7 +83,7 @@ class ExplicitIntegration {
     double t = scene_.start.time;
     const double before = thread_seconds();
     const int code = ERKStepEvolve(erk(), t_end, y_.get(), &t, ARK_NORMAL);
-    if (exception_) std::rethrow_exception(std::exchange(exception_, nullptr));
+    callbacks_.rethrow();
     run.cpu_seconds = thread_seconds() - before;
     if (code < 0) run.failure = describe_failure(code, t);
     read_counters(run);
@@ -141,16 +140,12 @@ class ExplicitIntegration {
     end.energy = scene_.energy(t, end.q, end.v);
   }
 
-  /// An exception must not cross ARKODE: it is kept and thrown again after it.
   static int rate(sunrealtype t, N_Vector y, N_Vector f, void* data) noexcept {
     auto& self = *static_cast<ExplicitIntegration*>(data);
-    try {
+    return self.callbacks_.guarded([&] {
       auto values = map(f);
       return self.equations_.rate(t, map(y), values) && values.allFinite() ? 0 : 1;  // 1: try a shorter step
-    } catch (...) {
-      self.exception_ = std::current_exception();
-      return -1;
-    }
+    });
   }
 
   const Scene& scene_;
@@ -160,7 +155,7 @@ class ExplicitIntegration {
   detail::MessageSink sink_;
   detail::VectorHandle y_;
   std::unique_ptr<void, FreeErk> erk_;
-  std::exception_ptr exception_;
+  detail::ExceptionKeeper callbacks_;
 };
 
 }  // namespace

@@ -8,10 +8,9 @@
 #include <diracstep/core/hidden_rows.hpp>
 #include <diracstep/core/saddle_point.hpp>
 #include <diracstep/solvers/detail/linear_solver.hpp>
-#include <diracstep/solvers/detail/sundials.hpp>
+#include <diracstep/solvers/detail/shells.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
 #include <diracstep/validation/ida_reference.hpp>
-#include <exception>
 #include <limits>
 #include <memory>
 #include <sstream>
@@ -178,7 +177,7 @@ class IdaIntegration {
       set_up(t_end);
       before = thread_seconds();
       const int code = IDASolve(ida(), t_end, &t, y_.get(), rate_.get(), IDA_NORMAL);
-      if (exception_) std::rethrow_exception(std::exchange(exception_, nullptr));
+      callbacks_.rethrow();
       if (code < 0) run.failure = describe_failure(code, t);
       run.cpu_seconds += thread_seconds() - before;
       read_counters(run);
@@ -298,24 +297,13 @@ class IdaIntegration {
     if (run.ok() && !report.ok()) run.failure = std::string("forces at the end: ") + describe(report.status);
   }
 
-  /// Runs a callback's body; an exception must not cross IDA, so it is kept and thrown again after it.
-  template <class Body>
-  int guarded(Body body) noexcept {
-    try {
-      return body();
-    } catch (...) {
-      exception_ = std::current_exception();
-      return -1;
-    }
-  }
-
   static IdaIntegration& self(void* data) { return *static_cast<IdaIntegration*>(data); }
   static Eigen::Map<Vector> map(N_Vector vector) {
     return {N_VGetArrayPointer(vector), N_VGetLength(vector)};
   }
 
   static int residual(sunrealtype t, N_Vector y, N_Vector rate, N_Vector f, void* data) {
-    return self(data).guarded([&] {
+    return self(data).callbacks_.guarded([&] {
       auto values = map(f);
       self(data).dae_.residual(t, map(y), map(rate), values);
       return values.allFinite() ? 0 : 1;  // IDA then tries a shorter step
@@ -324,7 +312,7 @@ class IdaIntegration {
 
   static int jacobian(sunrealtype t, sunrealtype cj, N_Vector y, N_Vector rate, N_Vector, SUNMatrix,
                       void* data, N_Vector, N_Vector, N_Vector) {
-    return self(data).guarded([&] {
+    return self(data).callbacks_.guarded([&] {
       Vector& values = self(data).values_;
       self(data).dae_.jacobian(t, cj, map(y), map(rate), values);
       return values.allFinite() ? 0 : 1;
@@ -332,26 +320,15 @@ class IdaIntegration {
   }
 
   void make_shells() {
-    matrix_shell_.reset(require(SUNMatNewEmpty(context_), "SUNMatNewEmpty"));
-    matrix_shell_->ops->getid = [](SUNMatrix) { return SUNMATRIX_CUSTOM; };
-    matrix_shell_->ops->zero = [](SUNMatrix) { return 0; };
-    matrix_shell_->ops->destroy = [](SUNMatrix m) { SUNMatFreeEmpty(m); };
-    linear_shell_.reset(require(SUNLinSolNewEmpty(context_), "SUNLinSolNewEmpty"));
-    linear_shell_->content = this;
+    matrix_shell_ = detail::make_matrix_shell(context_);
+    linear_shell_ = detail::make_linear_solver_shell(context_, this);
     auto& ops = *linear_shell_->ops;
-    ops.gettype = [](SUNLinearSolver) { return SUNLINEARSOLVER_DIRECT; };
-    ops.getid = [](SUNLinearSolver) { return SUNLINEARSOLVER_CUSTOM; };
-    ops.initialize = [](SUNLinearSolver) { return 0; };
     ops.setup = [](SUNLinearSolver s, SUNMatrix) {
       return self(s->content).linear_solver_->factor(self(s->content).values_.data()) ? 0 : 1;
     };
     ops.solve = [](SUNLinearSolver s, SUNMatrix, N_Vector x, N_Vector b, sunrealtype) {
       if (x != b) N_VScale(1.0, b, x);
       self(s->content).linear_solver_->solve(N_VGetArrayPointer(x));
-      return 0;
-    };
-    ops.free = [](SUNLinearSolver s) {
-      SUNLinSolFreeEmpty(s);
       return 0;
     };
   }
@@ -371,7 +348,7 @@ class IdaIntegration {
   detail::MatrixHandle matrix_shell_;
   detail::LinearSolverHandle linear_shell_;
   std::unique_ptr<void, FreeIda> ida_;
-  std::exception_ptr exception_;
+  detail::ExceptionKeeper callbacks_;
 };
 
 }  // namespace
