@@ -276,13 +276,14 @@ class DocumentReader : TableReader {
     check_keys(table, "[recommended]", {"method", "order", "step", "end", "tolerance"});
     SceneDocument::Recommended& recommended = document_.recommended;
     recommended.method = string(table, "method", recommended.method);
-    const double order = number(table, "order").value_or(recommended.order);
+    const double order = number(table, "order").value_or(0.0);
     recommended.step = number(table, "step").value_or(0.0);
     recommended.end = number(table, "end").value_or(0.0);
     recommended.tolerance = number(table, "tolerance").value_or(0.0);
-    if (recommended.step < 0.0 || recommended.tolerance < 0.0 || !(order >= 1.0 && order <= 64.0))
+    if (recommended.step < 0.0 || recommended.tolerance < 0.0 || !(order >= 0.0 && order <= 64.0))
       fail(place_of(table.source()),
-           "[recommended]: expected an order in [1, 64], a step and a tolerance above 0");
+           "[recommended]: expected an order in [1, 64], or 0 for the method's own, a step and a tolerance "
+           "above 0");
     recommended.order = static_cast<int>(order);
   }
 

@@ -75,7 +75,7 @@ struct SceneDocument {
   };
   struct Recommended {
     std::string method = "type1/midpoint";
-    int order = 2;
+    int order = 0;           ///< 0: the method's own
     double step = 0.0;       ///< 0: the span's
     double end = 0.0;        ///< 0: the last reference
     double tolerance = 0.0;  ///< relative error in q and v that this reaches; 0: none stated

@@ -275,9 +275,12 @@ class WatchedSolver final : public NonlinearSolver {
   double& condition_;
 };
 
+constexpr const char* reading_of_velocities = "velocities from momenta";
+
 void examine_step(const CatalogueScene& entry, const Registry& registry, const SolverFactory& solvers,
                   std::vector<Finding>& findings) {
-  Finding step{"regularity of the step", false, ""}, reading{"velocities from momenta", false, ""};
+  Finding step{"regularity of the step", false, ""};
+  std::optional<Finding> reading;
   double condition = 0.0;
   const SolverFactory watched = [&](NonlinearProblem& problem) {
     return std::make_unique<WatchedSolver>(problem, solvers(problem), condition);
@@ -288,28 +291,29 @@ void examine_step(const CatalogueScene& entry, const Registry& registry, const S
     const StepReport report = integrator.step();
     step.passed = report.ok() && condition < ill_conditioned;
     step.detail = fmt::format("{} of order {}, step {:g}: condition of the Jacobian {:.1e}", advice.method,
-                              advice.order, advice.step, condition);
+                              integrator.options().order, advice.step, condition);
     if (!report.ok()) step.detail += "; " + report.failure;
     Sample sample;
     const SolveReport read = integrator.sample(Momentum::projected, sample);
-    reading.passed = read.ok();
-    reading.detail = read.ok() ? "∂²L/∂v² is regular along the rows" : describe(read.status);
+    reading = {reading_of_velocities, read.ok(),
+               read.ok() ? "∂²L/∂v² is regular along the rows" : describe(read.status)};
   } catch (const Misuse& misuse) {
     step.detail = misuse.what();
-    reading.detail = "no step was possible";
   }
   findings.push_back(std::move(step));
-  findings.push_back(std::move(reading));
+  if (reading) findings.push_back(std::move(*reading));
 }
 
 std::vector<std::string> advise(const CatalogueScene& entry, const Examination& examination) {
   const Scene& scene = *entry.scene;
   std::vector<std::string> advice;
-  const bool readable = examination.findings.back().passed;
-  if (!readable)
-    advice.emplace_back(
-        "the Lagrangian is degenerate along the rows: momenta do not determine the velocities");
-  if (scene.lagrangian && !readable) return advice;
+  const Finding& last = examination.findings.back();
+  if (scene.lagrangian && !last.passed) {
+    if (last.what == reading_of_velocities)
+      advice.emplace_back(
+          "the Lagrangian is degenerate along the rows: momenta do not determine the velocities");
+    return advice;
+  }
   const PhaseStructure structure =
       scene.lagrangian ? scene.lagrangian->structure() : scene.hamiltonian->structure();
   if (structure.quadratic && scene.constraints.empty() && !scene.force)

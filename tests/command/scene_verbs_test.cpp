@@ -55,7 +55,7 @@ TEST_F(SceneVerbs, CheckRunsEverySceneAgainstItsPublishedValues) {
     EXPECT_FALSE(one["source"].get<std::string>().empty()) << one;
     scenes.insert(one["scene"].get<std::string>());
   }
-  EXPECT_EQ(scenes.size(), 26U);
+  EXPECT_EQ(scenes.size(), 28U);
   expect_misuse("check --scenes knife_edge", {"--scenes"});
 }
 
@@ -65,6 +65,15 @@ TEST_F(SceneVerbs, CheckNamesDependentRows) {
   const Outcome outcome = run("check " + file);
   EXPECT_EQ(outcome.status, 1);
   EXPECT_NE(outcome.out.find("rank 1 of 2"), std::string::npos) << outcome.out;
+}
+
+TEST_F(SceneVerbs, CheckSaysWhyTheRecommendedMethodCannotStep) {
+  const std::string file = "'" + made() + "'";
+  change("order = 4", "order = 3");
+  const Outcome outcome = run("check " + file);
+  EXPECT_EQ(outcome.status, 1);
+  EXPECT_NE(outcome.out.find("cannot be composed to order 3"), std::string::npos) << outcome.out;
+  EXPECT_EQ(outcome.out.find("degenerate"), std::string::npos) << outcome.out;
 }
 
 TEST_F(SceneVerbs, MistakesInAFileAreMisuse) {
