@@ -16,7 +16,7 @@ vcpkg_cmake_configure(
 )
 
 vcpkg_cmake_install()
-vcpkg_cmake_config_fixup(PACKAGE_NAME DiracStep CONFIG_PATH lib/cmake/DiracStep)
+vcpkg_cmake_config_fixup(CONFIG_PATH lib/cmake/DiracStep)
 vcpkg_fixup_pkgconfig()
 if("command" IN_LIST FEATURES)
     vcpkg_copy_tools(TOOL_NAMES diracstep AUTO_CLEAN)
