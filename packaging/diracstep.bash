@@ -16,7 +16,7 @@ _diracstep() {
     --out | --plugin | --checkpoint | --resume | --compare) compopt -o default 2>/dev/null && return ;;
     *)
       case "$cur,$verb" in
-        -*,*) words="$(diracstep $verb --help 2>/dev/null | grep -o -e '--[a-z][a-z-]*' | sort -u)" ;;
+        -*,*) words="$(diracstep ${verb:+"$verb"} --help 2>/dev/null | grep -o -e '--[a-z][a-z-]*' | sort -u)" ;;
         *,) words="$(diracstep --help 2>/dev/null | sed -n '/^Subcommands:/,/^$/s/^  \([a-z]\{1,\}\) .*/\1/p')" ;;
         *,list) words="scenes methods plugins" ;;
         *,check | *,plan | *,run | *,study)
