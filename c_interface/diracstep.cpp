@@ -1,4 +1,5 @@
 #include <diracstep/c_interface/diracstep.h>
+#include <diracstep/version.h>
 
 #include <diracstep/core/errors.hpp>
 #include <diracstep/core/integrator.hpp>
@@ -93,6 +94,8 @@ void write(const Vector& column, double* to) {
 }
 
 }  // namespace
+
+const char* diracstep_version() { return DIRACSTEP_VERSION; }
 
 int diracstep_create(unsigned version, const diracstep_scene* scene, const diracstep_options* options,
                      diracstep_integrator** integrator) {

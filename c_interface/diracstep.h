@@ -14,7 +14,8 @@
 extern "C" {
 #endif
 
-/* Raised with every change of this header or of diracstep_scene.h. */
+/* Raised when a struct here or in diracstep_scene.h, or what a function does, changes; not for new functions.
+ */
 #define DIRACSTEP_VERSION_OF_C_INTERFACE 1u
 
 #if defined(_WIN32)
@@ -50,6 +51,9 @@ typedef struct diracstep_state {
 } diracstep_state;
 
 typedef struct diracstep_integrator diracstep_integrator;
+
+/* The version of the library, "0.1.0"; that of the headers is DIRACSTEP_VERSION of <diracstep/version.h>. */
+DIRACSTEP_API const char *diracstep_version(void);
 
 /* Makes an integrator at the scene's start.  `options` may be NULL.  *integrator is set in any case, for
  * diracstep_message, and to be given to diracstep_destroy; only after DIRACSTEP_OK can it be used.  What the

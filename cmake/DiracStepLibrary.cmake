@@ -15,6 +15,14 @@ function(diracstep_compile_options target)
     -ffp-contract=off)
 endfunction()
 
+# Installs a library and its targets file: shared objects belong to the component library, all else to development.
+function(diracstep_install_library target component)
+  install(TARGETS ${target} EXPORT diracstep_${component} ARCHIVE COMPONENT development
+    LIBRARY COMPONENT library NAMELINK_COMPONENT development)
+  install(EXPORT diracstep_${component} NAMESPACE DiracStep:: FILE DiracStep-${component}.cmake
+    DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/DiracStep)
+endfunction()
+
 # diracstep_library(<folder> SOURCES ... PUBLIC ... PRIVATE ...)
 # Makes diracstep_<folder>, alias DiracStep::<folder>, and installs it with its headers.
 # A folder without sources becomes a header-only library.
@@ -45,9 +53,7 @@ function(diracstep_library folder)
   target_include_directories(${target} ${scope}
     $<BUILD_INTERFACE:${include_root}> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
 
-  install(TARGETS ${target} EXPORT diracstep_${folder})
-  install(EXPORT diracstep_${folder} NAMESPACE DiracStep:: FILE DiracStep-${folder}.cmake
-    DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/DiracStep)
+  diracstep_install_library(${target} ${folder})
   install(DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR}/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/diracstep/${folder}
     FILES_MATCHING PATTERN *.hpp PATTERN *.h PATTERN command EXCLUDE)  # the command's own parts are no interface
 endfunction()

@@ -1,3 +1,5 @@
+#include <diracstep/version.h>
+
 #include <diracstep/solvers/sundials_build.hpp>
 #include <diracstep/validation/build_facts.hpp>
 #include <fstream>

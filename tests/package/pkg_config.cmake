@@ -1,11 +1,20 @@
-# Compiles SOURCE/main.cpp with nothing but what pkg-config says, and runs it.
+# Compiles the program of SOURCE, main.c or main.cpp, with nothing but what pkg-config says of PACKAGE, and runs it.
 set(ENV{PKG_CONFIG_PATH} "${PREFIX}/${LIBDIR}/pkgconfig:$ENV{PKG_CONFIG_PATH}")
-execute_process(COMMAND pkg-config --cflags --libs diracstep
-                OUTPUT_VARIABLE package COMMAND_ERROR_IS_FATAL ANY)
+execute_process(COMMAND pkg-config --validate ${PACKAGE} COMMAND_ERROR_IS_FATAL ANY)
+execute_process(COMMAND pkg-config --modversion ${PACKAGE} OUTPUT_VARIABLE version OUTPUT_STRIP_TRAILING_WHITESPACE
+                COMMAND_ERROR_IS_FATAL ANY)
+if(NOT version STREQUAL VERSION)
+  message(FATAL_ERROR "pkg-config says that ${PACKAGE} has version ${version}, not ${VERSION}")
+endif()
+execute_process(COMMAND pkg-config --cflags --libs ${PACKAGE} OUTPUT_VARIABLE package COMMAND_ERROR_IS_FATAL ANY)
 separate_arguments(package UNIX_COMMAND "${package}")
 separate_arguments(FLAGS UNIX_COMMAND "${FLAGS}")
-set(program ${PREFIX}/pkg_config_example)
-execute_process(COMMAND ${COMPILER} -std=c++20 ${FLAGS} ${SOURCE}/main.cpp -o ${program} ${package}
-                        -Wl,-rpath,${PREFIX}/${LIBDIR}
-                COMMAND_ERROR_IS_FATAL ANY)
+if(EXISTS ${SOURCE}/main.c)
+  set(command ${C_COMPILER} -std=c11 ${FLAGS} ${SOURCE}/main.c)
+  list(APPEND package -lm)
+else()
+  set(command ${COMPILER} -std=c++20 ${FLAGS} ${SOURCE}/main.cpp)
+endif()
+set(program ${PREFIX}/pkg_config_${NAME})
+execute_process(COMMAND ${command} -o ${program} ${package} -Wl,-rpath,${PREFIX}/${LIBDIR} COMMAND_ERROR_IS_FATAL ANY)
 execute_process(COMMAND ${program} COMMAND_ERROR_IS_FATAL ANY)

@@ -1,4 +1,5 @@
 #include <diracstep/c_interface/diracstep.h>
+#include <diracstep/version.h>
 
 #include <cmath>
 #include <diracstep/core/run.hpp>
@@ -175,6 +176,8 @@ TEST_F(CInterface, StepsAndReadsAsTheLibraryDoes) {
   ASSERT_EQ(diracstep_read(made_, DIRACSTEP_MINUS, &state), DIRACSTEP_OK);
   EXPECT_EQ(q, scene->start.q);
 }
+
+TEST_F(CInterface, HeaderAndLibraryHaveOneVersion) { EXPECT_STREQ(diracstep_version(), DIRACSTEP_VERSION); }
 
 TEST_F(CInterface, MisuseIsToldAndNothingElse) {
   AsCallbacks callbacks(laws::mixed());

@@ -1,3 +1,4 @@
+#include <diracstep/version.h>
 #include <fmt/format.h>
 
 #include <algorithm>

@@ -1,0 +1,26 @@
+# find_package(DiracStep <version>) against PREFIX, which holds VERSION: before 1.0 every minor version stands alone,
+# and a component that is not there is a package that is not found.
+string(REGEX MATCH "^([0-9]+)\\.([0-9]+)" minor ${VERSION})
+math(EXPR next "${CMAKE_MATCH_2} + 1")
+file(REMOVE_RECURSE ${BUILD})
+file(WRITE ${BUILD}/CMakeLists.txt "
+cmake_minimum_required(VERSION 3.22)
+project(versions LANGUAGES CXX)
+foreach(other 0.0 ${CMAKE_MATCH_1}.${next} ${VERSION}.1 1.99 2)
+  find_package(DiracStep \${other} QUIET CONFIG)
+  if(DiracStep_FOUND)
+    message(FATAL_ERROR \"version ${VERSION} passes for \${other}\")
+  endif()
+endforeach()
+find_package(DiracStep QUIET CONFIG COMPONENTS nonsense)
+if(DiracStep_FOUND)
+  message(FATAL_ERROR \"there is a component nonsense\")
+endif()
+find_package(DiracStep ${VERSION} REQUIRED CONFIG)
+find_package(DiracStep ${minor} REQUIRED CONFIG COMPONENTS core)
+if(NOT DiracStep_VERSION STREQUAL \"${VERSION}\")
+  message(FATAL_ERROR \"DiracStep_VERSION is \${DiracStep_VERSION}, not ${VERSION}\")
+endif()
+")
+execute_process(COMMAND ${CMAKE_COMMAND} -S ${BUILD} -B ${BUILD}/build -G ${GENERATOR}
+  -D CMAKE_PREFIX_PATH=${PREFIX} -D CMAKE_CXX_COMPILER=${COMPILER} COMMAND_ERROR_IS_FATAL ANY)
