@@ -24,8 +24,8 @@ refuse() { echo "$page: block $number ($language): $1" >&2; exit 1; }
 build_programs() {
   programs="$(awk '($2 == "c" || $2 == "cpp") && $3 == "run" { printf "%s%02d.%s", n++ ? ";" : "", $1, $2 }' blocks/list)"
   [ -n "$programs" ] || return 0
-  cmake -S "$tests/programs" -B programs -D CMAKE_PREFIX_PATH="$prefix" -D CMAKE_BUILD_TYPE=Release \
-        -D SOURCES="$programs" -D BLOCKS="$work/blocks" >programs.log || { cat programs.log; exit 1; }
+  cmake -S "$tests/programs" -B programs -D CMAKE_PREFIX_PATH="$prefix" -D SOURCES="$programs" \
+        -D BLOCKS="$work/blocks" >programs.log || { cat programs.log; exit 1; }
   cmake --build programs --parallel 2
 }
 
@@ -44,14 +44,13 @@ save_file() {
 }
 
 build_programs
-previous=
 while read -r number language mark argument <&3; do
   block="blocks/$(printf %02d "$number").$language"
   case "$mark" in
     not-run) continue ;;
     slow) [ -n "$slow" ] || continue ;;
     file) save_file "$block"; continue ;;
-    continues) cat "$previous" "$block" >"$block.whole"; block="$block.whole" ;;
+    added) cat "$argument.toml" "$block" >"$block.whole"; block="$block.whole" ;;
   esac
   echo "== block $number ($language)"
   case "$language" in
@@ -62,5 +61,4 @@ while read -r number language mark argument <&3; do
     toml) examine_scene "$block" ;;
     *) refuse "no test runs this; mark it '<!-- file: NAME -->' or '<!-- not run: WHY -->'" ;;
   esac
-  previous="$block"
 done 3<blocks/list
