@@ -1,5 +1,9 @@
 """The site of the documentation. The pages are the Markdown files of the repository, where they are; build.sh stages them."""
 import os
+import pathlib
+import re
+
+import furo
 
 project = "DiracStep"
 html_title = "DiracStep"
@@ -8,7 +12,7 @@ language = "en"
 
 extensions = ["myst_parser", "breathe"]
 root_doc = "docs/README"
-exclude_patterns = ["**/tests", "examples", "scenes"]
+exclude_patterns = ["tests/**", "examples/**"]
 myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 4
 breathe_projects = {"DiracStep": os.environ["DIRACSTEP_XML"]}
@@ -16,12 +20,25 @@ breathe_default_project = "DiracStep"
 breathe_show_include = False
 
 # What is declared elsewhere: the standard library, Eigen, GoogleTest.
-nitpick_ignore_regex = [("cpp:.*", r"(std|Eigen|testing)\b.*"), ("cpp:.*", r"u?int\d+_t|size_t|Clock::.*")]
+nitpick_ignore_regex = [
+    ("cpp:.*", r"(std|Eigen|testing)\b.*|size_t|Clock::.*"),
+    ("cpp:.*", r"(detail|scene_compiler)\b.*|Integrator::@.*|DIRACSTEP_COUNTS_ALLOCATIONS"),  # no interface
+]
+
+
+
+def dark_colors():
+    """Furo's own. Debian's build of its style sheet has them for the dark theme, but lacks the rule for systems set to dark."""
+    style = (pathlib.Path(furo.__file__).parent / "theme/furo/static/styles/furo.css").read_text(encoding="utf-8")
+    rule = re.search(r'body\[data-theme="?dark"?\]\s*{([^}]*)}', style)
+    return dict(re.findall(r"--([\w-]+):\s*([^;}]+)", rule[1]))
+
 
 html_theme = "furo"
+html_theme_options = {"dark_css_variables": dark_colors()}
 html_static_path = [os.environ["DIRACSTEP_STATIC"]]
 html_css_files = ["katex.min.css", "site.css"]
-html_js_files = [("katex.min.js", {"defer": "defer"})]
+html_js_files = [("katex.min.js", {"defer": "defer", "priority": 100})]
 mathjax_path = "auto-render.js"  # KaTeX renders what Sphinx marks for MathJax
 mathjax_options = {"defer": "defer", "onload": "renderMathInElement(document.body)"}
 myst_update_mathjax = False
@@ -33,7 +50,7 @@ html_show_sphinx = False
 NAVIGATION = {
     "Use": ["getting_started", "choosing_a_method", "scene_format", "solver_backend", "plugins", "adaptive"],
     "Understand": ["mathematics", "measuring", "orders", "at_error", "stability"],
-    "More": ["/README", "/api/index", "/core/README", "/CONTRIBUTING", "/CHANGELOG"],
+    "More": ["Front page </README>", "/api/index", "/core/README", "/CONTRIBUTING", "/CHANGELOG"],
 }
 
 
@@ -44,5 +61,12 @@ def add_navigation(app, docname, source):
             source[0] += "\n```{toctree}\n:hidden:\n:caption: " + caption + "\n\n" + "\n".join(pages) + "\n```\n"
 
 
+def link_to_folder(app, env, node, contnode):
+    """A code host shows a folder; the site has none to show, so the link's text stands alone."""
+    folder = os.path.join(env.srcdir, os.path.dirname(env.doc2path(node.get("refdoc"), base=False)), node["reftarget"])
+    return contnode if os.path.isdir(folder) else None
+
+
 def setup(app):
+    app.connect("missing-reference", link_to_folder)
     app.connect("source-read", add_navigation)

@@ -2,9 +2,10 @@
 """Doxygen's input filter: one of our headers, as Doxygen and Breathe read it best.
 
 The comments stay as they are written for those who read the code. Here
-  * indented lines, which are formulas and tables, become verbatim blocks,
+  * indented lines, which are formulas and tables, become fenced blocks,
   * the comment above the namespace, or at the top of a C header, becomes that of the file,
-  * the namespace that everything is in is left out, and so are plain comments in C that Doxygen would skip.
+  * comments of C headers become comments of documentation,
+  * the namespace that everything is in is left out, and so is what stands in a namespace `detail`.
 """
 import re
 import sys
@@ -13,22 +14,23 @@ FORMULA = re.compile(r"( *)///  ( +\S.*)$")
 
 
 def keep_formulas(lines):
-    """Indented lines of a /// comment, and blank ones between them, between @verbatim and @endverbatim."""
+    """Indented lines of a /// comment, and blank ones between them, as fenced blocks."""
     result, formula = [], False
     for number, line in enumerate(lines):
         match = FORMULA.match(line)
         follows = number + 1 < len(lines) and FORMULA.match(lines[number + 1])
         if match and not formula:
-            result.append(match[1] + "/// @verbatim")
+            result.append(match[1] + "/// ~~~{.unparsed}")
             formula = True
         if formula and not match and not (line.strip() == "///" and follows):
-            result.append(re.match(" *", result[-1])[0] + "/// @endverbatim")
+            result.append(re.match(" *", result[-1])[0] + "/// ~~~")
             formula = False
         result.append(line)
     return result
 
 
 def cpp(text):
+    text = re.sub(r"^namespace detail {\n.*?^}  // namespace detail\n", "", text, flags=re.S | re.M)
     lines = text.split("\n")
     if "namespace diracstep {" in lines or "namespace diracstep::plugin {" in lines:
         at = next(i for i, line in enumerate(lines) if line.startswith("namespace diracstep"))
@@ -43,7 +45,7 @@ def cpp(text):
 
 
 def c_comment(match):
-    """A comment of C as one of Doxygen's; its indented lines as verbatim blocks."""
+    """A comment of C as one of Doxygen's; its indented lines as fenced blocks."""
     after_code = match[1].strip() != ""
     body = [re.sub(r"^ ?\* ?", "", line.strip()) if i else line for i, line in enumerate(match[2].split("\n"))]
     if after_code:

@@ -34,7 +34,8 @@ def contents(pages, options=""):
 
 def names(file):
     """What a header declares, in its order: types first, then functions, each once."""
-    found = [inner.text for inner in file.findall("innerclass") if "::" not in inner.text and "<" not in inner.text]
+    found = [inner.text for inner in file.findall("innerclass") if "<" not in inner.text]
+    found += [inner.text for inner in file.findall("innernamespace")]
     for kind in ("enum", "typedef", "function", "var", "define"):
         found += [m.findtext("name") for m in file.findall(f"sectiondef/memberdef[@kind='{kind}']")]
     return [name for name in dict.fromkeys(found) if name and not name.startswith("@")]
@@ -55,13 +56,15 @@ for path in sorted(xml.glob("*_8h*.xml")):
         f".. _{file.get('id')}:\n\n{heading(location)}"
         f".. code-block:: cpp\n\n   #include <diracstep/{location}>\n\n.. doxygenfile:: {location}\n", encoding="utf-8")
     shown = ", ".join(f"``{name}``" for name in declared[:6]) + (", …" if len(declared) > 6 else "")
-    headers[folder].append((str(page.relative_to(out / folder)), file.get("id"), location, shown))
+    headers[folder].append((location, str(page.relative_to(out / folder)), file.get("id"), shown))
 
 for folder, pages in headers.items():
-    rows = "".join(f"   * - :ref:`{location} <{label}>`\n     - {shown}\n" for _, label, location, shown in pages)
+    pages.sort()
+    rows = "".join(f"   * - :ref:`{location} <{label}>`\n     - {shown}\n" for location, _, label, shown in pages)
+    entries = [f"{location.split('/', 1)[1]} <{page}>" for location, page, *_ in pages]
     (out / folder / "index.rst").write_text(
         heading(folder) + FOLDERS[folder] + "\n\n.. list-table::\n   :widths: 40 60\n\n" + rows + "\n" +
-        contents([page for page, *_ in pages], "   :hidden:\n"), encoding="utf-8")
+        contents(entries, "   :hidden:\n"), encoding="utf-8")
 (out / "index.rst").write_text(
     heading("Reference of the headers") + INTRODUCTION + "\n" + contents(f"{folder}/index" for folder in FOLDERS),
     encoding="utf-8")
