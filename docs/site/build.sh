@@ -19,7 +19,7 @@ ln -s "$katex/katex.min.css" "$katex/katex.min.js" "$katex/contrib/auto-render.j
   "$site/site.css" "$work/static"
 
 HEADERS="$SOURCES/core $SOURCES/constraints $SOURCES/solvers $SOURCES/validation $SOURCES/c_interface \
-  $SOURCES/plugins/diracstep_plugin.h $SOURCES/plugins/diracstep_scene.h $SOURCES/plugins/plugin.hpp $SOURCES/plugins/formula_system.hpp \
+  $SOURCES/plugins/diracstep_plugin.h $SOURCES/plugins/diracstep_scene.h $SOURCES/plugins/plugin.hpp \
   $SOURCES/plugins/loaded_plugin.hpp"
 READABLE_HEADER="$site/readable_header.py" OUTPUT="$work"
 export SOURCES HEADERS READABLE_HEADER OUTPUT

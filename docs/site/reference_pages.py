@@ -66,5 +66,7 @@ for folder, pages in headers.items():
         heading(folder) + FOLDERS[folder] + "\n\n.. list-table::\n   :widths: 40 60\n\n" + rows + "\n" +
         contents(entries, "   :hidden:\n"), encoding="utf-8")
 (out / "index.rst").write_text(
-    heading("Reference of the headers") + INTRODUCTION + "\n" + contents(f"{folder}/index" for folder in FOLDERS),
+    heading("Reference of the headers") + INTRODUCTION + "\n" +
+    "".join(f"* :doc:`{folder}/index`: {what}\n" for folder, what in FOLDERS.items()) + "\n" +
+    contents([f"{folder}/index" for folder in FOLDERS], "   :hidden:\n"),
     encoding="utf-8")
