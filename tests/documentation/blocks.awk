@@ -44,6 +44,8 @@ open && /^ *```+ *$/ {
 
 open { if (code) print > name; next }
 
+/^ *~~~/ { refuse("fence blocks with ```") }
+
 /^    ( *)(\.\/dev |diracstep |cmake |#include|\[\[?[a-z_]+\]\]? *$|[a-z_]+ = ")/ {
   refuse("code in an indented block, which no test sees: fence it")
 }

@@ -1,6 +1,6 @@
-# Checks every link of the Markdown pages given: the file or folder must exist, and a heading or the start of a
-# table for its anchor.  Links to other hosts are left alone.  ROOT is the folder the pages' names start from.
-# The first pass over the pages collects their anchors, the second checks: awk -f links.awk pass=1 PAGES pass=2 PAGES
+# Checks every link of the Markdown pages given: the file or folder must exist, and a heading for its anchor.  Links
+# to other hosts are left alone.  Names of pages are relative to the folder it runs in.  The first pass over the pages
+# collects their anchors, the second checks: awk -f links.awk pass=1 PAGES pass=2 PAGES
 function refuse(why) {
   print FILENAME ":" FNR ": " why > "/dev/stderr"
   failed = 1

@@ -39,8 +39,8 @@ examine_scene() {  # FILE; interpreted, which gives the same bits as compiled
 save_file() {
   mkdir -p "$(dirname "$argument")"
   cp "$1" "$argument"
-  sed "1,/^$number /d" blocks/list | while read -r later rest; do cat "blocks/$(printf %02d "$later")".*; done |
-    grep -qF "$(basename "$argument")" || refuse "no later block names the file $argument"
+  awk -v this="$number" '$1 > this' blocks/list | while read -r later rest; do cat "blocks/$(printf %02d "$later")".*; done |
+    grep -qF "${argument%%/*}" || refuse "no later block names the file $argument"
 }
 
 build_programs
