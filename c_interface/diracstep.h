@@ -24,11 +24,13 @@ extern "C" {
 #define DIRACSTEP_API __attribute__((visibility("default")))
 #endif
 
+/* What a function returns. */
 enum { DIRACSTEP_OK = 0, DIRACSTEP_FAILED = 1, DIRACSTEP_MISUSE = 2 };
 
 /* Which representative of the momentum class [p] in T*Q/annihilator is read. */
 enum { DIRACSTEP_PLUS = 0, DIRACSTEP_MINUS = 1, DIRACSTEP_PROJECTED = 2 };
 
+/* How a scene is stepped; all zero is the default. */
 typedef struct diracstep_options {
   const char *method;        /* NULL: "type1/midpoint" */
   int order;                 /* composed to this order; 0: the method's own */
@@ -60,6 +62,7 @@ DIRACSTEP_API const char *diracstep_version(void);
  * scene points to must stay where it is until then.  `version` is DIRACSTEP_VERSION_OF_C_INTERFACE. */
 DIRACSTEP_API int diracstep_create(unsigned version, const diracstep_scene *scene,
                                    const diracstep_options *options, diracstep_integrator **integrator);
+/* Ends an integrator, NULL as well. */
 DIRACSTEP_API void diracstep_destroy(diracstep_integrator *integrator);
 
 /* Takes steps until `steps` are done or one fails; the state is then that before the failed step. */

@@ -27,6 +27,7 @@ enum class StepControl {
   irreversible
 };
 
+/// How the step size varies.
 struct AdaptiveOptions {
   double eps = 0.2;  ///< radians of a step
   StepControl control = StepControl::integrating;

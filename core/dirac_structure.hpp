@@ -22,7 +22,6 @@ struct PhaseVelocity {
 };
 
 // --- Continuous limits
-// ------------------------------------------------------------------------------------------
 
 /// Ω♭ : T(T*Q) → T*(T*Q),  (q,p,q̇,ṗ) ↦ (q,p; −ṗ,q̇)                      Leok and Ohsawa (3.5)
 Covector omega_flat(const PhaseVelocity& z);
@@ -32,7 +31,6 @@ Covector kappa(const PhaseVelocity& z);
 Covector gamma(const Covector& on_tangent_bundle);
 
 // --- Discrete maps
-// ----------------------------------------------------------------------------------------------
 
 /// κ^d_Q : T*Q×T*Q → T*(Q×Q),  ((q0,p0),(q1,p1)) ↦ (q0,q1; −p0,p1)          (2.13)
 Covector discrete_kappa(const PhasePoint& z0, const PhasePoint& z1);
@@ -46,7 +44,6 @@ Covector gamma_plus(const Covector& on_pairs);
 Covector gamma_minus(const Covector& on_pairs);
 
 // --- Discrete Legendre transforms and energies of L_d at (q0,q1)
-// ------------------------------------------------
 
 /// First derivatives of L_d at a pair of points, and its value.
 struct DiscreteLagrangianAt {
@@ -61,21 +58,24 @@ DiscreteLagrangianAt evaluate(GeneratingFunction& lagrangian, Interval step, con
 PhasePoint legendre_plus(const DiscreteLagrangianAt& l);
 /// FL_d⁻(q0,q1) = (q0, −D1L_d)                                              (9.4)
 PhasePoint legendre_minus(const DiscreteLagrangianAt& l);
-/// G_{d+} = p1·q1 and G_{d−} = −p0·q0, on T*Q×T*Q                            (6.9), (6.10)
+/// G_{d+} = p1·q1, on T*Q×T*Q                                                (6.9)
 double momentum_function_plus(const PhasePoint& z0, const PhasePoint& z1);
+/// G_{d−} = −p0·q0                                                           (6.10)
 double momentum_function_minus(const PhasePoint& z0, const PhasePoint& z1);
-/// E_{d+} = p1·q1 − L_d and E_{d−} = −p0·q0 − L_d                            (6.13), (6.14)
+/// E_{d+} = p1·q1 − L_d                                                      (6.13)
 double generalised_energy_plus(const DiscreteLagrangianAt& l, const Vector& p1);
+/// E_{d−} = −p0·q0 − L_d                                                     (6.14)
 double generalised_energy_minus(const DiscreteLagrangianAt& l, const Vector& p0);
-/// H_{d+} and H_{d−}: the energies where they are stationary, p1 = D2L_d, p0 = −D1L_d   (9.6)–(9.9)
+/// H_{d+} = E_{d+} where it is stationary, p1 = D2L_d                        (9.6), (9.8)
 double discrete_hamiltonian_plus(const DiscreteLagrangianAt& l);
+/// H_{d−} = E_{d−} where it is stationary, p0 = −D1L_d                       (9.7), (9.9)
 double discrete_hamiltonian_minus(const DiscreteLagrangianAt& l);
-/// D⁺L_d = γ^{d+}_Q(dL_d) and D⁻L_d = γ^{d−}_Q(dL_d)                          (4.26), (4.43)
+/// D⁺L_d = γ^{d+}_Q(dL_d)                                                    (4.26)
 Covector differential_plus(const DiscreteLagrangianAt& l);
+/// D⁻L_d = γ^{d−}_Q(dL_d)                                                    (4.43)
 Covector differential_minus(const DiscreteLagrangianAt& l);
 
 // --- Membership
-// -------------------------------------------------------------------------------------------------
 
 /// How far ((z0,z1),α) is from a discrete Dirac structure; both are zero for a member.
 struct Membership {

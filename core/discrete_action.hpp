@@ -27,6 +27,7 @@ DiscreteCurve curve_of(double start, double step, const std::vector<Vector>& q, 
 double hamilton_pontryagin_sum(GeneratingFunction& lagrangian, const DiscreteCurve& curve);
 
 /// The phase-space sums, with q_k = q⁰_k and q_{k+1} = q¹_k:
+///
 ///   Σ [p_{k+1}·q_{k+1} − H_{d+}(q_k,p_{k+1})] for H_{d+} of type 2                  (9.10), (10.1)
 ///   Σ [−p_k·q_k − H_{d−}(p_k,q_{k+1})]        for H_{d−} of type 3                  (9.11), (10.3)
 double phase_space_sum(GeneratingFunction& hamiltonian, const DiscreteCurve& curve);
@@ -34,9 +35,11 @@ double phase_space_sum(GeneratingFunction& hamiltonian, const DiscreteCurve& cur
 /// The largest violation of the stationarity of the sum of S along the curve under δq ∈ Δ_Q, δp free,
 /// together with q¹_k = q⁰_{k+1}: the principles (8.1), (10.1), (10.3), whose equations are (8.3), (9.14),
 /// (9.15) up to Δ°_Q.
-///   type 1   D1L_d + p_k ∈ Δ°_Q(q_k),   D2L_d − p_{k+1} ∈ Δ°_Q(q_{k+1}): momenta of the (+) or the (−)
-///   system alike type 2   p_k − D1H_{d+} ∈ Δ°_Q(q_k),   q_{k+1} = D2H_{d+}: momenta of the (+) system type 3
-///   q_k = −D1H_{d−},   p_{k+1} + D2H_{d−} ∈ Δ°_Q(q_{k+1}): momenta of the (−) system
+///
+///   type 1   D1L_d + p_k ∈ Δ°_Q(q_k),   D2L_d − p_{k+1} ∈ Δ°_Q(q_{k+1})   momenta of the (+) or (−) system
+///   type 2   p_k − D1H_{d+} ∈ Δ°_Q(q_k),   q_{k+1} = D2H_{d+}             momenta of the (+) system
+///   type 3   q_k = −D1H_{d−},   p_{k+1} + D2H_{d−} ∈ Δ°_Q(q_{k+1})        momenta of the (−) system
+///
 /// Membership of the pairs in Δ^d_Q is a matter of its own; see DiscreteDiracStructure.  Throws Misuse for
 /// type 4.
 double stationarity_residual(GeneratingFunction& s, DiscreteDiracStructure& structure,

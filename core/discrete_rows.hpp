@@ -48,10 +48,10 @@ struct ConstraintRule {
 /// Throws Misuse unless the rows discretise the nonholonomic ones among `constraints` at (t, q), saying which
 /// requirement fails and by how much:
 ///
-///   (q,q) ∈ Δ^d_Q                       c = 0 on the diagonal for h = 0                 Leok and Ohsawa
-///   (4.17) ∂c/∂q1 at (q,q) spans Δ°_Q(q)       so that Δ^d_Q induces Δ_Q back                (4.18), (4.19)
-///   c(q,q)/h → b                        the same for affine rows, h → 0
-///   ∂c/∂q1                              agrees with differences near (q,q)
+///   (q,q) ∈ Δ^d_Q                   c = 0 on the diagonal for h = 0          Leok and Ohsawa (4.17)
+///   ∂c/∂q1 at (q,q) spans Δ°_Q(q)   so that Δ^d_Q induces Δ_Q back           (4.18), (4.19)
+///   c(q,q)/h → b                    the same for affine rows, h → 0
+///   ∂c/∂q1                          agrees with differences near (q,q)
 ///
 /// Tolerances are 1e-9 of the terms, and 1e-6 for differences.
 void require_discretisation(const DiscreteRows& rows, const ConstraintBlocks& constraints, double t,

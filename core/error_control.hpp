@@ -9,6 +9,7 @@
 
 namespace diracstep {
 
+/// The error asked for, and how far the search may go.
 struct ErrorControlOptions {
   double error = 0.0;       ///< asked for at the end of the motion, see ErrorControlReport::estimate
   std::string method = {};  ///< empty: chosen by the size of the scene and the error
@@ -33,6 +34,7 @@ struct ErrorControlRun {
   std::string failure = {};                                          ///< empty, or why it stopped
 };
 
+/// What was reached, and every run on the way there.
 struct ErrorControlReport {
   std::string refusal;  ///< empty, or why the error asked for was not reached
   std::string warning;  ///< empty, or why the estimate deserves less trust

@@ -25,6 +25,7 @@ struct GraphOf {
   double start_sign;
   double end_sign;
 };
+/// The table above, for one type.
 constexpr GraphOf graph_of(GeneratingType type) {
   switch (type) {
     case GeneratingType::one:

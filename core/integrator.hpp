@@ -26,6 +26,7 @@ enum class Momentum {
   projected  ///< ∂L/∂v(q_k, v_k) with v_k ∈ Δ_Q(q_k)
 };
 
+/// How a scene is stepped; everything but the step size has a default.
 struct IntegratorOptions {
   std::string method = automatic_method;  ///< a name of the registry, or "auto": see default_method()
   int order = 0;  ///< composed to this order, methods that are not self-adjoint with their adjoint; 0 keeps

@@ -40,6 +40,7 @@ class NonlinearProblem {
   virtual void solve_splitting(VectorRef /*f*/) {}
 };
 
+/// How a solve ended.
 enum class SolveStatus {
   ok,
   no_convergence,     ///< iterations used up or the residual no longer falls

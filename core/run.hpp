@@ -17,12 +17,13 @@ struct [[nodiscard]] RunReport {
 /// Takes `steps` steps and shows the start, every `every`-th point and the last one to the observer.
 RunReport run(Integrator& integrator, long steps, Momentum momentum, long every, const Observer& observer);
 
-/// Number of steps of about size `step` from `start` to `end` and the size that makes them fit exactly.
-/// Throws Misuse for a step that is zero, not finite, or of the wrong sign.
+/// A number of steps of one size.
 struct StepGrid {
   long steps;
   double step;
 };
+/// Number of steps of about size `step` from `start` to `end` and the size that makes them fit exactly.
+/// Throws Misuse for a step that is zero, not finite, or of the wrong sign.
 StepGrid fit_steps(double start, double end, double step);
 
 }  // namespace diracstep

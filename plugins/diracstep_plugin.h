@@ -101,6 +101,7 @@ typedef struct diracstep_rule {
   const double *weights; /* they add up to 1 */
 } diracstep_rule;
 
+/* What a shared object brings. */
 typedef struct diracstep_plugin {
   unsigned version; /* DIRACSTEP_PLUGIN_VERSION */
   unsigned size;    /* sizeof(diracstep_plugin) */

@@ -13,6 +13,7 @@ enum class JacobianPolicy {
   kept,       ///< only where the residual falls too slowly, so that one serves many steps
 };
 
+/// What is repeated until the residual is zero.
 enum class Iteration {
   newton,
   fixed_point,  ///< x ← x − P⁻¹F(x) by KINSOL's fixed-point solver with the problem's splitting P; Newton's
@@ -36,10 +37,13 @@ struct KinsolOptions {
   int anderson = 0;  ///< how many past iterates accelerate the fixed-point iteration
 };
 
-/// Names as a user writes them, "automatic", "per-step", …; the second throws Misuse for any other.
+/// The name as a user writes it: "automatic", "per-step", …
 const char* name(JacobianPolicy policy);
+/// The policy of that name; throws Misuse for any other.
 JacobianPolicy jacobian_policy(const std::string& name);
+/// The name as a user writes it: "newton", "fixed-point", "automatic".
 const char* name(Iteration iteration);
+/// The iteration of that name; throws Misuse for any other.
 Iteration iteration(const std::string& name);
 
 /// Solves nonlinear problems with SUNDIALS KINSOL: Newton's method with exact Jacobians, and once more with a

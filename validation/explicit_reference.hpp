@@ -11,9 +11,10 @@ namespace diracstep {
 /// The continuous system with its index reduced to 0, as one would write it by hand: the rows enter only
 /// differentiated, so that a numerical solution drifts off them.
 ///
-///   L regular on Δ_Q:    y = (q, v),   q̇ = v,   v̇ = a with  [∂²L/∂v² −Aᵀ; A 0] (a, Λ) = …
-///   (AccelerationProblem) L linear in v:       y = q,        q̇ = v with  (Dθᵀ − Dθ) v = ∂H/∂q
-///   (PhaseSpaceVelocityProblem)
+///   L regular on Δ_Q   y = (q, v),   q̇ = v,   v̇ = a with  [∂²L/∂v² −Aᵀ; A 0] (a, Λ) = …
+///   L linear in v      y = q,        q̇ = v with  (Dθᵀ − Dθ) v = ∂H/∂q
+///
+/// The accelerations are those of AccelerationProblem, the velocities those of PhaseSpaceVelocityProblem.
 class ReducedEquations {
  public:
   /// With `dense` the linear system of a rate is factored as a full matrix.

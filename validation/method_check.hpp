@@ -19,6 +19,7 @@ struct Check {
   std::string detail;   ///< what the figure is, or why the check failed or does not apply
 };
 
+/// All lines of a method or a rule.
 struct ConformanceTable {
   std::string subject;  ///< the name of the method or rule
   std::vector<Check> checks;
@@ -26,6 +27,7 @@ struct ConformanceTable {
   bool passed() const;
 };
 
+/// What a check may use, and who is told of its progress.
 struct CheckOptions {
   /// Heap allocations of this program so far; without it the claim to allocate nothing is not looked at.
   std::function<long()> allocations = {};

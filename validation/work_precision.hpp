@@ -25,10 +25,9 @@ struct OrderFit {
 /// Least squares over the asymptotic points; empty where there are fewer than three.  A point counts when
 ///
 ///   * its error is below 1e-2 (coarser ones are pre-asymptotic), and
-///   * it lies above round-off: above 1e-11, or above 30 times the smallest error reached.  Where the ladder
-///   shows
-///     a plateau (an error below 1e-6 that a refinement lowers by less than the square root of the step
-///     ratio) only the second part holds, for the points before it;
+///   * it lies above round-off: above 1e-11, or above 30 times the smallest error reached.
+///     Where the ladder shows a plateau (an error below 1e-6 that a refinement lowers by less than the square
+///     root of the step ratio) only the second part holds, for the points before it;
 ///
 /// of these the finest four are taken.
 std::optional<OrderFit> measure_order(std::vector<WorkPoint> points);

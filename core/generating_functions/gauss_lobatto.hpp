@@ -14,7 +14,7 @@ namespace diracstep {
 ///   three  S3(p0,q1) = −p0·q0 − h Σ b_i L(Q_i,V_i),  q0 = q1 − h Σ b_i V_i        inner V_1 … V_s
 ///
 /// with Q_i = q0 + h Σ a_ik V_k; at a stationary point μ = p1.  So they have nothing to invert, like the
-/// transforms of Leok and Ohsawa (9.6), (9.8), which they are.
+/// transforms of Leok and Ohsawa (9.6), (9.7), which they are.
 ///
 /// On scenes without rows the step of each of the three is GL(s) itself.  Rows and forces act at nodes inside
 /// the step, which no function of the end points knows: those scenes are stepped by gauss_lobatto_step(), and

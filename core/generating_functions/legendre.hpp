@@ -10,7 +10,7 @@ namespace diracstep {
 /// inverted:
 ///
 ///   two    H_{d+}(q0,p1) = stat_{q1}     p1·q1 − L_d(q0,q1)                Leok and Ohsawa (9.6)
-///   three  H_{d−}(p0,q1) = stat_{q0}    −p0·q0 − L_d(q0,q1)                Leok and Ohsawa (9.8)
+///   three  H_{d−}(p0,q1) = stat_{q0}    −p0·q0 − L_d(q0,q1)                Leok and Ohsawa (9.7)
 ///   four   S(p0,p1)      = stat_{q0,q1}  p0·q0 − p1·q1 + L_d(q0,q1)        beyond the paper
 ///
 /// Throws Misuse unless `lagrangian` is of type 1 and `type` is not.

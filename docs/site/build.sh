@@ -1,0 +1,40 @@
+#!/bin/sh
+# build.sh OUT: the site of the documentation in OUT, from the Markdown pages and the public headers. Any warning fails.
+# Needs doxygen, sphinx with myst-parser, breathe and furo, and KaTeX (Debian: libjs-katex) in /usr/share/javascript.
+set -eu
+site="$(cd "$(dirname "$0")" && pwd)"
+SOURCES="$(cd "$site/../.." && pwd)"
+mkdir -p "$1"
+out="$(cd "$1" && pwd)"
+work="$out.work"
+katex="${DIRACSTEP_KATEX:-/usr/share/javascript/katex}"
+rm -rf "$out" "$work"
+mkdir -p "$work/source" "$work/static"
+
+# The pages and what they link to, under the names they have in the repository.
+for entry in "$SOURCES"/*; do
+  case "$(basename "$entry")" in build) ;; *) ln -s "$entry" "$work/source" ;; esac
+done
+ln -s "$katex/katex.min.css" "$katex/katex.min.js" "$katex/contrib/auto-render.js" "$katex/fonts" \
+  "$site/site.css" "$work/static"
+
+HEADERS="$SOURCES/core $SOURCES/constraints $SOURCES/solvers $SOURCES/validation $SOURCES/c_interface \
+  $SOURCES/plugins/diracstep_plugin.h $SOURCES/plugins/diracstep_scene.h $SOURCES/plugins/plugin.hpp \
+  $SOURCES/plugins/loaded_plugin.hpp"
+READABLE_HEADER="$site/readable_header.py" OUTPUT="$work"
+export SOURCES HEADERS READABLE_HEADER OUTPUT
+doxygen "$site/Doxyfile"
+mkdir "$work/source/api"
+python3 "$site/reference_pages.py" "$work/xml" "$work/source/api"
+
+DIRACSTEP_XML="$work/xml" DIRACSTEP_STATIC="$work/static" \
+  sphinx-build -q -W -n --keep-going -c "$site" -d "$work/doctrees" "$work/source" "$out"
+rm -rf "$work"
+
+# Debian's furo.js imports its second script as a module does, but no page loads it as one: both as one file.
+scripts="$out/_static/scripts"
+if grep -q '^import Gumshoe' "$scripts/furo.js"; then
+  sed '/^import Gumshoe/d' "$scripts/furo.js" >>"$scripts/gumshoe-patched.js"
+  mv "$scripts/gumshoe-patched.js" "$scripts/furo.js"
+fi
+echo "$out/index.html"
