@@ -1,13 +1,20 @@
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <diracstep/core/run.hpp>
 #include <diracstep/validation/history.hpp>
+#include <diracstep/validation/report.hpp>
+#include <diracstep/validation/work_precision.hpp>
+#include <utility>
 
 namespace diracstep {
 
 namespace {
 
 constexpr double shown_error = 1e-6;
+constexpr long most_numbers = 60'000;  // positions kept of a run, give or take half
+constexpr long fewest_points = 50;     // …and the points kept of the largest scene
 
 /// Better: below the shown error, and there the least work; else the smaller error.
 bool better(const StudyRow& a, const StudyRow& b) {
@@ -34,6 +41,39 @@ StepGrid finer(const StudyRow& row, const Study& study, long points) {
   return {steps, length / static_cast<double>(steps)};
 }
 
+/// The error of a run while it goes on: against the closed form where the scene has one, else against a
+/// second run of half the step beside it.
+class ErrorAlongside {
+ public:
+  ErrorAlongside(const CatalogueScene& entry, const Study& study, Momentum momentum, Integrator finer)
+      : entry_(entry), momentum_(momentum), finer_(std::move(finer)) {
+    closed_form_ = known_point(entry, 0.5 * (study.t_start + study.t_end)).has_value();
+  }
+
+  std::string against() const {
+    return closed_form_ ? entry_.reference.how : "the same run with half the step";
+  }
+
+  /// NaN from where the second run has failed.
+  double at(const Sample& sample, long steps) {
+    if (closed_form_) {
+      const auto truth = known_point(entry_, sample.time);
+      return truth ? truth->distance(sample) : StudyRow::none;
+    }
+    for (; taken_ < 2 * steps && going_; ++taken_) going_ = finer_.step().ok();
+    if (!going_ || !finer_.sample(momentum_, other_).ok()) return StudyRow::none;
+    return std::max(relative_error(sample.q, other_.q), relative_error(sample.p, other_.p));
+  }
+
+ private:
+  const CatalogueScene& entry_;
+  Momentum momentum_;
+  Integrator finer_;
+  Sample other_;
+  long taken_ = 0;
+  bool closed_form_ = false, going_ = true;
+};
+
 /// Takes samples into a history.
 class Recorder {
  public:
@@ -44,9 +84,10 @@ class Recorder {
     energy_ = scene.energy(start.time, start.q, start.v);
   }
 
-  void take(const Sample& sample) {
+  void take(const Sample& sample, double error) {
     history_.time.push_back(sample.time);
-    history_.q.push_back(sample.q);
+    history_.error.push_back(error);
+    history_.positions.push_back(drawn(sample.q));
     history_.energy.push_back(change(sample.energy, energy_));
     if (scene_.rows() > 0) history_.constraint.push_back(largest_violation(scene_, sample));
     for (std::size_t i = 0; i < entry_.invariants.size(); ++i) {
@@ -57,6 +98,14 @@ class Recorder {
   }
 
  private:
+  Vector drawn(const Vector& q) const {
+    const auto& coordinates = history_.motion.coordinates;
+    Vector values(static_cast<Eigen::Index>(coordinates.size()));
+    for (std::size_t i = 0; i < coordinates.size(); ++i)
+      values[static_cast<Eigen::Index>(i)] = q[coordinates[i].index];
+    return values;
+  }
+
   const Vector& second_argument(const Sample& sample) const {
     return entry_.scene->lagrangian ? sample.v : sample.p;
   }
@@ -68,6 +117,15 @@ class Recorder {
   std::vector<double> first_;  ///< the invariants at the start
 };
 
+History described(const StudyRow& row, double step, const CatalogueScene& entry) {
+  History history;
+  history.method = row.method;
+  history.order = row.order;
+  history.step = step;
+  history.motion = motion_of(entry);
+  return history;
+}
+
 }  // namespace
 
 History record_history(const CatalogueScene& entry, const Registry& registry, const SolverFactory& solvers,
@@ -75,22 +133,39 @@ History record_history(const CatalogueScene& entry, const Registry& registry, co
   const StudyRow* row = shown_row(study);
   if (row == nullptr) return {};
   const StepGrid grid = finer(*row, study, points);
-  Integrator integrator(entry.scene, registry, solvers,
-                        {.method = row->method, .order = row->order, .step = grid.step});
-  History history;
-  history.method = row->method;
-  history.order = row->order;
-  history.step = grid.step;
-  history.coordinates = integrator.scene().coordinates;
+  const auto integrator_of = [&](double step) {
+    return Integrator(entry.scene, registry, solvers,
+                      {.method = row->method, .order = row->order, .step = step});
+  };
+  Integrator integrator = integrator_of(grid.step);
+  History history = described(*row, grid.step, entry);
   history.plan = integrator.plan();
+  ErrorAlongside error(entry, study, study.momentum, integrator_of(0.5 * grid.step));
+  history.error_against = error.against();
   Recorder recorder(entry, integrator.scene(), history);
-  const long every = std::max(1L, grid.steps / points);
+  const long drawn = static_cast<long>(history.motion.coordinates.size());
+  const long kept = std::clamp(most_numbers / std::max(drawn, 1L), std::min(fewest_points, points), points);
+  const long every = std::max(1L, grid.steps / kept);
   const RunReport report = run(integrator, grid.steps, study.momentum, every, [&](const Sample& sample) {
-    recorder.take(sample);
+    recorder.take(sample, error.at(sample, std::lround((sample.time - study.t_start) / grid.step)));
     return true;
   });
   history.failure = report.last.failure;
   return history;
+}
+
+std::string history_csv(const History& history) {
+  std::string text = "t,error,energy";
+  if (!history.constraint.empty()) text += ",rows";
+  for (const auto& invariant : history.invariants) text += ',' + csv_field(invariant.name);
+  for (const auto& drawn : history.motion.coordinates) text += ',' + csv_field(drawn.name);
+  for (std::size_t i = 0; i < history.time.size(); ++i) {
+    text += fmt::format("\n{:.17g},{:.9g},{:.9g}", history.time[i], history.error[i], history.energy[i]);
+    if (!history.constraint.empty()) text += fmt::format(",{:.9g}", history.constraint[i]);
+    for (const auto& invariant : history.invariants) text += fmt::format(",{:.9g}", invariant.values[i]);
+    for (const double value : history.positions[i]) text += fmt::format(",{:.17g}", value);
+  }
+  return text + '\n';
 }
 
 }  // namespace diracstep

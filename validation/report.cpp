@@ -240,6 +240,21 @@ std::string at_error_markdown(const Study& study) {
   return text + '\n';
 }
 
+std::string summary_markdown(const std::vector<Study>& studies) {
+  const auto time = [](std::optional<double> t) { return t ? time_cell(*t) : std::string("-"); };
+  const auto ratio = [](std::optional<double> r) { return r ? fmt::format("{:.2f}", *r) : std::string("-"); };
+  std::string text =
+      "| scene | error | fastest of ours | ours | IDA | IDA / ours | explicit | explicit / ours |\n"
+      "|---|---|---|---|---|---|---|---|\n";
+  for (const Study& study : studies)
+    for (const AtError& at : study.at_error)
+      if (at.best && (at.error == 1e-6 || at.error == 1e-9))
+        text += fmt::format("| `{}` | {:.0e} | `{}`, order {} | {} | {} | {} | {} | {} |\n", study.scene,
+                            at.error, at.method, at.order, time(at.cpu_seconds), time(at.ida_cpu_seconds),
+                            ratio(at.ratio), time(at.erk_cpu_seconds), ratio(at.erk_ratio));
+  return text;
+}
+
 std::string studies_csv(const std::vector<Study>& studies) {
   std::string text =
       "scene,method,order,momentum,step,rtol,status,error_q,error_p,self_error,constraint,energy_error,"

@@ -85,10 +85,9 @@ double largest_violation(const Scene& scene, const Sample& at) {
   return largest;
 }
 
-Truth true_end(const CatalogueScene& scene, double t_end) {
-  const auto point = scene.reference.at ? scene.reference.at(t_end) : std::nullopt;
-  const auto complete = completed(scene.scene);
-  if (!point) return true_end_by_ida(*complete, t_end);
+std::optional<Truth> known_point(const CatalogueScene& scene, double t) {
+  const auto point = scene.reference.at ? scene.reference.at(t) : std::nullopt;
+  if (!point) return std::nullopt;
   Truth truth{.kind = scene.reference.kind,
               .how = scene.reference.how,
               .self_error = scene.reference.self_error,
@@ -96,8 +95,13 @@ Truth true_end(const CatalogueScene& scene, double t_end) {
               .q = point->q,
               .p = Vector::Zero(point->q.size())};
   Vector force = truth.p;
-  complete->lagrangian->gradient(t_end, point->q, point->v, force, truth.p);
+  completed(scene.scene)->lagrangian->gradient(t, point->q, point->v, force, truth.p);
   return truth;
+}
+
+Truth true_end(const CatalogueScene& scene, double t_end) {
+  if (auto known = known_point(scene, t_end)) return *std::move(known);
+  return true_end_by_ida(*completed(scene.scene), t_end);
 }
 
 void judge(StudyRow& row, const Scene& scene, const Sample& end, const Truth& truth) {

@@ -5,6 +5,7 @@
 #include <diracstep/validation/scene_catalogue.hpp>
 #include <functional>
 #include <limits>
+#include <optional>
 #include <string>
 
 namespace diracstep {
@@ -62,6 +63,9 @@ struct Truth {
   /// The larger of the relative errors in q and p.
   double distance(const Sample& end) const;
 };
+
+/// The scene's reference at time t with p = ∂L/∂v; empty where it does not reach t.
+std::optional<Truth> known_point(const CatalogueScene& scene, double t);
 
 /// The scene's reference at t_end with p = ∂L/∂v, or IDA's result at the tolerance 1e-13 where there is none.
 Truth true_end(const CatalogueScene& scene, double t_end);

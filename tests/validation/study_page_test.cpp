@@ -32,7 +32,7 @@ TEST(History, RepeatsTheRunOfAStudyWithWhatShouldStay) {
   EXPECT_EQ(history.step, 0.1);  // the cheaper one of the two below 1e-6
   EXPECT_EQ(history.time.front(), 0.0);
   EXPECT_EQ(history.time.back(), 10.0);
-  ASSERT_EQ(history.q.size(), history.time.size());
+  ASSERT_EQ(history.positions.size(), history.time.size());
   ASSERT_EQ(history.constraint.size(), history.time.size());
   EXPECT_EQ(history.energy.front(), 0.0);
   for (const double violation : history.constraint) EXPECT_LT(violation, 1e-13);
@@ -49,10 +49,10 @@ TEST(StudyPage, NeedsNoOtherFileAndEscapesWhatItShows) {
   const CatalogueScene scene = make_scene("knife_edge");
   PageEntry entry{small_study(scene), {}, scene.kind, "a < b & \"c\"", scene.source};
   entry.history = record_history(scene, Registry::with_built_ins(), kinsol(), entry.study, 50);
-  const std::string page = study_page({entry}, "/nonexistent");
+  const std::string page = study_page({entry}, {{"methods", "type1/midpoint"}}, "/nonexistent");
   expect_parts(page, {"<!DOCTYPE html>", "id=\"knife_edge\"", "a &lt; b &amp; &quot;c&quot;", "IDA / ours",
                       "What type1/midpoint does here", "SUNDIALS 6", "</html>"});
-  for (const char* outside : {"http:", "https:", "src=\"/", "<link"})
+  for (const char* outside : {"src=\"http", "src=\"/", "href=\"http", "href=\"/", "url(http", "@import"})
     EXPECT_EQ(page.find(outside), std::string::npos) << outside;
 }
 
