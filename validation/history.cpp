@@ -6,7 +6,7 @@
 #include <diracstep/validation/history.hpp>
 #include <diracstep/validation/report.hpp>
 #include <diracstep/validation/work_precision.hpp>
-#include <utility>
+#include <functional>
 
 namespace diracstep {
 
@@ -14,7 +14,7 @@ namespace {
 
 constexpr double shown_error = 1e-6;
 constexpr long most_numbers = 60'000;  // positions kept of a run, give or take half
-constexpr long fewest_points = 50;     // …and the points kept of the largest scene
+constexpr long fewest_points = 50;     // … and the points kept of the largest scene
 
 /// Better: below the shown error, and there the least work; else the smaller error.
 bool better(const StudyRow& a, const StudyRow& b) {
@@ -34,25 +34,25 @@ const StudyRow* shown_row(const Study& study) {
 
 double change(double now, double start) { return std::abs(now - start) / std::max(std::abs(start), 1.0); }
 
-/// The steps of a row, shortened where there are too few for a smooth picture.
-StepGrid finer(const StudyRow& row, const Study& study, long points) {
-  const double length = study.t_end - study.t_start;
-  const long steps = std::max(row.steps, points / 2);
-  return {steps, length / static_cast<double>(steps)};
+/// The integrator of a run, for a step size.
+using IntegratorOf = std::function<Integrator(double)>;
+
+/// A number of steps and their size.
+StepGrid grid_of(const Study& study, long steps) {
+  return {steps, (study.t_end - study.t_start) / static_cast<double>(steps)};
 }
 
 /// The error of a run while it goes on: against the closed form where the scene has one, else against a
 /// second run of half the step beside it.
 class ErrorAlongside {
  public:
-  ErrorAlongside(const CatalogueScene& entry, const Study& study, Momentum momentum, Integrator finer)
-      : entry_(entry), momentum_(momentum), finer_(std::move(finer)) {
+  ErrorAlongside(const CatalogueScene& entry, const Study& study, const IntegratorOf& integrator_of,
+                 double step)
+      : entry_(entry), momentum_(study.momentum), finer_(integrator_of(0.5 * step)) {
     closed_form_ = known_point(entry, 0.5 * (study.t_start + study.t_end)).has_value();
   }
 
-  std::string against() const {
-    return closed_form_ ? entry_.reference.how : "the same run with half the step";
-  }
+  std::string against() const { return closed_form_ ? "the closed form" : "the same run with half the step"; }
 
   /// NaN from where the second run has failed.
   double at(const Sample& sample, long steps) {
@@ -87,7 +87,6 @@ class Recorder {
   void take(const Sample& sample, double error) {
     history_.time.push_back(sample.time);
     history_.error.push_back(error);
-    history_.positions.push_back(drawn(sample.q));
     history_.energy.push_back(change(sample.energy, energy_));
     if (scene_.rows() > 0) history_.constraint.push_back(largest_violation(scene_, sample));
     for (std::size_t i = 0; i < entry_.invariants.size(); ++i) {
@@ -98,14 +97,6 @@ class Recorder {
   }
 
  private:
-  Vector drawn(const Vector& q) const {
-    const auto& coordinates = history_.motion.coordinates;
-    Vector values(static_cast<Eigen::Index>(coordinates.size()));
-    for (std::size_t i = 0; i < coordinates.size(); ++i)
-      values[static_cast<Eigen::Index>(i)] = q[coordinates[i].index];
-    return values;
-  }
-
   const Vector& second_argument(const Sample& sample) const {
     return entry_.scene->lagrangian ? sample.v : sample.p;
   }
@@ -117,13 +108,31 @@ class Recorder {
   std::vector<double> first_;  ///< the invariants at the start
 };
 
-History described(const StudyRow& row, double step, const CatalogueScene& entry) {
+History described(const StudyRow& row, const CatalogueScene& entry) {
   History history;
   history.method = row.method;
   history.order = row.order;
-  history.step = step;
+  history.step = row.step;
   history.motion = motion_of(entry);
   return history;
+}
+
+/// Fills in the track of the motion: fewer points of a large scene, and steps short enough for a picture.
+void record_track(History& history, const Study& study, const StudyRow& row, long points,
+                  const IntegratorOf& integrator_of) {
+  const auto& coordinates = history.motion.coordinates;
+  const auto drawn = static_cast<long>(coordinates.size());
+  const long kept = std::clamp(most_numbers / std::max(drawn, 1L), std::min(fewest_points, points), points);
+  const StepGrid grid = grid_of(study, std::max(row.steps, kept / 2));
+  Integrator integrator = integrator_of(grid.step);
+  const RunReport report =
+      run(integrator, grid.steps, study.momentum, std::max(1L, grid.steps / kept), [&](const Sample& sample) {
+        history.track_time.push_back(sample.time);
+        Vector& at = history.positions.emplace_back(drawn);
+        for (long i = 0; i < drawn; ++i) at[i] = sample.q[coordinates[static_cast<std::size_t>(i)].index];
+        return true;
+      });
+  if (!report.ok()) history.failure = "the run for the picture of the motion: " + report.last.failure;
 }
 
 }  // namespace
@@ -132,25 +141,24 @@ History record_history(const CatalogueScene& entry, const Registry& registry, co
                        const Study& study, long points) {
   const StudyRow* row = shown_row(study);
   if (row == nullptr) return {};
-  const StepGrid grid = finer(*row, study, points);
+  const StepGrid grid = grid_of(study, row->steps);
   const auto integrator_of = [&](double step) {
     return Integrator(entry.scene, registry, solvers,
                       {.method = row->method, .order = row->order, .step = step});
   };
   Integrator integrator = integrator_of(grid.step);
-  History history = described(*row, grid.step, entry);
+  History history = described(*row, entry);
   history.plan = integrator.plan();
-  ErrorAlongside error(entry, study, study.momentum, integrator_of(0.5 * grid.step));
+  record_track(history, study, *row, points, integrator_of);
+  ErrorAlongside error(entry, study, integrator_of, grid.step);
   history.error_against = error.against();
   Recorder recorder(entry, integrator.scene(), history);
-  const long drawn = static_cast<long>(history.motion.coordinates.size());
-  const long kept = std::clamp(most_numbers / std::max(drawn, 1L), std::min(fewest_points, points), points);
-  const long every = std::max(1L, grid.steps / kept);
+  const long every = std::max(1L, grid.steps / points);
   const RunReport report = run(integrator, grid.steps, study.momentum, every, [&](const Sample& sample) {
     recorder.take(sample, error.at(sample, std::lround((sample.time - study.t_start) / grid.step)));
     return true;
   });
-  history.failure = report.last.failure;
+  if (!report.ok()) history.failure = report.last.failure;
   return history;
 }
 
@@ -158,11 +166,19 @@ std::string history_csv(const History& history) {
   std::string text = "t,error,energy";
   if (!history.constraint.empty()) text += ",rows";
   for (const auto& invariant : history.invariants) text += ',' + csv_field(invariant.name);
-  for (const auto& drawn : history.motion.coordinates) text += ',' + csv_field(drawn.name);
   for (std::size_t i = 0; i < history.time.size(); ++i) {
     text += fmt::format("\n{:.17g},{:.9g},{:.9g}", history.time[i], history.error[i], history.energy[i]);
     if (!history.constraint.empty()) text += fmt::format(",{:.9g}", history.constraint[i]);
     for (const auto& invariant : history.invariants) text += fmt::format(",{:.9g}", invariant.values[i]);
+  }
+  return text + '\n';
+}
+
+std::string motion_csv(const History& history) {
+  std::string text = "t";
+  for (const auto& drawn : history.motion.coordinates) text += ',' + csv_field(drawn.name);
+  for (std::size_t i = 0; i < history.track_time.size(); ++i) {
+    text += fmt::format("\n{:.17g}", history.track_time[i]);
     for (const double value : history.positions[i]) text += fmt::format(",{:.17g}", value);
   }
   return text + '\n';

@@ -23,18 +23,22 @@ struct History {
   };
   std::vector<Change> invariants;  ///< of the scene
   Motion motion;                   ///< what is drawn …
-  std::vector<Vector> positions;   ///< … and its coordinates at each time
+  std::vector<double> track_time;  ///< … and when …
+  std::vector<Vector> positions;   ///< … its coordinates are where
   std::vector<PlanLine> plan;      ///< what the integrator does and leaves out
   std::string failure;             ///< empty, or why the run stopped
 };
 
 /// The run of a study with steps of one size that comes nearest to the error 1e-6 from below, repeated with
-/// about `points` points kept, fewer of a large scene, and with half as many steps at least; where none is
-/// that exact, the most exact one.
+/// about `points` points kept; where none is that exact, the most exact one.  Where it takes too few steps
+/// for a smooth picture, the motion is that of a second run with shorter ones.
 History record_history(const CatalogueScene& scene, const Registry& registry, const SolverFactory& solvers,
                        const Study& study, long points = 400);
 
-/// A line for each time: t, error, energy, rows, the invariants, then the drawn coordinates, by name.
+/// A line for each time: t, error, energy, rows, the invariants.
 std::string history_csv(const History& history);
+
+/// A line for each time of the motion: t, then the drawn coordinates by name.
+std::string motion_csv(const History& history);
 
 }  // namespace diracstep

@@ -67,7 +67,6 @@ HtmlCell number_cell(std::optional<double> value, const std::string& text) {
 
 std::string HtmlTable::text() const {
   std::string text = "<div class=\"table\"><table>";
-  if (!caption.empty()) text += "<caption>" + html(caption) + "</caption>";
   text += "<thead>" + heads(*this) + "</thead><tbody>\n";
   for (std::size_t i = 0; i < rows.size(); ++i) {
     text += i < best.size() && best[i] ? "<tr class=\"best\">" : "<tr>";

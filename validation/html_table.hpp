@@ -24,7 +24,6 @@ HtmlCell words(std::string_view text, std::string look = {});
 HtmlCell number_cell(std::optional<double> value, const std::string& text);
 
 struct HtmlTable {
-  std::string caption;                              ///< may be empty
   std::vector<std::pair<std::string, int>> groups;  ///< heads over so many columns each; may be empty
   std::vector<std::string> header;                  ///< each a button that the page sorts by
   std::vector<std::vector<HtmlCell>> rows;

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <diracstep/validation/build_facts.hpp>
 #include <diracstep/validation/html_table.hpp>
@@ -19,8 +20,13 @@ namespace {
 constexpr std::array<double, 3> summary_errors{1e-3, 1e-6, 1e-9};
 constexpr double headline_error = 1e-6;
 
+/// 1e-06 as "1e-6".
+std::string power_text(double power_of_ten) {
+  return fmt::format("1e{}", std::lround(std::log10(power_of_ten)));
+}
+
 HtmlCell seconds(std::optional<double> value) { return number_cell(value, value ? time_cell(*value) : ""); }
-HtmlCell exponent(double value) { return number_cell(value, fmt::format("{:.0e}", value)); }
+HtmlCell exponent(double value) { return number_cell(value, power_text(value)); }
 HtmlCell whole(double value) { return number_cell(value, fmt::format("{}", value)); }
 
 HtmlCell ratio(std::optional<double> value) {
@@ -83,9 +89,10 @@ std::string tile(const std::vector<PageEntry>& entries, const std::string& yards
   const auto faster = std::ranges::count_if(ratios, [](double r) { return r > 1.0; });
   const auto middle = median(ratios);
   return fmt::format(
-      "<li><b>{}</b><span>time of {} over ours at the error {:.0e}: the median of {} scenes, above 1 on "
+      "<li><b>{}</b><span>time of {} over ours at the error {}: the median of {} scenes; ours is faster on "
       "{}</span></li>",
-      middle ? fmt::format("{:.1f}", *middle) : "–", yardstick, headline_error, ratios.size(), faster);
+      middle ? fmt::format("{:.1f}", *middle) : "–", yardstick, power_text(headline_error), ratios.size(),
+      faster);
 }
 
 std::string tiles(const std::vector<PageEntry>& entries) {
@@ -110,8 +117,7 @@ std::vector<HtmlCell> summary_row(const PageEntry& entry) {
 }
 
 std::string summary(const std::vector<PageEntry>& entries) {
-  HtmlTable table{"Time of the yardsticks over the time of the fastest of ours; above 1 ours is faster",
-                  {{"", 2}, {"fastest of ours at 1e-6", 2}, {"IDA / ours at", 3}, {"explicit / ours at", 3}},
+  HtmlTable table{{{"", 2}, {"fastest of ours at 1e-6", 2}, {"IDA / ours at", 3}, {"explicit / ours at", 3}},
                   {"scene", "class", "method", "CPU", "1e-3", "1e-6", "1e-9", "1e-3", "1e-6", "1e-9"},
                   {}};
   for (const PageEntry& entry : entries) table.rows.push_back(summary_row(entry));
@@ -122,7 +128,7 @@ std::string summary(const std::vector<PageEntry>& entries) {
 
 std::string ratios(const Study& study) {
   HtmlTable table{
-      "", {}, {"error", "fastest of ours", "ours", "IDA", "IDA / ours", "explicit", "explicit / ours"}, {}};
+      {}, {"error", "fastest of ours", "ours", "IDA", "IDA / ours", "explicit", "explicit / ours"}, {}};
   for (const double error : compared_errors)
     if (const AtError* at = best_at(study, error))
       table.rows.push_back({exponent(error), words(label(*at)), seconds(at->cpu_seconds),
@@ -146,8 +152,7 @@ std::vector<HtmlCell> method_row(const Study& study, const MeasuredOrder& m) {
 }
 
 std::string methods(const Study& study) {
-  HtmlTable table{"",
-                  {{"", 1}, {"order", 2}, {"", 1}, {"CPU time at the error", 4}, {"", 1}},
+  HtmlTable table{{{"", 1}, {"order", 2}, {"", 1}, {"CPU time at the error", 4}, {"", 1}},
                   {"method", "stated", "measured", "points", "1e-3", "1e-6", "1e-9", "1e-12",
                    "the ladder of steps ended because"},
                   {}};
@@ -177,9 +182,8 @@ std::string run_pictures(const PageEntry& entry, std::ptrdiff_t number, const st
   const std::string& scene = entry.study.scene;
   const std::string run =
       fmt::format("{}, order {}, step {:.3g}", html(history.method), history.order, history.step);
-  const bool any_error = std::ranges::any_of(history.error, [](double e) { return e > 0.0; });
-  std::string text = "<div class=\"figures\">\n";
-  if (any_error)
+  std::string text;
+  if (std::ranges::any_of(history.error, [](double e) { return e > 0.0; }))
     text += figure("error", number,
                    fmt::format("<b>Error over time</b> of {}, against {}", run, html(history.error_against)),
                    scene + ": error over time", stem + "-error.svg");
@@ -188,8 +192,20 @@ std::string run_pictures(const PageEntry& entry, std::ptrdiff_t number, const st
                              history.constraint.empty() ? "" : ", constraint rows",
                              history.invariants.empty() ? "" : ", invariants", run),
                  scene + ": energy, invariants and constraint residual over time", stem + "-history.svg");
-  text += figure("motion", number, "<b>The motion</b>", scene + ": the motion", stem + "-motion.svg");
-  return text + "</div>\n" + (history.failure.empty() ? "" : "<p>" + html(history.failure) + "</p>\n");
+  if (!history.track_time.empty())
+    text += figure("motion", number, "<b>The motion</b>", scene + ": the motion", stem + "-motion.svg");
+  return text;
+}
+
+std::string pictures(const PageEntry& entry, std::ptrdiff_t number, const std::string& stem) {
+  const Study& study = entry.study;
+  std::string text = run_pictures(entry, number, stem);
+  if (std::ranges::any_of(study.rows, [](const auto& row) { return row.ok() && !row.is_yardstick(); }))
+    text += figure("orders", number, "<b>Error over the step</b>; the legend gives the measured orders",
+                   study.scene + ": error over the step", stem + "-orders.svg");
+  const std::string& failure = entry.history.failure;
+  return "<div class=\"figures\">\n" + text + "</div>\n" +
+         (failure.empty() ? "" : "<p>" + html(failure) + "</p>\n");
 }
 
 std::string section(const PageEntry& entry, std::ptrdiff_t number, const std::filesystem::path& directory) {
@@ -205,11 +221,8 @@ std::string section(const PageEntry& entry, std::ptrdiff_t number, const std::fi
     text += figure("work", number,
                    "<b>Error against CPU time</b>, one point a run: to the left and down is better",
                    study.scene + ": error against CPU time of every method", stem + ".svg");
-  text += "<h3>At equal error</h3>\n" + ratios(study) + run_pictures(entry, number, stem);
+  text += "<h3>At equal error</h3>\n" + ratios(study) + pictures(entry, number, stem);
   text += "<h3>Methods and measured orders</h3>\n" + methods(study);
-  if (any_row && !study.measured_orders.empty())
-    text += figure("orders", number, "<b>Error over the step</b>; the legend gives the measured order",
-                   study.scene + ": error over the step", stem + "-orders.svg");
   text += plan(entry.history);
   return text + fmt::format(
                     "<p class=\"muted\">Reference: {} ({}), its own error {:.1e}. Data of the scene: "
@@ -250,7 +263,10 @@ std::string study_page(const std::vector<PageEntry>& entries, const PageFacts& o
       "<link rel=\"icon\" href=\"data:,\">\n<title>DiracStep: error against run time</title>\n"
       "<style>\n{}</style>\n</head>\n<body>\n{}",
       study_page_parts::style, introduction);
-  text += tiles(entries) + summary(entries);
+  text += tiles(entries) +
+          "<p class=\"muted\">Time of the yardsticks over the time of the fastest of ours; above 1 ours is "
+          "faster.</p>\n" +
+          summary(entries);
   text +=
       figure("summary", -1, "<b>Time of the yardsticks over ours</b>: to the right of 1 ours is faster",
              "time of IDA and of the explicit method over ours, for every scene", directory / "summary.svg");

@@ -31,8 +31,9 @@ Json body_json(const Motion::Body& body) {
   return json;
 }
 
-Json motion_json(const Motion& motion, const std::vector<Vector>& positions) {
-  Json json{{"form", name(motion.form)}};
+Json motion_json(const History& history) {
+  const Motion& motion = history.motion;
+  Json json{{"form", name(motion.form)}, {"time", rounded(history.track_time)}};
   for (const char* list : {"names", "units", "numbers", "bodies", "bars", "pins", "values"})
     json[list] = Json::array();
   for (std::size_t i = 0; i < motion.coordinates.size(); ++i) {
@@ -40,7 +41,7 @@ Json motion_json(const Motion& motion, const std::vector<Vector>& positions) {
     json["units"].push_back(motion.coordinates[i].unit);
     json["numbers"].push_back(motion.coordinates[i].index + 1);
     Json values = Json::array();
-    for (const Vector& at : positions) values.push_back(rounded(at[static_cast<Eigen::Index>(i)]));
+    for (const Vector& at : history.positions) values.push_back(rounded(at[static_cast<Eigen::Index>(i)]));
     json["values"].push_back(std::move(values));
   }
   for (const Motion::Body& body : motion.bodies) json["bodies"].push_back(body_json(body));
@@ -58,7 +59,7 @@ Json history_json(const PageEntry& entry) {
             {"energy", rounded(history.energy)},
             {"constraint", rounded(history.constraint)},
             {"invariants", Json::array()},
-            {"motion", motion_json(history.motion, history.positions)}};
+            {"motion", motion_json(history)}};
   for (const History::Change& change : history.invariants)
     json["invariants"].push_back({{"name", change.name}, {"values", rounded(change.values)}});
   return json;

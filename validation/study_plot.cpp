@@ -168,9 +168,10 @@ std::string profile_script(const History& history) {
   for (const auto& c : history.motion.coordinates) number.push_back(c.index + 1);
   constexpr std::size_t times = 5;
   for (std::size_t k = 0; k < times; ++k) {
-    const std::size_t i = k * (history.time.size() - 1) / (times - 1);
+    const std::size_t i = k * (history.track_time.size() - 1) / (times - 1);
     const Vector& q = history.positions[i];
-    curves.push_back(curve(fmt::format("t = {:.3g}", history.time[i]), k, number, {q.begin(), q.end()}));
+    curves.push_back(
+        curve(fmt::format("t = {:.3g}", history.track_time[i]), k, number, {q.begin(), q.end()}));
   }
   const auto& first = history.motion.coordinates.front();
   const std::string family = first.name.substr(0, first.name.find_last_of('_'));

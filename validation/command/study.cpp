@@ -82,8 +82,11 @@ class OutputDirectory {
     draw(studies, page.back());
     const std::string stem = (path_ / file_name(page.back().study.scene)).string();
     std::string failure = write_tables(studies);
-    if (failure.empty() && !page.back().history.time.empty())
-      failure = write_file(stem + "-history.csv", history_csv(page.back().history));
+    const History& history = page.back().history;
+    if (failure.empty() && !history.time.empty())
+      failure = write_file(stem + "-history.csv", history_csv(history));
+    if (failure.empty() && !history.time.empty())
+      failure = write_file(stem + "-motion.csv", motion_csv(history));
     if (failure.empty()) failure = write_file(path_ / "report.html", study_page(page, options, path_));
     return failure;
   }

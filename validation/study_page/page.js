@@ -63,7 +63,7 @@ function summarySpec() {
   }) });
   const series = [points(ida, 'ratio'), points({ ...erk, colour: 'var(--series-1)' }, 'erk_ratio')];
   const one = { label: '', colour: 'var(--ink)', width: 1.4, points: [-0.7, categories.length - 0.3].map(y => ({ x: 1, y })) };
-  return { x: { label: 'time of the yardstick / time of ours [1]', log: true, include: [0.5, 2] }, y: { categories },
+  return { x: { label: 'time of the yardstick / time of ours [1]', log: true, plain: true, include: [0.5, 2] }, y: { categories },
     series: [one, ...series] };
 }
 
@@ -143,7 +143,7 @@ function drawing(figure) {
   const about = { name, description: figure.dataset.description };
   addTools(figure, name);
   if (kind === 'motion')
-    return motionPicture(figure, { ...history.motion, time: history.time, timeLabel: timeLabel(history) }, about);
+    return motionPicture(figure, { ...history.motion, timeLabel: timeLabel(history) }, about);
   return () => Plot(figure, { ...about, ...pictures[kind](study, history) });
 }
 
@@ -158,15 +158,24 @@ function redraw(figure) {
 const resized = new ResizeObserver(entries => entries.forEach(entry => redraw(entry.target)));
 drawings.forEach((_, figure) => { redraw(figure); resized.observe(figure); });
 
+// On paper all is open, and the pictures are as wide as it is, so that their letters keep their size.
 const openBeforePrint = new Set();
-window.addEventListener('beforeprint', () => document.querySelectorAll('details:not([open])').forEach(details => {
-  openBeforePrint.add(details);
-  details.open = true;
-}));
-window.addEventListener('afterprint', () => openBeforePrint.forEach(details => {
-  details.open = false;
-  openBeforePrint.delete(details);
-}));
+function paper(on) {
+  document.body.classList.toggle('paper', on);
+  drawings.forEach((_, figure) => redraw(figure));
+}
+window.addEventListener('beforeprint', () => {
+  document.querySelectorAll('details:not([open])').forEach(details => {
+    openBeforePrint.add(details);
+    details.open = true;
+  });
+  paper(true);
+});
+window.addEventListener('afterprint', () => {
+  openBeforePrint.forEach(details => { details.open = false; });
+  openBeforePrint.clear();
+  paper(false);
+});
 
 function sortBy(header) {
   const table = header.closest('table'), body = table.tBodies[0], headers = [...header.parentNode.children];

@@ -1,7 +1,8 @@
 // One picture: axes, grid, curves, a legend beside or below them, and the values at the point next to the pointer.
 // plot(figure, spec) draws it as wide as the figure and returns what an animation draws on.
 //   spec  { name, x, y, series, equal, legend }
-//   axis  { label, log, categories, include }: categories are names at 0, 1, 2, …; include are values that are shown too
+//   axis  { label, log, plain, categories, include }: plain numbers, not powers of ten, on a logarithmic axis;
+//         categories are names at 0, 1, 2, …; include are values that are shown too
 //   series { label, colour, marker, dash, line, points: [{ x, y, tip }] }
 // Colours are var(--…) of the style sheet, so they follow the colour scheme and the paper without being drawn again.
 'use strict';
@@ -25,21 +26,24 @@ const Plot = (() => {
 
   const power = n => '10' + (n < 0 ? '⁻' : '') + [...String(Math.abs(n))].map(d => superscripts[d]).join('');
 
-  function decades(low, high, most) {
+  const scientific = (digit, n) => digit === 1 ? power(n) : `${digit}·${power(n)}`;
+  const plain = (digit, n) => String(Number((digit * 10 ** n).toPrecision(1)));
+
+  function decades(low, high, most, name) {
     const first = Math.ceil(low - 1e-9), last = Math.floor(high + 1e-9);
-    if (last - first < 1) return fewDecades(low, high);
+    if (last - first < 2) return fewDecades(low, high, name);
     const step = Math.max(1, Math.ceil((last - first + 1) / most));
     const ticks = [];
-    for (let n = Math.ceil(first / step) * step; n <= last; n += step) ticks.push({ at: n, label: power(n) });
+    for (let n = Math.ceil(first / step) * step; n <= last; n += step) ticks.push({ at: n, label: name(1, n) });
     return ticks;
   }
 
-  function fewDecades(low, high) {
+  function fewDecades(low, high, name) {
     const ticks = [];
     for (let n = Math.floor(low); n <= high; ++n)
       for (const digit of [1, 2, 5]) {
         const at = n + Math.log10(digit);
-        if (at >= low && at <= high) ticks.push({ at, label: digit === 1 ? power(n) : `${digit}·${power(n)}` });
+        if (at >= low && at <= high) ticks.push({ at, label: name(digit, n) });
       }
     return ticks;
   }
@@ -67,7 +71,8 @@ const Plot = (() => {
   function ticksOf(axis, range, length, spacing) {
     if (axis.categories) return axis.categories.map((label, at) => ({ at, label }));
     const most = Math.max(2, Math.floor(length / spacing));
-    const ticks = (axis.log ? decades : linearTicks)(range.low, range.high, most);
+    const ticks = axis.log ? decades(range.low, range.high, most, axis.plain ? plain : scientific)
+      : linearTicks(range.low, range.high, most);
     return ticks.filter(t => t.at >= range.low && t.at <= range.high);
   }
 
@@ -128,7 +133,8 @@ const Plot = (() => {
     }
     for (const t of ticks.y) {
       make('path', { d: `M${area.left},${at.y(t.at)}H${area.right}`, style: 'stroke:var(--grid)' }, svg);
-      if (spec.y.categories && narrow) label(area.left, at.y(t.at) - 9, t.label, 'start');
+      if (spec.y.categories && narrow) label(area.left, at.y(t.at) - 9, t.label, 'start',
+        { 'paint-order': 'stroke', stroke: 'var(--paper)', 'stroke-width': 5 });
       else label(area.left - tick - 3, at.y(t.at) + 4.5, t.label, 'end');
     }
     make('path', { d: `M${area.left},${area.top}V${area.bottom}H${area.right}`,
