@@ -7,6 +7,7 @@
 #include <diracstep/validation/report.hpp>
 #include <diracstep/validation/work_precision.hpp>
 #include <functional>
+#include <utility>
 
 namespace diracstep {
 
@@ -54,22 +55,45 @@ class ErrorAlongside {
 
   std::string against() const { return closed_form_ ? "the closed form" : "the same run with half the step"; }
 
-  /// NaN from where the second run has failed.
-  double at(const Sample& sample, long steps) {
+  /// Takes the next point; the error is NaN from where the second run has failed.
+  void take(const Sample& sample, long steps) {
+    double q = StudyRow::none, p = StudyRow::none;
     if (closed_form_) {
-      const auto truth = known_point(entry_, sample.time);
-      return truth ? truth->distance(sample) : StudyRow::none;
+      if (const auto truth = known_point(entry_, sample.time)) {
+        q = distance(sample.q, truth->q);
+        p = distance(sample.p, truth->p);
+      }
+    } else if (follow(steps)) {
+      q = distance(sample.q, other_.q);
+      p = distance(sample.p, other_.p);
     }
-    for (; taken_ < 2 * steps && going_; ++taken_) going_ = finer_.step().ok();
-    if (!going_ || !finer_.sample(momentum_, other_).ok()) return StudyRow::none;
-    return std::max(relative_error(sample.q, other_.q), relative_error(sample.p, other_.p));
+    errors_.emplace_back(q, p);
+    largest_q_ = std::max(largest_q_, sample.q.lpNorm<Eigen::Infinity>());
+    largest_p_ = std::max(largest_p_, sample.p.lpNorm<Eigen::Infinity>());
+  }
+
+  /// Over the largest q and p of the run, since those of a point may vanish.
+  std::vector<double> relative() const {
+    std::vector<double> all;
+    const auto over = [](double error, double size) { return size > 0.0 ? error / size : error; };
+    for (const auto& [q, p] : errors_) all.push_back(std::max(over(q, largest_q_), over(p, largest_p_)));
+    return all;
   }
 
  private:
+  static double distance(const Vector& a, const Vector& b) { return (a - b).lpNorm<Eigen::Infinity>(); }
+
+  bool follow(long steps) {
+    for (; taken_ < 2 * steps && going_; ++taken_) going_ = finer_.step().ok();
+    return going_ && finer_.sample(momentum_, other_).ok();
+  }
+
   const CatalogueScene& entry_;
   Momentum momentum_;
   Integrator finer_;
   Sample other_;
+  std::vector<std::pair<double, double>> errors_;  ///< of q and p
+  double largest_q_ = 0.0, largest_p_ = 0.0;
   long taken_ = 0;
   bool closed_form_ = false, going_ = true;
 };
@@ -84,9 +108,8 @@ class Recorder {
     energy_ = scene.energy(start.time, start.q, start.v);
   }
 
-  void take(const Sample& sample, double error) {
+  void take(const Sample& sample) {
     history_.time.push_back(sample.time);
-    history_.error.push_back(error);
     history_.energy.push_back(change(sample.energy, energy_));
     if (scene_.rows() > 0) history_.constraint.push_back(largest_violation(scene_, sample));
     for (std::size_t i = 0; i < entry_.invariants.size(); ++i) {
@@ -155,9 +178,11 @@ History record_history(const CatalogueScene& entry, const Registry& registry, co
   Recorder recorder(entry, integrator.scene(), history);
   const long every = std::max(1L, grid.steps / points);
   const RunReport report = run(integrator, grid.steps, study.momentum, every, [&](const Sample& sample) {
-    recorder.take(sample, error.at(sample, std::lround((sample.time - study.t_start) / grid.step)));
+    recorder.take(sample);
+    error.take(sample, std::lround((sample.time - study.t_start) / grid.step));
     return true;
   });
+  history.error = error.relative();
   if (!report.ok()) history.failure = report.last.failure;
   return history;
 }

@@ -13,8 +13,8 @@ struct History {
   int order = 0;
   double step = 0.0;
   std::vector<double> time;
-  std::vector<double> error;       ///< relative error of q and p, the larger one; see `error_against`
-  std::string error_against;       ///< the closed form, or "the same run with half the step"
+  std::vector<double> error;  ///< maximum norm of the error of q over that of the largest q, or the same of p
+  std::string error_against;  ///< the closed form, or "the same run with half the step"
   std::vector<double> energy;      ///< |E(t) − E(0)| / max(|E(0)|, 1)
   std::vector<double> constraint;  ///< largest |φ(q)| and |A(q)v + b|; empty for a scene without rows
   struct Change {

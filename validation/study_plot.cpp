@@ -124,7 +124,7 @@ std::string run_title(const History& history, const std::string& scene) {
 }
 
 std::string history_script(const History& history, const std::string& title, const std::string& time) {
-  std::vector<Curve> curves{logarithmic("energy", 0, history, history.energy)};
+  std::vector<Curve> curves{logarithmic("total energy", 0, history, history.energy)};
   if (!history.constraint.empty()) curves.push_back(logarithmic("rows", 1, history, history.constraint));
   for (const History::Change& invariant : history.invariants)
     curves.push_back(logarithmic(invariant.name, curves.size(), history, invariant.values));
@@ -138,7 +138,7 @@ std::string error_script(const History& history, const std::string& title, const
     if (history.time[i] > history.time.front() && history.error[i] > 0.0)
       error.add(history.time[i] - history.time.front(), history.error[i]);
   if (error.data.empty()) return {};
-  return std::string(style) + axes(title, time, "relative error of q and p [1]") +
+  return std::string(style) + axes(title, time, "error over largest q, p [1]") +
          fmt::format("set key off\n{}", plotted({error}));
 }
 

@@ -43,11 +43,11 @@ const pictures = {
       const order = study.measured_order.find(m => m.method === s.method && m.order === s.order);
       return { ...s, label: order && order.slope !== null ? `${s.label}: ${order.slope.toFixed(2)}` : s.label };
     }) }),
-  error: (study, history) => ({ x: { label: timeLabel(history), log: true }, y: { label: 'relative error of q and p [1]', log: true },
+  error: (study, history) => ({ x: { label: timeLabel(history), log: true }, y: { label: 'error over largest q, p [1]', log: true },
     legend: false, series: [overTime({ ...history, time: history.time.map(t => Math.abs(t - study.t_start)) }, 'error', history.error, 0)] }),
   history: (study, history) => ({ x: { label: timeLabel(history) },
     y: { label: 'relative change, or violation [1]', log: true },
-    series: [['energy', history.energy], ['rows', history.constraint], ...history.invariants.map(i => [i.name, i.values])]
+    series: [['total energy', history.energy], ['rows', history.constraint], ...history.invariants.map(i => [i.name, i.values])]
       .filter(([, values]) => values.length)
       .map(([label, values], k) => overTime(history, label, values.map(v => v === null ? v : Math.max(v, 1e-18)), k)) }),
 };

@@ -64,7 +64,8 @@ const Plot = (() => {
     const place = axis.log ? Math.log10 : value => value;
     const all = values.concat(axis.include || []).filter(v => Number.isFinite(v) && (!axis.log || v > 0)).map(place);
     const [low, high] = all.length ? extent(all) : [0, 1];
-    const margin = axis.categories ? 0.6 : high > low ? 0.04 * (high - low) : axis.log ? 0.5 : Math.abs(low) / 2 || 0.5;
+    const margin = axis.log ? Math.max(0.04 * (high - low), (1.1 - (high - low)) / 2)  // a tick at least
+      : high > low ? 0.04 * (high - low) : Math.abs(low) / 2 || 0.5;
     return { place, low: low - margin, high: high + margin };
   }
 
