@@ -21,10 +21,14 @@ namespace diracstep {
 
 namespace {
 
-int unknowns(const Scene& scene) {
+bool stabilised(const ConstraintRows& rows, Posing posing) {
+  return rows.holonomic() && posing != Posing::velocity;
+}
+
+int unknowns(const Scene& scene, Posing posing) {
   int count = 3 * scene.dimension() + scene.rows();
   for (const auto& block : scene.constraints)
-    if (block->holonomic()) count += block->rows();
+    if (stabilised(*block, posing)) count += block->rows();
   return count;
 }
 
@@ -37,11 +41,12 @@ SparsityPattern diagonal(int n) {
 
 }  // namespace
 
-ImplicitLagrangianDae::ImplicitLagrangianDae(const Scene& scene, bool dense)
+ImplicitLagrangianDae::ImplicitLagrangianDae(const Scene& scene, bool dense, Posing posing)
     : lagrangian_(scene.lagrangian),
       force_(scene.force),
+      posing_(posing),
       n_(scene.dimension()),
-      size_(unknowns(scene)),
+      size_(unknowns(scene, posing)),
       layout_(size_, size_),
       diagonal_(diagonal(n_)),
       ones_(Vector::Ones(n_)),
@@ -54,9 +59,9 @@ ImplicitLagrangianDae::ImplicitLagrangianDae(const Scene& scene, bool dense)
   for (const auto& rows : scene.constraints) {
     const Vector a = Vector::Zero(rows->pattern().nonzeros()), b = Vector::Zero(rows->rows());
     const Vector curvature = Vector::Zero(rows->curvature_pattern().nonzeros());
-    rows_.push_back({rows, force, drift, a, b, a, curvature, curvature});
+    rows_.push_back({rows, stabilised(*rows, posing), force, drift, a, b, a, curvature, curvature});
     force += rows->rows();
-    if (rows->holonomic()) drift += rows->rows();
+    if (rows_.back().stabilised) drift += rows->rows();
   }
   for_each_block(1.0, [this](const SparsityPattern& block, int row, int column, bool transposed, auto&&...) {
     layout_.add(block, row, column, transposed);
@@ -69,6 +74,7 @@ template <class Visit>
 void ImplicitLagrangianDae::for_each_block(double cj, Visit visit) {
   const SparsityPattern& hessian = lagrangian_->pattern();
   const int q = 0, v = n_, p = 2 * n_;  // columns; the rows of q̇, ṗ and p begin at the same places
+  const double of_multiplier = posing_ == Posing::index_2 ? 1.0 : cj;
   visit(diagonal_, q, q, false, ones_, cj);
   visit(diagonal_, q, v, false, ones_, -1.0);
   visit(hessian, v, q, false, lqq_, -1.0);
@@ -83,12 +89,12 @@ void ImplicitLagrangianDae::for_each_block(double cj, Visit visit) {
   }
   for (const Rows& r : rows_) {
     const SparsityPattern &rows = r.rows->pattern(), &curvature = r.rows->curvature_pattern();
-    visit(rows, v, r.force, true, r.a, -cj);
+    visit(rows, v, r.force, true, r.a, -of_multiplier);
     visit(curvature, v, q, false, r.force_derivative, -1.0);
     visit(rows, r.force, q, false, r.derivative, 1.0);
     visit(rows, r.force, v, false, r.a, 1.0);
-    if (!r.rows->holonomic()) continue;
-    visit(rows, q, r.drift, true, r.a, -cj);
+    if (!r.stabilised) continue;
+    visit(rows, q, r.drift, true, r.a, -of_multiplier);
     visit(curvature, q, q, false, r.drift_derivative, -1.0);
     visit(rows, r.drift, q, false, r.a, 1.0);
   }
@@ -97,6 +103,7 @@ void ImplicitLagrangianDae::for_each_block(double cj, Visit visit) {
 void ImplicitLagrangianDae::residual(double t, ConstVectorRef y, ConstVectorRef rate, VectorRef f) {
   const Eigen::Index n = n_;
   const auto q = y.head(n), v = y.segment(n, n), p = y.segment(2 * n, n);
+  const ConstVectorRef& multipliers = posing_ == Posing::index_2 ? y : rate;
   lagrangian_->gradient(t, q, v, lq_, lv_);
   if (force_) force_->value(t, q, v, f_);
   f.head(n) = rate.head(n) - v;
@@ -105,11 +112,11 @@ void ImplicitLagrangianDae::residual(double t, ConstVectorRef y, ConstVectorRef 
   for (Rows& r : rows_) {
     const SparsityPattern& pattern = r.rows->pattern();
     r.rows->coefficients(t, q, r.a, r.b);
-    pattern.transposed_multiply_add(r.a.data(), rate.data() + r.force, f.data() + n_, -1.0);
+    pattern.transposed_multiply_add(r.a.data(), multipliers.data() + r.force, f.data() + n_, -1.0);
     f.segment(r.force, r.rows->rows()) = r.b;
     pattern.multiply_add(r.a.data(), v.data(), f.data() + r.force);
-    if (!r.rows->holonomic()) continue;
-    pattern.transposed_multiply_add(r.a.data(), rate.data() + r.drift, f.data(), -1.0);
+    if (!r.stabilised) continue;
+    pattern.transposed_multiply_add(r.a.data(), multipliers.data() + r.drift, f.data(), -1.0);
     r.rows->position(t, q, f.segment(r.drift, r.rows->rows()));
   }
 }
@@ -117,15 +124,16 @@ void ImplicitLagrangianDae::residual(double t, ConstVectorRef y, ConstVectorRef 
 void ImplicitLagrangianDae::jacobian(double t, double cj, ConstVectorRef y, ConstVectorRef rate,
                                      VectorRef values) {
   const auto q = y.head(n_), v = y.segment(n_, n_);
+  const ConstVectorRef& multipliers = posing_ == Posing::index_2 ? y : rate;
   lagrangian_->hessian(t, q, v, lqq_, lqv_, lvv_);
   if (force_) force_->derivatives(t, q, v, fq_, fv_);
   for (Rows& r : rows_) {
     const int rows = r.rows->rows();
     r.rows->coefficients(t, q, r.a, r.b);
     r.rows->derivative(t, q, v, 1.0, r.derivative);
-    r.rows->annihilator_derivative(t, q, rate.segment(r.force, rows), r.force_derivative);
-    if (r.rows->holonomic())
-      r.rows->annihilator_derivative(t, q, rate.segment(r.drift, rows), r.drift_derivative);
+    r.rows->annihilator_derivative(t, q, multipliers.segment(r.force, rows), r.force_derivative);
+    if (r.stabilised)
+      r.rows->annihilator_derivative(t, q, multipliers.segment(r.drift, rows), r.drift_derivative);
   }
   values.setZero();
   int number = 0;
@@ -158,8 +166,8 @@ class IdaIntegration {
       : scene_(scene),
         options_(options),
         atol_(options.atol > 0.0 ? options.atol : options.rtol),
-        dae_(scene, unknowns(scene) <= dense_limit),
-        acceleration_problem_(scene, unknowns(scene) <= dense_limit),
+        dae_(scene, unknowns(scene, options.posing) <= dense_limit, options.posing),
+        acceleration_problem_(scene, unknowns(scene, options.posing) <= dense_limit),
         acceleration_solver_(kinsol()(acceleration_problem_)),
         acceleration_(Vector::Zero(acceleration_problem_.size())),
         linear_solver_(detail::make_linear_solver(dae_.pattern())),
@@ -198,7 +206,8 @@ class IdaIntegration {
     return acceleration_solver_->solve(acceleration_);
   }
 
-  /// y and ẏ at the start: p = ∂L/∂v, Λ = M = 0, Ṁ = 0, and the rest from the acceleration system.
+  /// y and ẏ at the start: p = ∂L/∂v, Λ = M = 0, Ṁ = 0, of index 2 M = 0, and the rest from the acceleration
+  /// system.
   std::string make_start() {
     const Start& start = scene_.start;
     const Eigen::Index n = start.q.size(), m = scene_.rows();
@@ -211,7 +220,7 @@ class IdaIntegration {
     if (!report.ok()) return std::string("start: acceleration and forces: ") + describe(report.status);
     rate.head(n) = start.v;
     rate.segment(n, n) = acceleration_.head(n);
-    rate.segment(3 * n, m) = acceleration_.tail(m);
+    (options_.posing == Posing::index_2 ? y : rate).segment(3 * n, m) = acceleration_.tail(m);
     Vector f(dae_.size());  // with p = 0 and ṗ = 0 the residual is what they must be
     dae_.residual(start.time, y, rate, f);
     rate.segment(2 * n, n) = -f.segment(n, n);
@@ -375,6 +384,15 @@ class IdaIntegration {
 };
 
 }  // namespace
+
+std::vector<Posing> posings_of(const Scene& given) {
+  const auto scene = with_hidden_rows(completed(std::make_shared<const Scene>(given)));
+  if (scene->rows() == 0) return {Posing::rates};
+  const bool holonomic =
+      std::ranges::any_of(scene->constraints, [](const auto& rows) { return rows->holonomic(); });
+  if (!holonomic) return {Posing::rates, Posing::index_2};
+  return {all_posings.begin(), all_posings.end()};
+}
 
 ReferenceRun integrate_with_ida(const Scene& given, double t_end, const ReferenceOptions& options) {
   const auto scene = with_hidden_rows(completed(std::make_shared<const Scene>(given)));

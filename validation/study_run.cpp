@@ -179,15 +179,16 @@ StudyRow run_variable(AdaptiveIntegrator& integrator, double t_end, Momentum mom
   return row;
 }
 
-StudyRow run_yardstick(const std::string& method, const Scene& scene, double t_end, double rtol, int repeats,
-                       const Truth& truth, Sample& end) {
+StudyRow run_yardstick(const std::string& method, const Scene& scene, double t_end,
+                       const ReferenceOptions& options, int repeats, const Truth& truth, Sample& end) {
   const auto integrate = method == erk_method ? integrate_explicitly : integrate_with_ida;
   ReferenceRun run;
   const auto once = [&] {
-    run = integrate(scene, t_end, {.rtol = rtol});
+    run = integrate(scene, t_end, options);
     return run.ok() ? run.cpu_seconds : -1.0;
   };
-  StudyRow row{.method = method, .rtol = rtol};
+  StudyRow row{.method = method, .rtol = options.rtol};
+  if (method == ida_method) row.posing = name(options.posing);
   row.cpu_seconds = repeat(once, repeats);
   row.steps = run.steps;
   row.newton_iterations = run.newton_iterations;

@@ -32,10 +32,13 @@ const std::vector<std::string> fair_selection{"kepler_e06",         "stiff_sprin
                                               "contact_oscillator", "nonholonomic_particle_free",
                                               "lotka_volterra_2d",  "toda_200"};
 
+constexpr const char* fastest = "fastest";  // of the posings of IDA on a scene
+
 struct Options {
   std::vector<std::string> scenes;
   std::optional<std::string> methods;
   std::optional<std::string> orders, steps, rtols;
+  std::string ida_posing = fastest;
   bool without_ida = false, without_erk = false;
   bool adaptive = false;
   int repeat = 5;
@@ -115,6 +118,16 @@ class OutputDirectory {
   std::filesystem::path path_;
 };
 
+std::optional<Posing> posing(const std::string& given) {
+  if (given == fastest) return {};
+  std::string allowed = fastest;
+  for (const Posing known : all_posings) {
+    if (given == name(known)) return known;
+    allowed += std::string(", ") + name(known);
+  }
+  throw Misuse(fmt::format("--ida-posing '{}' is not known; allowed are {}", given, allowed));
+}
+
 StudyOptions study_options(const Options& options) {
   StudyOptions study;
   if (options.methods)
@@ -126,6 +139,7 @@ StudyOptions study_options(const Options& options) {
   if (options.rtols) study.rtols = numbers("--rtols", *options.rtols);
   if (options.without_ida) std::erase(study.yardsticks, ida_method);
   if (options.without_erk) std::erase(study.yardsticks, erk_method);
+  study.ida_posing = posing(options.ida_posing);
   study.adaptive = options.adaptive;
   study.repeats = options.repeat;
   study.run_budget = options.budget;
@@ -270,6 +284,10 @@ void add_study(CLI::App& app, Session& session) {
   verb->add_option("--rtols", options->rtols, "Tolerances of the yardsticks; 1e-4,1e-5,…,1e-14 without it");
   verb->add_flag("--adaptive", options->adaptive,
                  "Also reversible variable steps, with a ladder of eps (in the column of the steps)");
+  verb->add_option("--ida-posing", options->ida_posing,
+                   "How IDA is given the rows: rates, index-2 or velocity; see ida_reference.hpp.\n"
+                   "fastest: on each scene the fastest one of those that complete most often")
+      ->capture_default_str();
   verb->add_flag("--without-ida", options->without_ida, "No runs of IDA");
   verb->add_flag("--without-erk", options->without_erk, "No runs of the explicit Runge–Kutta method");
   verb->add_option("--repeat", options->repeat, "Timed runs of each row")->capture_default_str();

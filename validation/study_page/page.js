@@ -21,7 +21,7 @@ const rowsOf = (study, style) => study.rows.filter(row => row.status === 'ok' &&
   (row.order ?? style.order) === style.order && errorOf(row) <= largestDrawn);
 
 function rowTip(row, style) {
-  const pace = row.step === undefined ? `rtol ${row.rtol}` : `step ${number(row.step, 4)}`;
+  const pace = row.step === undefined ? `${row.posing ? `posing ${row.posing}, ` : ''}rtol ${row.rtol}` : `step ${number(row.step, 4)}`;
   return () => [style.label, `${pace}, ${row.steps} steps`, `error of q ${exponent(row.error_q)}, of p ${exponent(row.error_p)}`,
     `CPU ${seconds(row.cpu_seconds.median)} (${seconds(row.cpu_seconds.min)} to ${seconds(row.cpu_seconds.max)})`,
     `rows violated by ${exponent(row.constraint)}`].join('\n');
@@ -98,7 +98,7 @@ function savePng(svg, name) {
 function csvText(studies) {
   const field = value => value === null || value === undefined ? '' : /[",\n]/.test(value) ? `"${value.replace(/"/g, '""')}"` : value;
   const keys = ['method', 'order', 'momentum', 'step', 'rtol', 'status', 'error_q', 'error_p', 'self_error', 'constraint',
-    'energy_error'], counts = ['steps', 'newton_iterations', 'residual_evaluations', 'jacobian_evaluations'];
+    'energy_error'], counts = ['steps', 'newton_iterations', 'residual_evaluations', 'jacobian_evaluations', 'posing'];
   const times = ['median', 'min', 'max', 'repeats'];
   const lines = studies.flatMap(study => study.rows.map(row => [study.scene, ...keys.map(key => row[key]),
     ...times.map(key => row.cpu_seconds[key]), ...counts.map(key => row[key])].map(field).join(',')));
