@@ -206,19 +206,26 @@ class StudyInProgress {
     }
   }
 
-  Posing ida_posing(const std::vector<double>& rtols, double part) const {
-    if (options_.ida_posing) return *options_.ida_posing;
-    if (!truth_.missing.empty()) return Posing::rates;
-    return fastest_posing(*entry_.scene, study_.t_end, rtols, truth_, options_.run_budget,
-                          [&] { look(part, "the posing of IDA"); });
+  std::vector<Posing> posings(const std::string& yardstick, const std::vector<double>& rtols,
+                              double part) const {
+    if (yardstick != ida_method) return {Posing::rates};  // it has none
+    if (options_.ida_posing) return {*options_.ida_posing};
+    if (!truth_.missing.empty()) return {Posing::rates};
+    return best_posings(*entry_.scene, study_.t_end, rtols, truth_, options_.run_budget,
+                        [&] { look(part, "the posings of IDA"); });
   }
 
   void run_yardstick_ladder(const std::string& yardstick, double part) {
     std::vector<double> rtols = options_.rtols;
     std::ranges::sort(rtols, std::greater{});
+    for (const Posing posing : posings(yardstick, rtols, part))
+      run_yardstick_ladder(yardstick, posing, rtols, part);
+  }
+
+  void run_yardstick_ladder(const std::string& yardstick, Posing posing, const std::vector<double>& rtols,
+                            double part) {
     const std::size_t first = study_.rows.size();
     std::vector<Sample> ends(rtols.size());
-    const Posing posing = yardstick == ida_method ? ida_posing(rtols, part) : Posing::rates;
     const auto run = [&](double rtol, int repeats, Sample& end) {
       return run_yardstick(yardstick, *entry_.scene, study_.t_end, {.rtol = rtol, .posing = posing}, repeats,
                            truth_, end);

@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <diracstep/validation/ida_reference.hpp>
 #include <diracstep/validation/posing_choice.hpp>
 #include <diracstep/validation/work_precision.hpp>
@@ -10,7 +9,8 @@ namespace diracstep {
 
 namespace {
 
-constexpr std::array<double, 3> judged_errors{1e-3, 1e-6, 1e-9};
+constexpr std::array<double, 3> judged_errors{1e-6, 1e-3, 1e-9};
+constexpr double nearly = 1.1;
 
 struct Candidate {
   Posing posing;
@@ -29,33 +29,39 @@ Candidate tried(Posing posing, const Scene& scene, double t_end, const std::vect
   return candidate;
 }
 
-/// The mean logarithm of the time at those errors that all reach; infinite where there are none.
-double mean_time(const Candidate& candidate, const std::vector<Candidate>& all) {
-  double sum = 0.0;
-  int count = 0;
-  for (const double error : judged_errors) {
-    if (!std::ranges::all_of(all,
-                             [&](const Candidate& c) { return cpu_seconds_at(c.points, error).has_value(); }))
-      continue;
-    sum += std::log(*cpu_seconds_at(candidate.points, error));
-    ++count;
+/// The fastest at an error, or one of the chosen that is nearly as fast; nothing where none reaches it.
+const Candidate* fastest_at(double error, const std::vector<Candidate>& all,
+                            const std::vector<Posing>& chosen) {
+  const Candidate* best = nullptr;
+  double least = std::numeric_limits<double>::infinity();
+  for (const Candidate& candidate : all) {
+    const auto seconds = cpu_seconds_at(candidate.points, error);
+    if (!seconds) continue;
+    const bool known = std::ranges::find(chosen, candidate.posing) != chosen.end();
+    if (const double judged = known ? *seconds / nearly : *seconds; judged < least) {
+      best = &candidate;
+      least = judged;
+    }
   }
-  return count > 0 ? sum / count : std::numeric_limits<double>::infinity();
+  return best;
 }
 
 }  // namespace
 
-Posing fastest_posing(const Scene& scene, double t_end, const std::vector<double>& rtols, const Truth& truth,
-                      double budget, const Look& look) {
+std::vector<Posing> best_posings(const Scene& scene, double t_end, const std::vector<double>& rtols,
+                                 const Truth& truth, double budget, const Look& look) {
   const std::vector<Posing> posings = posings_of(scene);
-  if (posings.size() == 1 || rtols.empty()) return Posing::rates;
+  if (posings.size() == 1 || rtols.empty()) return {Posing::rates};
   std::vector<Candidate> all;
   for (const Posing posing : posings) all.push_back(tried(posing, scene, t_end, rtols, truth, budget, look));
-  std::size_t most = 0;
-  for (const Candidate& candidate : all) most = std::max(most, candidate.points.size());
-  std::erase_if(all, [&](const Candidate& candidate) { return candidate.points.size() < most; });
-  // the first of equals: `rates`, if it is still among them
-  return std::ranges::min_element(all, {}, [&](const Candidate& c) { return mean_time(c, all); })->posing;
+  std::vector<Posing> chosen;
+  for (const double error : judged_errors) {
+    const Candidate* const best = fastest_at(error, all, chosen);
+    if (best != nullptr && std::ranges::find(chosen, best->posing) == chosen.end())
+      chosen.push_back(best->posing);
+  }
+  if (!chosen.empty()) return chosen;
+  return {std::ranges::max_element(all, {}, [](const Candidate& c) { return c.points.size(); })->posing};
 }
 
 }  // namespace diracstep

@@ -10,6 +10,8 @@ const char* name(Posing posing) {
   switch (posing) {
     case Posing::rates:
       return "rates";
+    case Posing::rates_loose:
+      return "rates-loose";
     case Posing::index_2:
       return "index-2";
     case Posing::velocity:

@@ -9,13 +9,15 @@ namespace diracstep {
 /// How IDA is given the rows of a scene: as equations on (q, v, p) and the multipliers Λ of all rows, M of
 /// holonomic ones.
 enum class Posing {
-  rates,     ///< multipliers as derivatives, φ = 0 beside A v + b = 0 (Gear, Gupta, Leimkuhler): index 1
-  index_2,   ///< the same with the multipliers themselves: stabilised index 2
-  velocity,  ///< multipliers as derivatives, A v + b = 0 alone: index 1, φ drifts
+  rates,        ///< multipliers as derivatives, φ = 0 beside A v + b = 0 (Gear, Gupta, Leimkuhler): index 1
+  rates_loose,  ///< the same, no tolerance on the multipliers
+  index_2,      ///< the multipliers themselves, without a tolerance: stabilised index 2
+  velocity,     ///< multipliers as derivatives, A v + b = 0 alone: index 1, φ drifts
 };
-inline constexpr std::array<Posing, 3> all_posings{Posing::rates, Posing::index_2, Posing::velocity};
+inline constexpr std::array<Posing, 4> all_posings{Posing::rates, Posing::rates_loose, Posing::index_2,
+                                                   Posing::velocity};
 
-/// "rates", "index-2" or "velocity".
+/// "rates", "rates-loose", "index-2" or "velocity".
 const char* name(Posing posing);
 
 struct ReferenceOptions {

@@ -53,7 +53,10 @@ Json motion_json(const History& history) {
 Json history_json(const PageEntry& entry) {
   const History& history = entry.history;
   if (history.time.empty()) return nullptr;
-  Json json{{"time_unit", entry.time_unit},
+  Json json{{"method", history.method},
+            {"order", history.order},
+            {"step", history.step},
+            {"time_unit", entry.time_unit},
             {"time", rounded(history.time)},
             {"error", rounded(history.error)},
             {"energy", rounded(history.energy)},

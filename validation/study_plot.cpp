@@ -69,10 +69,11 @@ std::string plotted(std::vector<Curve> curves) {
 
 using Abscissa = std::function<double(const StudyRow&)>;
 
-void add_rows(Curve& curve, const Study& study, const std::string& method, int order, const Abscissa& x) {
+using Choice = std::function<bool(const StudyRow&)>;
+
+void add_rows(Curve& curve, const Study& study, const Choice& chosen, const Abscissa& x) {
   for (const StudyRow& row : study.rows)
-    if (row.ok() && row.method == method && row.order == order && row.error() > 0.0 &&
-        row.error() <= largest_drawn)
+    if (row.ok() && chosen(row) && row.error() > 0.0 && row.error() <= largest_drawn)
       curve.add(x(row), row.error());
 }
 
@@ -84,18 +85,32 @@ std::vector<Curve> curves_of(const Study& study, const std::vector<SeriesStyle>&
                                 "pointsize 0.85 linecolor '{}'",
                                 dashes[s.colour / colours.size() % dashes.size()],
                                 markers[s.marker % markers.size()], colours[s.colour % colours.size()])});
-    add_rows(all.back(), study, s.method, s.order, x);
+    add_rows(
+        all.back(), study,
+        [&](const StudyRow& row) { return row.method == s.method && row.order == s.order; }, x);
   }
   return all;
 }
 
+/// A curve of IDA for each posing it runs in.
 void add_yardsticks(std::vector<Curve>& curves, const Study& study, const Abscissa& x) {
-  curves.push_back({"IDA", "with linespoints linewidth 2 pointtype 4 pointsize 0.95 linecolor '#000000'"});
-  add_rows(curves.back(), study, ida_method, 0, x);
+  std::vector<std::string> posings;
+  for (const StudyRow& row : study.rows)
+    if (row.method == ida_method && std::ranges::find(posings, row.posing) == posings.end())
+      posings.push_back(row.posing);
+  for (std::size_t i = 0; i < posings.size(); ++i) {
+    curves.push_back({"IDA, " + posings[i],
+                      fmt::format("with linespoints linewidth 2 dashtype {} pointtype 4 pointsize 0.95 "
+                                  "linecolor '#000000'",
+                                  dashes[i % dashes.size()])});
+    add_rows(
+        curves.back(), study, [&](const StudyRow& row) { return row.posing == posings[i]; }, x);
+  }
   curves.push_back({"explicit RK 8",
                     "with linespoints linewidth 2 dashtype (6,4) pointtype 8 pointsize 0.95 "
                     "linecolor '#707070'"});
-  add_rows(curves.back(), study, erk_method, 0, x);
+  add_rows(
+      curves.back(), study, [](const StudyRow& row) { return row.method == erk_method; }, x);
 }
 
 std::vector<double> component(const std::vector<Vector>& points, int i) {
@@ -132,8 +147,10 @@ std::string history_script(const History& history, const std::string& title, con
          axes(title, time, "relative change, or violation [1]") + plotted(curves);
 }
 
-std::string error_script(const History& history, const std::string& title, const std::string& time) {
-  Curve error{"error", line_look(0)};
+std::string error_script(const History& history, const std::string& title, const std::string& time,
+                         const std::vector<SeriesStyle>& styles) {
+  const auto style_of = std::ranges::find(styles, history.method, &SeriesStyle::method);
+  Curve error{"error", line_look(style_of == styles.end() ? 0 : style_of->colour)};
   for (std::size_t i = 0; i < history.time.size(); ++i)
     if (history.time[i] > history.time.front() && history.error[i] > 0.0)
       error.add(history.time[i] - history.time.front(), history.error[i]);
@@ -230,10 +247,10 @@ std::string draw_work_precision(const Study& study, const std::vector<SeriesStyl
 }
 
 std::string draw_history(const History& history, const std::string& scene, const std::string& time_unit,
-                         const std::filesystem::path& directory) {
+                         const std::vector<SeriesStyle>& styles, const std::filesystem::path& directory) {
   const std::string stem = (directory / file_name(scene)).string(), title = run_title(history, scene);
   const std::string time = in_unit("time", time_unit);
-  const std::string error = error_script(history, title, time);
+  const std::string error = error_script(history, title, time, styles);
   return first_failure({render(history_script(history, title, time), stem + "-history", 760, 420),
                         error.empty() ? "" : render(error, stem + "-error", 760, 420),
                         render(motion_script(history, time), stem + "-motion", 620, 420)});
@@ -265,7 +282,7 @@ std::string draw_summary(const std::vector<Study>& studies, const std::filesyste
           erk.empty() ? "NaN NaN\n" : erk) +
       "plot $ida with points pointtype 5 pointsize 1.2 linecolor '#000000' title 'IDA', $erk with points "
       "pointtype 9 "
-      "pointsize 1.3 linecolor '#D55E00' title 'explicit RK 8'\n";
+      "pointsize 1.3 linecolor '#707070' title 'explicit RK 8'\n";
   return render(script, (directory / "summary").string(), 860, std::max<std::size_t>(260, 120 + 34 * place));
 }
 

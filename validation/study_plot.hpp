@@ -19,7 +19,7 @@ std::string draw_work_precision(const Study& study, const std::vector<SeriesStyl
 /// SCENE-history: what should stay over time, that is the change of energy and invariants and the violation
 /// of the rows, on a logarithmic axis; SCENE-error: the error over time, both logarithmic; SCENE-motion.
 std::string draw_history(const History& history, const std::string& scene, const std::string& time_unit,
-                         const std::filesystem::path& directory);
+                         const std::vector<SeriesStyle>& styles, const std::filesystem::path& directory);
 
 /// summary: IDA's and the explicit method's time over ours at the error 1e-6, for every study that has them.
 std::string draw_summary(const std::vector<Study>& studies, const std::filesystem::path& directory);

@@ -73,6 +73,10 @@ document.querySelectorAll('figure[data-plot=work] .key, figure[data-plot=orders]
   const method = key.textContent.split(',')[0], colour = getComputedStyle(key.querySelector('path')).stroke;
   ofMethod.set(method, (ofMethod.get(method) || new Set()).add(colour));
 });
+document.querySelectorAll('figure[data-plot=error]').forEach(figure => {
+  const method = data.histories[figure.dataset.scene].method, curve = figure.querySelector('.series path');
+  ofMethod.get(method).add(getComputedStyle(curve).stroke);
+});
 const several = [...ofMethod].filter(([, colours]) => colours.size > 1).map(([method]) => `${method} has several colours`);
 const all = [...ofMethod].map(([, colours]) => [...colours][0]);
 return all.length < 3 ? ['too few methods'] : new Set(all).size < all.length ? ['two methods of one colour'] : several;"""

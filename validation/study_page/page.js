@@ -18,7 +18,13 @@ const styles = data.styles.map(style => ({ ...style, colour: `var(--series-${sty
 
 const errorOf = row => row.error_q === null || row.error_p === null ? NaN : Math.max(row.error_q, row.error_p);
 const rowsOf = (study, style) => study.rows.filter(row => row.status === 'ok' && row.method === style.method &&
-  (row.order ?? style.order) === style.order && errorOf(row) <= largestDrawn);
+  row.order === style.order && row.posing === style.posing && errorOf(row) <= largestDrawn);
+
+// IDA has a curve for each posing it runs in.
+function yardsticks(study) {
+  const posings = [...new Set(study.rows.filter(row => row.method === 'ida').map(row => row.posing))];
+  return [...posings.map((posing, i) => ({ ...ida, posing, label: `IDA, ${posing}`, dash: ['', '9,5', '2,4'][i % 3] })), erk];
+}
 
 function rowTip(row, style) {
   const pace = row.step === undefined ? `${row.posing ? `posing ${row.posing}, ` : ''}rtol ${row.rtol}` : `step ${number(row.step, 4)}`;
@@ -35,7 +41,7 @@ const overTime = (history, label, values, k, extra = {}) => ({ label, colour: `v
 
 const pictures = {
   work: study => ({ x: { label: 'CPU time [s]', log: true }, y: { label: 'relative error of q and p at the end [1]', log: true },
-    series: series(study, [...styles, ida, erk], row => row.cpu_seconds.median) }),
+    series: series(study, [...styles, ...yardsticks(study)], row => row.cpu_seconds.median) }),
   orders: (study, history) => ({
     x: { label: history && history.time_unit ? `step [${history.time_unit}]` : "step [the scene's unit of time]", log: true },
     y: { label: 'relative error of q and p at the end [1]', log: true },
@@ -44,7 +50,8 @@ const pictures = {
       return { ...s, label: order && order.slope !== null ? `${s.label}: ${order.slope.toFixed(2)}` : s.label };
     }) }),
   error: (study, history) => ({ x: { label: timeLabel(history), log: true }, y: { label: 'error over largest q, p [1]', log: true },
-    legend: false, series: [overTime({ ...history, time: history.time.map(t => Math.abs(t - study.t_start)) }, 'error', history.error, 0)] }),
+    legend: false, series: [overTime({ ...history, time: history.time.map(t => Math.abs(t - study.t_start)) }, 'error', history.error, 0,
+      { colour: styles.find(s => s.method === history.method).colour })] }),
   history: (study, history) => ({ x: { label: timeLabel(history) },
     y: { label: 'relative change, or violation [1]', log: true },
     series: [['total energy', history.energy], ['rows', history.constraint], ...history.invariants.map(i => [i.name, i.values])]
@@ -56,12 +63,12 @@ let summaryError = 1e-6;
 function summarySpec() {
   const categories = data.studies.map(study => study.scene);
   const best = study => study.at_error.find(at => at.best && at.error === summaryError);
-  const points = (style, key) => ({ ...style, line: false, hollow: false, size: 5, points: data.studies.flatMap((study, i) => {
+  const points = (style, key) => ({ ...style, line: false, size: 5, points: data.studies.flatMap((study, i) => {
     const at = best(study), ratio = at && at[key];
     return ratio ? [{ x: ratio, y: i, tip: () => `${study.scene}\n${style.label} / ours: ${ratio.toFixed(2)}\n` +
       `ours: ${at.method}, order ${at.order}` }] : [];
   }) });
-  const series = [points(ida, 'ratio'), points({ ...erk, colour: 'var(--series-1)' }, 'erk_ratio')];
+  const series = [points(ida, 'ratio'), points(erk, 'erk_ratio')];
   const one = { label: '', colour: 'var(--ink)', width: 1.4, points: [-0.7, categories.length - 0.3].map(y => ({ x: 1, y })) };
   return { x: { label: 'time of the yardstick / time of ours [1]', log: true, plain: true, include: [0.5, 2] }, y: { categories },
     series: [one, ...series] };
