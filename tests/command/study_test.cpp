@@ -89,7 +89,7 @@ TEST_F(StudyCommand, PatternsAndClassesChooseScenes) {
 }
 
 TEST_F(StudyCommand, IdaTakesThePosingAskedForAndNamesItInTheRow) {
-  const std::string rest = " --orders 2 --steps 0.5 --without-erk --rtols 1e-6 --repeat 1 --end 1 --json";
+  const std::string rest = " --orders 2 --steps 0.02 --without-erk --rtols 1e-6 --repeat 1 --end 1 --json";
   for (const std::string posing : {"rates", "rates-loose", "index-2", "velocity"}) {
     const Outcome outcome = run("study pendulum_cartesian --ida-posing " + posing + rest);
     ASSERT_EQ(outcome.status, 0) << outcome.err;
