@@ -167,7 +167,7 @@ void compare(const std::string& name) {
   for (double rtol = 1e-4; rtol > 0.9e-14; rtol /= 10.0) {
     Sample end;
     const StudyRow result =
-        run_yardstick(ida_method, *completed(scene.scene), scene.t_end, rtol, 3, truth, end);
+        run_yardstick(ida_method, *completed(scene.scene), scene.t_end, {.rtol = rtol}, 3, truth, end);
     if (result.ok()) ida.push_back({result.error(), 0.0, result.cpu_seconds.min});
   }
   std::printf("| IDA | |%s\n", at_errors(ida, false).c_str());

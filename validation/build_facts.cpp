@@ -1,8 +1,11 @@
 #include <diracstep/version.h>
+#include <sys/utsname.h>
 
 #include <diracstep/solvers/sundials_build.hpp>
 #include <diracstep/validation/build_facts.hpp>
 #include <fstream>
+#include <string>
+#include <thread>
 
 namespace diracstep {
 
@@ -14,6 +17,13 @@ std::string processor() {
     if (line.rfind("model name", 0) == 0 && line.find(": ") != std::string::npos)
       return line.substr(line.find(": ") + 2);
   return "unknown";
+}
+
+std::string system() {
+  utsname names{};
+  if (uname(&names) != 0) return "unknown";
+  return std::string(names.sysname) + ' ' + names.release + ", " + names.machine + ", " +
+         std::to_string(std::thread::hardware_concurrency()) + " processors";
 }
 
 std::string compiler() {
@@ -32,7 +42,8 @@ std::vector<std::pair<std::string, std::string>> build_facts() {
   return {{"diracstep", DIRACSTEP_VERSION},
           {"sundials", sundials_build()},
           {"compiler", compiler()},
-          {"processor", processor()}};
+          {"processor", processor()},
+          {"system", system()}};
 }
 
 }  // namespace diracstep

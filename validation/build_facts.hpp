@@ -7,7 +7,7 @@
 namespace diracstep {
 
 /// What run times depend on: name and value of the library's version, the SUNDIALS that is linked, the
-/// compiler and the processor.
+/// compiler, the processor and the operating system.
 std::vector<std::pair<std::string, std::string>> build_facts();
 
 }  // namespace diracstep

@@ -7,6 +7,7 @@
 #include <diracstep/core/run.hpp>
 #include <diracstep/plugins/callback_error.hpp>
 #include <diracstep/validation/convergence_study.hpp>
+#include <diracstep/validation/posing_choice.hpp>
 #include <diracstep/validation/work_precision.hpp>
 #include <utility>
 
@@ -205,13 +206,29 @@ class StudyInProgress {
     }
   }
 
+  std::vector<Posing> posings(const std::string& yardstick, const std::vector<double>& rtols,
+                              double part) const {
+    if (yardstick != ida_method) return {Posing::rates};  // it has none
+    if (options_.ida_posing) return {*options_.ida_posing};
+    if (!truth_.missing.empty()) return {Posing::rates};
+    return best_posings(*entry_.scene, study_.t_end, rtols, truth_, options_.run_budget,
+                        [&] { look(part, "the posings of IDA"); });
+  }
+
   void run_yardstick_ladder(const std::string& yardstick, double part) {
     std::vector<double> rtols = options_.rtols;
     std::ranges::sort(rtols, std::greater{});
+    for (const Posing posing : posings(yardstick, rtols, part))
+      run_yardstick_ladder(yardstick, posing, rtols, part);
+  }
+
+  void run_yardstick_ladder(const std::string& yardstick, Posing posing, const std::vector<double>& rtols,
+                            double part) {
     const std::size_t first = study_.rows.size();
     std::vector<Sample> ends(rtols.size());
     const auto run = [&](double rtol, int repeats, Sample& end) {
-      return run_yardstick(yardstick, *entry_.scene, study_.t_end, rtol, repeats, truth_, end);
+      return run_yardstick(yardstick, *entry_.scene, study_.t_end, {.rtol = rtol, .posing = posing}, repeats,
+                           truth_, end);
     };
     for (std::size_t i = 0; i < rtols.size(); ++i) {
       look(part, fmt::format("{}, rtol {:g}", yardstick, rtols[i]));

@@ -6,6 +6,20 @@
 
 namespace diracstep {
 
+const char* name(Posing posing) {
+  switch (posing) {
+    case Posing::rates:
+      return "rates";
+    case Posing::rates_loose:
+      return "rates-loose";
+    case Posing::index_2:
+      return "index-2";
+    case Posing::velocity:
+      return "velocity";
+  }
+  return "unknown";
+}
+
 void require_reference(const char* integrator, const Scene& scene, double t_end,
                        const ReferenceOptions& options) {
   const auto require = [&](bool allowed, const char* option, double value, const char* which) {

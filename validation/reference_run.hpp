@@ -1,14 +1,30 @@
 #pragma once
 
+#include <array>
 #include <diracstep/core/integrator.hpp>
 #include <string>
 
 namespace diracstep {
 
+/// How IDA is given the rows of a scene: as equations on (q, v, p) and the multipliers Λ of all rows, M of
+/// holonomic ones.
+enum class Posing {
+  rates,        ///< multipliers as derivatives, φ = 0 beside A v + b = 0 (Gear, Gupta, Leimkuhler): index 1
+  rates_loose,  ///< the same, no tolerance on the multipliers
+  index_2,      ///< the multipliers themselves, without a tolerance: stabilised index 2
+  velocity,     ///< multipliers as derivatives, A v + b = 0 alone: index 1, φ drifts
+};
+inline constexpr std::array<Posing, 4> all_posings{Posing::rates, Posing::rates_loose, Posing::index_2,
+                                                   Posing::velocity};
+
+/// "rates", "rates-loose", "index-2" or "velocity".
+const char* name(Posing posing);
+
 struct ReferenceOptions {
   double rtol = 1e-8;  ///< relative tolerance, in [1e-14, 1e-1]
   double atol = 0.0;   ///< absolute tolerance on every component that has an error test; 0 takes rtol
   long max_steps = 5'000'000;
+  Posing posing = Posing::rates;  ///< of IDA
 };
 
 /// One run of an integrator of the continuous system.  `failure` is empty, or says why and where it stopped;

@@ -38,7 +38,7 @@ std::size_t width(std::string_view text) {
 }
 
 Cells row_cells(const StudyRow& row) {
-  return {row.method == ida_method ? "IDA" : row.method,
+  return {row.method == ida_method ? "IDA, " + row.posing : row.method,
           row.is_yardstick() ? "" : fmt::format("{}", row.order),
           row.is_yardstick() ? fmt::format("rtol {:g}", row.rtol)
                              : (std::isfinite(row.step) ? fmt::format("{:.4g}", row.step) : "-"),
@@ -95,6 +95,7 @@ Json row_json(const StudyRow& row, Momentum momentum) {
   Json json{{"method", row.method}};
   if (row.is_yardstick()) {
     json["rtol"] = row.rtol;
+    if (!row.posing.empty()) json["posing"] = row.posing;
   } else {
     json["order"] = row.order;
     json["momentum"] = name(momentum);
@@ -182,7 +183,8 @@ std::string csv_line(const Study& study, const StudyRow& row) {
                      fmt::format("{}", row.steps),
                      fmt::format("{}", row.newton_iterations),
                      fmt::format("{}", row.residual_evaluations),
-                     fmt::format("{}", row.jacobian_evaluations)};
+                     fmt::format("{}", row.jacobian_evaluations),
+                     row.posing};
   return fmt::format("{}\n", fmt::join(fields, ","));
 }
 
@@ -240,12 +242,27 @@ std::string at_error_markdown(const Study& study) {
   return text + '\n';
 }
 
+std::string summary_markdown(const std::vector<Study>& studies) {
+  const auto time = [](std::optional<double> t) { return t ? time_cell(*t) : std::string("-"); };
+  const auto ratio = [](std::optional<double> r) { return r ? fmt::format("{:.2f}", *r) : std::string("-"); };
+  std::string text =
+      "| scene | error | fastest of ours | ours | IDA | IDA / ours | explicit | explicit / ours |\n"
+      "|---|---|---|---|---|---|---|---|\n";
+  for (const Study& study : studies)
+    for (const AtError& at : study.at_error)
+      if (at.best && (at.error == 1e-6 || at.error == 1e-9))
+        text += fmt::format("| `{}` | {:.0e} | `{}`, order {} | {} | {} | {} | {} | {} |\n", study.scene,
+                            at.error, at.method, at.order, time(at.cpu_seconds), time(at.ida_cpu_seconds),
+                            ratio(at.ratio), time(at.erk_cpu_seconds), ratio(at.erk_ratio));
+  return text;
+}
+
 std::string studies_csv(const std::vector<Study>& studies) {
   std::string text =
       "scene,method,order,momentum,step,rtol,status,error_q,error_p,self_error,constraint,energy_error,"
       "cpu_seconds_median,cpu_seconds_min,cpu_seconds_max,repeats,steps,newton_iterations,residual_"
       "evaluations,"
-      "jacobian_evaluations\n";
+      "jacobian_evaluations,posing\n";
   for (const Study& study : studies)
     for (const StudyRow& row : study.rows) text += csv_line(study, row);
   return text;

@@ -85,10 +85,9 @@ double largest_violation(const Scene& scene, const Sample& at) {
   return largest;
 }
 
-Truth true_end(const CatalogueScene& scene, double t_end) {
-  const auto point = scene.reference.at ? scene.reference.at(t_end) : std::nullopt;
-  const auto complete = completed(scene.scene);
-  if (!point) return true_end_by_ida(*complete, t_end);
+std::optional<Truth> known_point(const CatalogueScene& scene, double t) {
+  const auto point = scene.reference.at ? scene.reference.at(t) : std::nullopt;
+  if (!point) return std::nullopt;
   Truth truth{.kind = scene.reference.kind,
               .how = scene.reference.how,
               .self_error = scene.reference.self_error,
@@ -96,8 +95,13 @@ Truth true_end(const CatalogueScene& scene, double t_end) {
               .q = point->q,
               .p = Vector::Zero(point->q.size())};
   Vector force = truth.p;
-  complete->lagrangian->gradient(t_end, point->q, point->v, force, truth.p);
+  completed(scene.scene)->lagrangian->gradient(t, point->q, point->v, force, truth.p);
   return truth;
+}
+
+Truth true_end(const CatalogueScene& scene, double t_end) {
+  if (auto known = known_point(scene, t_end)) return *std::move(known);
+  return true_end_by_ida(*completed(scene.scene), t_end);
 }
 
 void judge(StudyRow& row, const Scene& scene, const Sample& end, const Truth& truth) {
@@ -175,15 +179,16 @@ StudyRow run_variable(AdaptiveIntegrator& integrator, double t_end, Momentum mom
   return row;
 }
 
-StudyRow run_yardstick(const std::string& method, const Scene& scene, double t_end, double rtol, int repeats,
-                       const Truth& truth, Sample& end) {
+StudyRow run_yardstick(const std::string& method, const Scene& scene, double t_end,
+                       const ReferenceOptions& options, int repeats, const Truth& truth, Sample& end) {
   const auto integrate = method == erk_method ? integrate_explicitly : integrate_with_ida;
   ReferenceRun run;
   const auto once = [&] {
-    run = integrate(scene, t_end, {.rtol = rtol});
+    run = integrate(scene, t_end, options);
     return run.ok() ? run.cpu_seconds : -1.0;
   };
-  StudyRow row{.method = method, .rtol = rtol};
+  StudyRow row{.method = method, .rtol = options.rtol};
+  if (method == ida_method) row.posing = name(options.posing);
   row.cpu_seconds = repeat(once, repeats);
   row.steps = run.steps;
   row.newton_iterations = run.newton_iterations;

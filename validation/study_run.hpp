@@ -2,9 +2,11 @@
 
 #include <diracstep/core/adaptive_integrator.hpp>
 #include <diracstep/core/integrator.hpp>
+#include <diracstep/validation/reference_run.hpp>
 #include <diracstep/validation/scene_catalogue.hpp>
 #include <functional>
 #include <limits>
+#include <optional>
 #include <string>
 
 namespace diracstep {
@@ -29,9 +31,10 @@ struct StudyRow {
   static constexpr double none = std::numeric_limits<double>::quiet_NaN();
 
   std::string method;
-  int order = 0;       ///< 0 for a yardstick
-  double step = none;  ///< ours: the step size, fitted to the interval, or eps of variable steps
-  double rtol = none;  ///< a yardstick's
+  int order = 0;            ///< 0 for a yardstick
+  double step = none;       ///< ours: the step size, fitted to the interval, or eps of variable steps
+  double rtol = none;       ///< a yardstick's
+  std::string posing = {};  ///< of IDA
   std::string status = "ok";
   double error_q = none;
   double error_p = none;
@@ -63,6 +66,9 @@ struct Truth {
   double distance(const Sample& end) const;
 };
 
+/// The scene's reference at time t with p = ∂L/∂v; empty where it does not reach t.
+std::optional<Truth> known_point(const CatalogueScene& scene, double t);
+
 /// The scene's reference at t_end with p = ∂L/∂v, or IDA's result at the tolerance 1e-13 where there is none.
 Truth true_end(const CatalogueScene& scene, double t_end);
 
@@ -88,7 +94,7 @@ StudyRow run_variable(AdaptiveIntegrator& integrator, double t_end, Momentum mom
                       const Truth& truth, const Look& look = {});
 
 /// The same for a yardstick, by its method name; `end` receives where it got to.
-StudyRow run_yardstick(const std::string& method, const Scene& scene, double t_end, double rtol, int repeats,
-                       const Truth& truth, Sample& end);
+StudyRow run_yardstick(const std::string& method, const Scene& scene, double t_end,
+                       const ReferenceOptions& options, int repeats, const Truth& truth, Sample& end);
 
 }  // namespace diracstep

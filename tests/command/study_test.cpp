@@ -33,6 +33,7 @@ TEST_F(StudyCommand, JsonHasTheKeysOfTheContract) {
     const bool yardstick = row["method"] == "ida" || row["method"] == "erk";
     EXPECT_EQ(row.contains("rtol"), yardstick);
     EXPECT_EQ(row.contains("self_error"), yardstick);
+    EXPECT_EQ(row.contains("posing"), row["method"] == "ida");
     for (const char* key : {"order", "momentum", "step"}) EXPECT_EQ(row.contains(key), !yardstick) << key;
   }
   ASSERT_EQ(study["measured_order"].size(), 2u);
@@ -85,6 +86,15 @@ TEST_F(StudyCommand, PatternsAndClassesChooseScenes) {
   EXPECT_EQ(studies[0]["scene"], "knife_edge");
   EXPECT_EQ(studies[1]["scene"], "kepler_e06");
   expect_misuse("study 'zz*'", {"zz*", "knife_edge"});
+}
+
+TEST_F(StudyCommand, IdaTakesThePosingAskedForAndNamesItInTheRow) {
+  const std::string rest = " --orders 2 --steps 0.02 --without-erk --rtols 1e-6 --repeat 1 --end 1 --json";
+  for (const std::string posing : {"rates", "rates-loose", "index-2", "velocity"}) {
+    const Outcome outcome = run("study pendulum_cartesian --ida-posing " + posing + rest);
+    ASSERT_EQ(outcome.status, 0) << outcome.err;
+    EXPECT_EQ(Json::parse(outcome.out)["studies"][0]["rows"].back()["posing"], posing);
+  }
 }
 
 TEST_F(StudyCommand, WithoutGnuplotEverythingElseIsWritten) {
@@ -142,6 +152,8 @@ TEST_F(StudyCommand, MisuseNamesTheValueAndWhatIsAllowed) {
   expect_misuse("study knife_edge --repeat 0", {"0", "1 or more"});
   expect_misuse("study knife_edge --budget 0", {"0"});
   expect_misuse("study knife_edge --end 0", {"0"});
+  expect_misuse("study knife_edge --ida-posing index-3",
+                {"index-3", "best, rates, rates-loose, index-2, velocity"});
   expect_misuse("study knife_edge --momentum x", {"plus", "minus", "projected"});
   expect_misuse("study knife_edge --set e=1", {"'e'", "J"});
   expect_misuse("study knife_edge --out /dev/null/x", {"/dev/null/x"});

@@ -17,7 +17,8 @@ double error_at(const std::string& name, double rtol, double* constraint = nullp
   const CatalogueScene entry = make_scene(name);
   const Truth truth = true_end(entry, entry.t_end);
   Sample end;
-  const StudyRow row = run_yardstick(erk_method, *completed(entry.scene), entry.t_end, rtol, 1, truth, end);
+  const StudyRow row =
+      run_yardstick(erk_method, *completed(entry.scene), entry.t_end, {.rtol = rtol}, 1, truth, end);
   EXPECT_TRUE(row.ok()) << row.status;
   if (constraint != nullptr) *constraint = row.constraint;
   return row.error();

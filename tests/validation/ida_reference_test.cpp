@@ -7,6 +7,7 @@
 #include <diracstep/constraints/pfaffian.hpp>
 #include <diracstep/core/errors.hpp>
 #include <diracstep/validation/ida_reference.hpp>
+#include <diracstep/validation/posing_choice.hpp>
 #include <diracstep/validation/scene_catalogue.hpp>
 #include <limits>
 #include <stdexcept>
@@ -123,8 +124,8 @@ Scene tied_oscillators() {
 // ------------------------------------------------------------------------------ the system and its Jacobian
 
 /// The largest difference between ∂F/∂y + cj ∂F/∂ẏ and its difference quotient at a point without symmetry.
-double jacobian_error(const Scene& scene, bool dense) {
-  ImplicitLagrangianDae dae(scene, dense);
+double jacobian_error(const Scene& scene, bool dense, Posing posing) {
+  ImplicitLagrangianDae dae(scene, dense, posing);
   constexpr double t = 0.3, cj = 1.7;
   Vector y(dae.size()), rate(dae.size());
   for (int i = 0; i < dae.size(); ++i) {
@@ -151,7 +152,9 @@ TEST(ImplicitLagrangianDae, JacobianAgreesWithDifferences) {
   }
   for (const Scene& scene : scenes)
     for (const bool dense : {true, false})
-      EXPECT_LT(jacobian_error(scene, dense), 1e-8) << scene.name;  // central differences: 1e-9 at size 1
+      for (const Posing posing : all_posings)
+        EXPECT_LT(jacobian_error(scene, dense, posing), 1e-8)
+            << scene.name << ' ' << name(posing);  // central differences: 1e-9 at size 1
 }
 
 TEST(ImplicitLagrangianDae, LeavesOutMultipliersThatASceneDoesNotHave) {
@@ -159,6 +162,58 @@ TEST(ImplicitLagrangianDae, LeavesOutMultipliersThatASceneDoesNotHave) {
   EXPECT_EQ(ImplicitLagrangianDae(driven_particle(), true).size(), 3 * 2 + 1);
   EXPECT_EQ(ImplicitLagrangianDae(bead_on_turning_line(), true).size(), 3 * 2 + 2);
   EXPECT_EQ(ImplicitLagrangianDae(*testing::mixed(), true).size(), 3 * 3 + 2 + 1);
+}
+
+// ------------------------------------------------------------------------------ posings
+
+TEST(Posings, AreThoseThatDifferForAScene) {
+  EXPECT_EQ(posings_of(damped_oscillator()), std::vector{Posing::rates});
+  EXPECT_EQ(posings_of(driven_particle()),
+            (std::vector{Posing::rates, Posing::rates_loose, Posing::index_2}));
+  EXPECT_EQ(posings_of(bead_on_turning_line()).size(), all_posings.size());
+  EXPECT_EQ(ImplicitLagrangianDae(bead_on_turning_line(), true, Posing::velocity).size(), 3 * 2 + 1);
+}
+
+TEST(Posings, AllReachTheClosedFormAndOnlyOneDrifts) {
+  for (const char* scene : {"pendulum_cartesian", "knife_edge"}) {
+    const CatalogueScene entry = make_scene(scene);
+    for (const Posing posing : posings_of(*entry.scene)) {
+      const ReferenceRun run =
+          integrate_with_ida(*entry.scene, entry.t_end, {.rtol = 1e-9, .posing = posing});
+      ASSERT_TRUE(run.ok()) << scene << ' ' << name(posing) << ": " << run.failure;
+      EXPECT_LT(error(entry, run.end), 1.4e-4) << scene << ' ' << name(posing);  // five times the largest
+    }
+  }
+  const CatalogueScene pendulum = make_scene("pendulum_cartesian");
+  const auto off_the_circle = [&](Posing posing) {
+    const Vector q =
+        integrate_with_ida(*pendulum.scene, pendulum.t_end, {.rtol = 1e-6, .posing = posing}).end.q;
+    return std::abs(q.norm() - 1.0);
+  };
+  EXPECT_LT(off_the_circle(Posing::rates), 1e-7);
+  EXPECT_LT(off_the_circle(Posing::index_2), 1e-7);
+  EXPECT_GT(off_the_circle(Posing::velocity), 1e-7);
+}
+
+TEST(BestPosings, ReachAnErrorThatTheUsualOneDoesNotOnAStiffMechanism) {
+  const CatalogueScene entry = make_scene("andrews_squeezer");
+  const Truth truth = true_end(entry, entry.t_end);
+  const std::vector<double> rtols{1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12};
+  const auto reached = [&](Posing posing) {
+    double least = infinite;
+    for (const double rtol : rtols) {
+      const ReferenceRun run =
+          integrate_with_ida(*entry.scene, entry.t_end, {.rtol = rtol, .posing = posing});
+      if (run.ok()) least = std::min(least, truth.distance(run.end));
+    }
+    return least;
+  };
+  EXPECT_GT(reached(Posing::rates), 1e-6);
+  int looks = 0;
+  const auto chosen = best_posings(*entry.scene, entry.t_end, rtols, truth, 1.0, [&] { ++looks; });
+  EXPECT_EQ(looks, static_cast<int>(rtols.size() * all_posings.size()));
+  ASSERT_FALSE(chosen.empty());
+  EXPECT_LT(reached(chosen.front()), 1e-6) << name(chosen.front());
 }
 
 // ------------------------------------------------------------------------------ catalogue scenes

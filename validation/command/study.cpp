@@ -14,6 +14,7 @@
 #include <diracstep/validation/report.hpp>
 #include <diracstep/validation/study_comparison.hpp>
 #include <diracstep/validation/study_page.hpp>
+#include <diracstep/validation/study_plot.hpp>
 #include <filesystem>
 #include <fstream>
 #include <memory>
@@ -31,10 +32,13 @@ const std::vector<std::string> fair_selection{"kepler_e06",         "stiff_sprin
                                               "contact_oscillator", "nonholonomic_particle_free",
                                               "lotka_volterra_2d",  "toda_200"};
 
+constexpr const char* best_posing = "best";  // of IDA on a scene
+
 struct Options {
   std::vector<std::string> scenes;
   std::optional<std::string> methods;
   std::optional<std::string> orders, steps, rtols;
+  std::string ida_posing = best_posing;
   bool without_ida = false, without_erk = false;
   bool adaptive = false;
   int repeat = 5;
@@ -67,7 +71,8 @@ std::string tables(const std::vector<Study>& studies) {
   return text;
 }
 
-/// The directory of --out: study.csv, study.json, the pictures and report.html, renewed after each scene.
+/// The directory of --out: study.csv, study.json, summary.md, report.html, and of each scene its pictures and
+/// the run looked at, renewed after each scene.
 class OutputDirectory {
  public:
   explicit OutputDirectory(const std::string& path) : path_(output_directory(path)) {
@@ -75,31 +80,53 @@ class OutputDirectory {
   }
 
   /// Empty, or what could not be written.
-  std::string write(const std::vector<Study>& studies, const std::vector<PageEntry>& page) const {
-    const std::string failure = write_tables(studies);
-    tell(draw_work_precision(page.back().study, path_));
-    if (!page.back().history.time.empty())
-      tell(draw_history(page.back().history, page.back().study.scene, path_));
-    tell(draw_summary(studies, path_));
-    const std::string no_page = write_file(path_ / "report.html", study_page(page, path_));
-    return failure.empty() ? no_page : failure;
+  std::string write(const std::vector<Study>& studies, const std::vector<PageEntry>& page,
+                    const PageFacts& options) const {
+    draw(studies, page.back());
+    const std::string stem = (path_ / file_name(page.back().study.scene)).string();
+    std::string failure = write_tables(studies);
+    const History& history = page.back().history;
+    if (failure.empty() && !history.time.empty())
+      failure = write_file(stem + "-history.csv", history_csv(history));
+    if (failure.empty() && !history.time.empty())
+      failure = write_file(stem + "-motion.csv", motion_csv(history));
+    if (failure.empty()) failure = write_file(path_ / "report.html", study_page(page, options, path_));
+    return failure;
   }
 
   std::string report() const { return (path_ / "report.html").string(); }
 
  private:
+  void draw(const std::vector<Study>& studies, const PageEntry& entry) const {
+    tell(draw_work_precision(entry.study, series_styles(studies), path_));
+    if (!entry.history.time.empty())
+      tell(draw_history(entry.history, entry.study.scene, entry.time_unit, series_styles(studies), path_));
+    tell(draw_summary(studies, path_));
+  }
+
   static void tell(const std::string& failure) {
     if (!failure.empty()) say(failure);
   }
 
   std::string write_tables(const std::vector<Study>& studies) const {
-    const std::string csv = write_file(path_ / "study.csv", studies_csv(studies));
-    const std::string json = write_file(path_ / "study.json", studies_json(studies) + '\n');
-    return csv.empty() ? json : csv;
+    std::string failure = write_file(path_ / "study.csv", studies_csv(studies));
+    if (failure.empty()) failure = write_file(path_ / "study.json", studies_json(studies) + '\n');
+    if (failure.empty()) failure = write_file(path_ / "summary.md", summary_markdown(studies));
+    return failure;
   }
 
   std::filesystem::path path_;
 };
+
+std::optional<Posing> posing(const std::string& given) {
+  if (given == best_posing) return {};
+  std::string allowed = best_posing;
+  for (const Posing known : all_posings) {
+    if (given == name(known)) return known;
+    allowed += std::string(", ") + name(known);
+  }
+  throw Misuse(fmt::format("--ida-posing '{}' is not known; allowed are {}", given, allowed));
+}
 
 StudyOptions study_options(const Options& options) {
   StudyOptions study;
@@ -112,12 +139,39 @@ StudyOptions study_options(const Options& options) {
   if (options.rtols) study.rtols = numbers("--rtols", *options.rtols);
   if (options.without_ida) std::erase(study.yardsticks, ida_method);
   if (options.without_erk) std::erase(study.yardsticks, erk_method);
+  study.ida_posing = posing(options.ida_posing);
   study.adaptive = options.adaptive;
   study.repeats = options.repeat;
   study.run_budget = options.budget;
   study.t_end = options.end;
   study.momentum = momentum(options.momentum);
   return study;
+}
+
+constexpr const char* posings =
+    "rates: multipliers as derivatives, φ = 0 beside A v + b = 0 (Gear, Gupta, Leimkuhler), index 1; "
+    "rates-loose: the same without a tolerance on the multipliers; index-2: the multipliers themselves, "
+    "without a tolerance; velocity: as rates with A v + b = 0 alone, so that φ drifts";
+
+/// What was asked for, as the report tells it.
+PageFacts facts_of(const StudyOptions& study) {
+  PageFacts facts{{"methods", fmt::format("{}", fmt::join(study.methods, ", "))}};
+  facts.emplace_back(
+      "orders", study.orders.empty() ? "all that fit" : fmt::format("{}", fmt::join(study.orders, ", ")));
+  facts.emplace_back("steps", study.steps.empty()
+                                  ? fmt::format("a ladder, up to {:g} s of CPU time a run", study.run_budget)
+                                  : fmt::format("{}", fmt::join(study.steps, ", ")));
+  if (!study.yardsticks.empty())
+    facts.emplace_back("tolerances of the yardsticks", fmt::format("{:g}", fmt::join(study.rtols, ", ")));
+  if (std::ranges::find(study.yardsticks, ida_method) != study.yardsticks.end()) {
+    facts.emplace_back("posing of IDA", study.ida_posing
+                                            ? name(*study.ida_posing)
+                                            : "on each scene those that are fastest to 1e-3, 1e-6 or 1e-9");
+    facts.emplace_back("posings", posings);
+  }
+  facts.emplace_back("CPU time", fmt::format("of the thread, output excluded, median of {}", study.repeats));
+  facts.emplace_back("momentum", name(study.momentum));
+  return facts;
 }
 
 std::string label(const StudyRow& row) {
@@ -180,7 +234,7 @@ std::string read_file(const std::string& path) {
 PageEntry page_entry(const Study& study, const CatalogueScene& scene, const Session& session) {
   History history =
       study.interrupted ? History{} : record_history(scene, session.registry, session.solvers, study);
-  return {study, std::move(history), scene.kind, scene.description, scene.source};
+  return {study, std::move(history), scene.kind, scene.description, scene.source, time_unit(scene.notes)};
 }
 
 /// Where the report goes: --out, or a default where no scenes are named.
@@ -207,7 +261,7 @@ void study(const Options& options, Session& session) {
     std::string failure;
     if (out) {
       page.push_back(page_entry(studies.back(), scene, session));
-      failure = out->write(studies, page);
+      failure = out->write(studies, page, facts_of(chosen));
     }
     if (failure.empty() && !options.table.empty()) failure = write_file(options.table, tables(studies));
     if (failure.empty()) continue;
@@ -241,6 +295,10 @@ void add_study(CLI::App& app, Session& session) {
   verb->add_option("--rtols", options->rtols, "Tolerances of the yardsticks; 1e-4,1e-5,…,1e-14 without it");
   verb->add_flag("--adaptive", options->adaptive,
                  "Also reversible variable steps, with a ladder of eps (in the column of the steps)");
+  verb->add_option("--ida-posing", options->ida_posing,
+                   "How IDA is given the rows: rates, rates-loose, index-2 or velocity;\n"
+                   "best: on each scene those that are fastest to 1e-3, 1e-6 or 1e-9")
+      ->capture_default_str();
   verb->add_flag("--without-ida", options->without_ida, "No runs of IDA");
   verb->add_flag("--without-erk", options->without_erk, "No runs of the explicit Runge–Kutta method");
   verb->add_option("--repeat", options->repeat, "Timed runs of each row")->capture_default_str();
@@ -250,7 +308,8 @@ void add_study(CLI::App& app, Session& session) {
   verb->add_option("--momentum", options->momentum,
                    "Representative of the momentum: plus, minus or projected")
       ->capture_default_str();
-  verb->add_option("--out", options->out, "Directory for report.html, study.csv, study.json and the pictures")
+  verb->add_option("--out", options->out,
+                   "Directory for report.html, study.csv, study.json, summary.md and the pictures")
       ->type_name("DIR");
   verb->add_option("--compare", options->compare,
                    "An earlier study.json: tells what got faster, slower, more or less exact")

@@ -1,0 +1,16 @@
+#pragma once
+
+#include <diracstep/validation/study_run.hpp>
+#include <vector>
+
+namespace diracstep {
+
+/// The posings in which IDA is the yardstick of a scene: for each of the errors 1e-6, 1e-3 and 1e-9 the one
+/// with the least CPU time, or one chosen already that is within a tenth of it.  Each posing is run once at
+/// each tolerance, until a run takes longer than `budget` CPU seconds; where none reaches those errors it is
+/// the first of those that complete at the most tolerances.  `look` is called before each run and may throw
+/// to end it.
+std::vector<Posing> best_posings(const Scene& scene, double t_end, const std::vector<double>& rtols,
+                                 const Truth& truth, double budget, const Look& look = {});
+
+}  // namespace diracstep
