@@ -25,7 +25,7 @@ class LinearSolver {
   virtual const char* name() const = 0;
 };
 
-/// Dense LU for full patterns, KLU for the others.
+/// Dense LU for full patterns, KLU for the others.  The pattern outlives the solver.
 std::unique_ptr<LinearSolver> make_linear_solver(const SparsityPattern& pattern);
 
 }  // namespace diracstep::detail
