@@ -2,15 +2,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <diracstep/core/errors.hpp>
 #include <diracstep/solvers/detail/linear_solver.hpp>
 #include <limits>
-#include <stdexcept>
 #include <utility>
 #include <vector>
-#ifdef DIRACSTEP_WITH_KLU
-#include <klu.h>
-#endif
 
 namespace diracstep::detail {
 
@@ -102,112 +97,6 @@ class DenseLu final : public LinearSolver {
   Eigen::VectorXd permuted_;
 };
 
-#ifdef DIRACSTEP_WITH_KLU
-
-/// KLU with AMD ordering and without block triangular form: on saddle-point matrices the latter pairs rows
-/// with multiplier columns and keeps tiny pivots.  The ordering is made once; a factorisation reuses the
-/// pivots of the one before until its reciprocal condition falls far below that of the last fresh one.
-/// Rows are scaled where pivots are chosen and nowhere else: with given pivots it changes round-off alone,
-/// and takes two fifths of the time.
-class Klu final : public LinearSolver {
- public:
-  /// The pattern outlives it.
-  explicit Klu(const SparsityPattern& pattern) : pattern_(pattern), fresh_values_(pattern.nonzeros()) {
-    klu_defaults(&common_);
-    common_.btf = 0;
-    common_.ordering = 0;
-    common_.tol = 0.1;
-    symbolic_ = klu_analyze(pattern.rows(), starts(), rows(), &common_);
-    if (symbolic_ == nullptr) throw std::runtime_error("KLU could not analyse the pattern of the Jacobian");
-  }
-  Klu(const Klu&) = delete;
-  Klu& operator=(const Klu&) = delete;
-  ~Klu() override {
-    klu_free_numeric(&numeric_, &common_);
-    klu_free_symbolic(&symbolic_, &common_);
-  }
-
-  bool factor(const double* values) override {
-    if (numeric_ != nullptr && refactor(values) && common_.rcond > 1e-3 * fresh_rcond_) return true;
-    return factor_afresh(values);
-  }
-
-  void solve(double* b) override { klu_solve(symbolic_, numeric_, pattern_.rows(), 1, b, &common_); }
-
-  void reset() override { klu_free_numeric(&numeric_, &common_); }
-
-  /// The pivots are those of the matrix that was last factored afresh.
-  void save(Snapshot& to) const override {
-    to.put(numeric_ != nullptr ? 1.0 : 0.0);
-    if (numeric_ != nullptr) to.put(fresh_values_);
-  }
-  void restore(Snapshot& from) override {
-    reset();
-    if (from.whole_number(1) == 0) return;
-    from.read(fresh_values_);
-    factor_afresh(fresh_values_.data());
-  }
-
-  bool holds(const double* values) const override {
-    return numeric_ != nullptr && fresh_values_ == Eigen::Map<const Vector>(values, fresh_values_.size());
-  }
-
-  const char* name() const override { return "KLU"; }
-
- private:
-  static constexpr int no_scaling = -1, by_largest_of_row = 2;
-
-  // KLU takes its input as mutable but only reads it.
-  // NOLINTBEGIN(cppcoreguidelines-pro-type-const-cast)
-  int* starts() const { return const_cast<int*>(pattern_.column_starts().data()); }
-  int* rows() const { return const_cast<int*>(pattern_.row_indices().data()); }
-  static double* input(const double* values) { return const_cast<double*>(values); }
-  // NOLINTEND(cppcoreguidelines-pro-type-const-cast)
-
-  /// With the pivots there are; false where one vanishes.
-  bool refactor(const double* values) {
-    common_.scale = no_scaling;
-    return klu_refactor(starts(), rows(), input(values), symbolic_, numeric_, &common_) != 0 &&
-           klu_rcond(symbolic_, numeric_, &common_) != 0;
-  }
-
-  bool factor_afresh(const double* values) {
-    fresh_values_ = Eigen::Map<const Vector>(values, fresh_values_.size());
-    klu_free_numeric(&numeric_, &common_);
-    common_.scale = by_largest_of_row;
-    numeric_ = klu_factor(starts(), rows(), input(values), symbolic_, &common_);
-    if (numeric_ == nullptr || !pivots_are_regular() || !refactor(values)) {
-      reset();  // such pivots serve no other matrix
-      return false;
-    }
-    fresh_rcond_ = common_.rcond;
-    return true;
-  }
-
-  /// Whether no pivot is round-off beside its column of the matrix with scaled rows.
-  bool pivots_are_regular() const {
-    constexpr double round_off = 8.0 * std::numeric_limits<double>::epsilon();
-    const auto* const pivots = static_cast<const double*>(numeric_->Udiag);
-    for (int k = 0; k < pattern_.rows(); ++k) {
-      const int column = symbolic_->Q[k];
-      double largest = 0.0;
-      for (int e = starts()[column]; e < starts()[column + 1]; ++e)
-        largest = std::max(largest, std::abs(fresh_values_[e]) / numeric_->Rs[numeric_->Pinv[rows()[e]]]);
-      if (!(std::abs(pivots[k]) > round_off * largest)) return false;
-    }
-    return true;
-  }
-
-  const SparsityPattern& pattern_;
-  klu_common common_{};
-  klu_symbolic* symbolic_ = nullptr;
-  klu_numeric* numeric_ = nullptr;
-  Vector fresh_values_;  ///< what the pivots in use were chosen for
-  double fresh_rcond_ = 0.0;
-};
-
-#endif
-
 /// Up to this size plain loops are faster than Eigen's blocks.
 constexpr int largest_small = 32;
 constexpr std::size_t largest_fixed = 12;
@@ -222,6 +111,8 @@ constexpr auto small_lu_of_each_size(std::index_sequence<N...>) {
   return std::array{&small_lu<static_cast<int>(N)>...};
 }
 
+}  // namespace
+
 std::unique_ptr<LinearSolver> make_dense_lu(int size) {
   static constexpr auto make = small_lu_of_each_size(std::make_index_sequence<largest_fixed + 1>());
   if (size > largest_small) return std::make_unique<DenseLu>(size);
@@ -229,16 +120,8 @@ std::unique_ptr<LinearSolver> make_dense_lu(int size) {
   return make.at(length <= largest_fixed ? length : 0)(size);
 }
 
-}  // namespace
-
 std::unique_ptr<LinearSolver> make_linear_solver(const SparsityPattern& pattern) {
-  if (pattern.is_dense()) return make_dense_lu(pattern.rows());
-#ifdef DIRACSTEP_WITH_KLU
-  return std::make_unique<Klu>(pattern);
-#else
-  throw Misuse("this build has no KLU, so sparse systems cannot be solved; raise dense_limit to " +
-               std::to_string(pattern.rows()) + " or build with DIRACSTEP_WITH_KLU=ON");
-#endif
+  return pattern.is_dense() ? make_dense_lu(pattern.rows()) : make_sparse_lu(pattern);
 }
 
 }  // namespace diracstep::detail
