@@ -1,7 +1,21 @@
-/// Large scenes: processor time of a step and resident memory, for each unknown, from a thousand to a million
-/// unknowns; beside it the bare KLU work and evaluations of such a step.
+/// Large scenes from a thousand to a million unknowns: processor time of a step for each unknown, beside the
+/// bare work of such a step, and memory.
 ///   large_scenes [LARGEST]   default 1e6 unknowns, some minutes; memory is read from /proc and left out
 ///   elsewhere
+///
+/// Columns, times in nanoseconds for each unknown:
+///   step        a step;   /least  beside the least of all sizes
+///   it res Jac  iterations, residuals and Jacobians of a step
+///   refactor solve residual Jacobian   the bare work, one of each: KLU with given pivots and without scaling
+///   KLU/least   refactor + solve beside the least of all sizes: what the caches alone cost
+///   /bare       step beside  it · (refactor + solve + residual + Jacobian)
+///   /same       step beside  Jac · (refactor + Jacobian) + it · solve + res · residual
+///   kB          resident memory;   build s  seconds for scene and integrator
+#include <klu.h>
+#include <stdio.h>
+
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -9,13 +23,32 @@
 #include <diracstep/solvers/kinsol_solver.hpp>
 #include <diracstep/validation/scene_catalogue.hpp>
 #include <fstream>
+#include <memory>
 #include <string>
+#include <vector>
 
 #include "timing.hpp"
 
 using namespace diracstep;
 
 namespace {
+
+/// What is measured of one size, as the program of that size prints it.
+enum Column {
+  unknowns,
+  step,
+  iterations,
+  residuals,
+  jacobians,
+  refactor,
+  solve,
+  residual,
+  jacobian,
+  memory,
+  build,
+  columns
+};
+using Measurement = std::array<double, columns>;
 
 /// Kilobytes of this program that are in memory; 0 where that cannot be known.
 double resident_kilobytes() {
@@ -25,55 +58,166 @@ double resident_kilobytes() {
   return 0.0;
 }
 
-/// Step sizes that grow with the length of a link, so that every size has the same step beside its fastest
-/// motion.
-void measure(const char* scene, const char* method, int unknowns, int rows_of_each_site, double step) {
-  const int sites = unknowns / rows_of_each_site;
-  const CatalogueScene entry = make_scene(scene, {{"N", double(sites)}});
-  const double before = resident_kilobytes();
-  Integrator integrator(entry.scene, Registry::with_built_ins(), kinsol(), {.method = method, .step = step});
-  const int warm_up = 8, steps = std::max(4, 40000 / unknowns);
-  for (int k = 0; k < warm_up; ++k)
-    if (!integrator.step().ok()) {
-      std::printf("%-14s%-17s%10d  failed\n", scene, method, unknowns);
-      return;
-    }
-  const Work start = integrator.work();
-  const auto ns = fewest_nanoseconds({[&] {
-                                       for (int k = 0; k < steps; ++k) (void)integrator.step();
-                                     }},
-                                     steps, 3);
-  const Work end = integrator.work();
-  const auto each = [&](long from, long to) { return double(to - from) / double(end.steps - start.steps); };
-  std::printf(
-      "%-14s%-17s%10d%12.1f%12.2f%12.2f%12.2f%12.3f\n", scene, method, unknowns, ns[0] / unknowns,
-      each(start.iterations, end.iterations), each(start.residual_evaluations, end.residual_evaluations),
-      each(start.jacobian_evaluations, end.jacobian_evaluations), (resident_kilobytes() - before) / unknowns);
+/// The step of `method` on its own, at the end of a run.
+struct BareStep {
+  BareStep(const Integrator& at, const char* method)
+      : problem(Registry::with_built_ins().method(method).step(at.scene(), false)), x(problem->size()) {
+    problem->begin({at.time(), at.options().step}, at.position(), at.momentum());
+    problem->guess(at.rough_velocity(), x);
+    other = x * (1.0 + 1e-9);
+    f.setZero(x.size());
+    values.setZero(problem->pattern().nonzeros());
+    problem->residual(x, f);
+    problem->jacobian(x, values);
+  }
+  /// At two points in turn, for nothing is computed twice at one.
+  void residual() {
+    problem->residual(x, f);
+    x.swap(other);
+  }
+  void jacobian() { problem->jacobian(x, values); }
+
+  std::unique_ptr<StepProblem> problem;
+  Vector x, other, f, values;
+};
+
+/// KLU as the library sets it, without the library.
+struct BareKlu {
+  explicit BareKlu(BareStep& step)
+      : starts(step.problem->pattern().column_starts().begin(),
+               step.problem->pattern().column_starts().end()),
+        rows(step.problem->pattern().row_indices().begin(), step.problem->pattern().row_indices().end()),
+        values(step.values),
+        b(step.f) {
+    klu_defaults(&common);
+    common.btf = 0;
+    common.ordering = 0;
+    common.tol = 0.1;
+    symbolic = klu_analyze(size(), starts.data(), rows.data(), &common);
+    numeric = klu_factor(starts.data(), rows.data(), values.data(), symbolic, &common);
+    common.scale = -1;
+    refactor();
+  }
+  BareKlu(const BareKlu&) = delete;
+  BareKlu& operator=(const BareKlu&) = delete;
+  ~BareKlu() {
+    klu_free_numeric(&numeric, &common);
+    klu_free_symbolic(&symbolic, &common);
+  }
+  int size() const { return static_cast<int>(starts.size()) - 1; }
+  void refactor() { klu_refactor(starts.data(), rows.data(), values.data(), symbolic, numeric, &common); }
+  void solve() { klu_solve(symbolic, numeric, size(), 1, b.data(), &common); }
+
+  std::vector<int> starts, rows;
+  Vector values, b;
+  klu_common common{};
+  klu_symbolic* symbolic = nullptr;
+  klu_numeric* numeric = nullptr;
+};
+
+/// Steps past the first ones, in which predictors are compared, again and again from the start.
+bool measure_steps(Integrator& integrator, Measurement& m) {
+  constexpr int before = 20, timed = 16;
+  const int rounds = m[unknowns] > 3e5 ? 3 : 6;
+  m[step] = HUGE_VAL;
+  for (int round = 0; round < rounds; ++round) {
+    integrator.reset();
+    for (int k = 0; k < before; ++k)
+      if (!integrator.step().ok()) return false;
+    const Work start = integrator.work();
+    const double seconds = processor_seconds();
+    for (int k = 0; k < timed; ++k) (void)integrator.step();
+    m[step] = std::min(m[step], 1e9 * (processor_seconds() - seconds) / timed / m[unknowns]);
+    const Work end = integrator.work();
+    m[iterations] = double(end.iterations - start.iterations) / timed;
+    m[residuals] = double(end.residual_evaluations - start.residual_evaluations) / timed;
+    m[jacobians] = double(end.jacobian_evaluations - start.jacobian_evaluations) / timed;
+  }
+  return true;
 }
 
-constexpr const char* usage = "large_scenes [LARGEST | SCENE METHOD UNKNOWNS]\n";
+void measure_bare(const Integrator& integrator, const char* method, Measurement& m) {
+  BareStep bare(integrator, method);
+  BareKlu klu(bare);
+  const int count = std::max(4, static_cast<int>(4e5 / m[unknowns]));
+  const auto times = [&](auto work) {
+    return [work, count] {
+      for (int k = 0; k < count; ++k) work();
+    };
+  };
+  const auto ns = fewest_nanoseconds({times([&] { klu.refactor(); }), times([&] { klu.solve(); }),
+                                      times([&] { bare.residual(); }), times([&] { bare.jacobian(); })},
+                                     count, 5);
+  for (int k = 0; k < 4; ++k)
+    m.at(static_cast<std::size_t>(refactor + k)) = ns[static_cast<std::size_t>(k)] / m[unknowns];
+}
+
+/// A step that grows with the root of a link's length, so that links move as far beside their length in all
+/// sizes.
+bool measure(const std::string& scene, const char* method, Measurement& m) {
+  const bool chain = scene == "hanging_chain";
+  const double sites = std::floor(m[unknowns] / (chain ? 3.0 : 1.0));
+  const double h = chain ? 7.5e-4 * std::sqrt(1000.0 / m[unknowns]) : 0.05;
+  const double memory_before = resident_kilobytes(), start = processor_seconds();
+  const CatalogueScene entry = make_scene(scene, {{"N", sites}});
+  Integrator integrator(entry.scene, Registry::with_built_ins(), kinsol(), {.method = method, .step = h});
+  m[build] = processor_seconds() - start;
+  if (!measure_steps(integrator, m)) return false;
+  m[memory] = (resident_kilobytes() - memory_before) / m[unknowns];
+  measure_bare(integrator, method, m);
+  return true;
+}
+
+/// Each size is measured by a program of its own, so that the memory of one is not that of the next.
+Measurement measure_apart(const std::string& program, const std::string& what, double size) {
+  const std::string command = '"' + program + "\" " + what + ' ' + std::to_string(std::lround(size));
+  FILE* const output = popen(command.c_str(), "r");
+  Measurement m{};
+  for (double& value : m)
+    if (output == nullptr || std::fscanf(output, "%lf", &value) != 1) value = std::nan("");
+  if (output != nullptr) pclose(output);
+  return m;
+}
+
+double klu(const Measurement& m) { return m[refactor] + m[solve]; }
+
+void print(const std::string& what, const std::vector<Measurement>& sizes) {
+  double least = HUGE_VAL, least_klu = HUGE_VAL;
+  for (const Measurement& m : sizes) {
+    least = std::min(least, m[step]);
+    least_klu = std::min(least_klu, klu(m));
+  }
+  std::printf("\n%s\n%9s%7s%7s%6s%6s%6s%10s%7s%10s%10s%11s%7s%7s%7s%9s\n", what.c_str(), "unknowns", "step",
+              "/least", "it", "res", "Jac", "refactor", "solve", "residual", "Jacobian", "KLU/least", "/bare",
+              "/same", "kB", "build s");
+  for (const Measurement& m : sizes) {
+    const double bare = m[iterations] * (klu(m) + m[residual] + m[jacobian]);
+    const double same =
+        m[jacobians] * (m[refactor] + m[jacobian]) + m[iterations] * m[solve] + m[residuals] * m[residual];
+    std::printf("%9.0f%7.1f%7.2f%6.2f%6.2f%6.2f%10.1f%7.1f%10.1f%10.1f%11.2f%7.2f%7.2f%7.3f%9.2f\n",
+                m[unknowns], m[step], m[step] / least, m[iterations], m[residuals], m[jacobians], m[refactor],
+                m[solve], m[residual], m[jacobian], klu(m) / least_klu, m[step] / bare, m[step] / same,
+                m[memory], m[build]);
+  }
+  std::fflush(stdout);
+}
 
 }  // namespace
 
-/// Each measurement is a program of its own, so that the memory of one is not that of the next.
 int main(int argc, char** argv) {
-  const auto number = [&](int k) { return std::strtod(argv[k], nullptr); };
   if (argc == 4) {
-    const int n = static_cast<int>(number(3));
-    const bool chain = std::string(argv[1]) == "hanging_chain";
-    measure(argv[1], argv[2], n, chain ? 3 : 1, chain ? 0.25 * 3.0 / n : 0.05);
+    Measurement m{};
+    m[unknowns] = std::strtod(argv[3], nullptr);
+    if (!measure(argv[1], argv[2], m)) return 1;
+    for (const double value : m) std::printf("%.6g ", value);
     return 0;
   }
-  if (argc > 2) return std::fputs(usage, stderr), 2;
-  const double largest = argc > 1 ? number(1) : 1e6;
-  std::printf("%-14s%-17s%10s%12s%12s%12s%12s%12s\n", "scene", "method", "unknowns", "ns/unknown",
-              "iterations", "residuals", "Jacobians", "kB/unknown");
-  for (const char* what :
-       {"hanging_chain type1/midpoint", "hanging_chain type1/trapezoidal", "toda_200 type1/midpoint"})
-    for (double unknowns = 1000; unknowns <= largest; unknowns *= 10) {
-      std::fflush(stdout);
-      const std::string command =
-          std::string("\"") + argv[0] + "\" " + what + " " + std::to_string(static_cast<long>(unknowns));
-      if (std::system(command.c_str()) != 0) return 1;
-    }
+  if (argc > 2) return std::fputs("large_scenes [LARGEST | SCENE METHOD UNKNOWNS]\n", stderr), 2;
+  const double largest = argc > 1 ? std::strtod(argv[1], nullptr) : 1e6;
+  for (const char* what : {"hanging_chain type1/midpoint", "toda_200 type1/midpoint"}) {
+    std::vector<Measurement> sizes;
+    for (double size = 1000.0; size <= largest; size *= 10.0)
+      sizes.push_back(measure_apart(argv[0], what, size));
+    print(what, sizes);
+  }
 }

@@ -38,7 +38,7 @@ IntegratorOptions inner_options(IntegratorOptions options, const Registry& regis
 IntegratorOptions with_method(IntegratorOptions options, const Scene& scene) {
   if (options.method != automatic_method) return options;
   const DefaultMethod choice =
-      default_method(scene, options.order, options.constraint_rule, options.dense_limit);
+      default_method(scene, options.order, options.constraint_rule, large_from(options.dense_limit));
   options.method = choice.method;
   options.order = choice.order;
   return options;

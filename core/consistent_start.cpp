@@ -1,10 +1,12 @@
 #include <Eigen/QR>
+#include <Eigen/SparseQR>
 #include <algorithm>
 #include <diracstep/core/consistent_start.hpp>
 #include <diracstep/core/constraint_distribution.hpp>
 #include <diracstep/core/errors.hpp>
 #include <diracstep/core/hidden_rows.hpp>
 #include <diracstep/core/saddle_point.hpp>
+#include <set>
 #include <sstream>
 
 namespace diracstep {
@@ -92,10 +94,10 @@ class RowSubset final : public ConstraintRows {
                        names_of(*block, kept)),
         block_(std::move(block)),
         kept_(std::move(kept)) {
+    const std::vector<int> numbers = numbers_of(block_->rows(), kept_);
     int k = 0;
     for (const auto& [row, column] : block_->pattern().entries()) {
-      const auto found = std::ranges::find(kept_, row);
-      if (found != kept_.end()) places_.push_back(k);
+      if (numbers[static_cast<std::size_t>(row)] >= 0) places_.push_back(k);
       ++k;
     }
   }
@@ -129,12 +131,19 @@ class RowSubset final : public ConstraintRows {
   }
 
  private:
+  /// The number of each row among the kept ones; -1 for those left out.
+  static std::vector<int> numbers_of(int rows, const std::vector<int>& kept) {
+    std::vector<int> numbers(static_cast<std::size_t>(rows), -1);
+    for (std::size_t r = 0; r < kept.size(); ++r)
+      numbers[static_cast<std::size_t>(kept[r])] = static_cast<int>(r);
+    return numbers;
+  }
   static SparsityPattern subset(const SparsityPattern& pattern, const std::vector<int>& kept) {
+    const std::vector<int> numbers = numbers_of(pattern.rows(), kept);
     std::vector<std::pair<int, int>> entries;
-    for (const auto& [row, column] : pattern.entries()) {
-      const auto found = std::ranges::find(kept, row);
-      if (found != kept.end()) entries.emplace_back(static_cast<int>(found - kept.begin()), column);
-    }
+    for (const auto& [row, column] : pattern.entries())
+      if (const int number = numbers[static_cast<std::size_t>(row)]; number >= 0)
+        entries.emplace_back(number, column);
     return {static_cast<int>(kept.size()), pattern.columns(), entries};
   }
   static std::vector<std::string> names_of(const ConstraintRows& block, const std::vector<int>& kept) {
@@ -153,6 +162,47 @@ class RowSubset final : public ConstraintRows {
   std::vector<int> kept_;    ///< ascending, so the entries keep their order
   std::vector<int> places_;  ///< values of the kept rows among all
 };
+
+/// Up to so many rows full matrices take less time.
+constexpr int most_rows_in_full = 100;
+
+/// Aᵀ with columns of size 1, since rows may come in any units.
+Columns full_one_forms(const ConstraintsAtPoint& rows) {
+  Columns one_forms = rows.pattern().full(rows.coefficients()).transpose();
+  for (auto column : one_forms.colwise())
+    if (const double size = column.norm(); size > 0.0) column /= size;
+  return one_forms;
+}
+Eigen::SparseMatrix<double> sparse_one_forms(const ConstraintsAtPoint& rows) {
+  const SparsityPattern& pattern = rows.pattern();
+  Eigen::SparseMatrix<double> one_forms =
+      Eigen::Map<const Eigen::SparseMatrix<double>>(pattern.rows(), pattern.columns(), pattern.nonzeros(),
+                                                    pattern.column_starts().data(),
+                                                    pattern.row_indices().data(), rows.coefficients().data())
+          .transpose();
+  for (int r = 0; r < pattern.rows(); ++r)
+    if (const double size = one_forms.col(r).norm(); size > 0.0) one_forms.col(r) /= size;
+  return one_forms;
+}
+
+template <class Qr>
+std::vector<int> beyond_rank(const Qr& qr) {
+  const auto& order = qr.colsPermutation().indices();
+  return {order.data() + qr.rank(), order.data() + order.size()};
+}
+
+std::vector<int> dependent_columns(const Columns& one_forms, double tolerance) {
+  Eigen::ColPivHouseholderQR<Columns> qr;
+  qr.setThreshold(tolerance);
+  qr.compute(one_forms);
+  return beyond_rank(qr);
+}
+std::vector<int> dependent_columns(const Eigen::SparseMatrix<double>& one_forms, double tolerance) {
+  Eigen::SparseQR<Eigen::SparseMatrix<double>, Eigen::COLAMDOrdering<int>> qr;
+  qr.setPivotThreshold(tolerance);
+  qr.compute(one_forms);
+  return beyond_rank(qr);
+}
 
 }  // namespace
 
@@ -190,22 +240,16 @@ ConsistentStart project_start(const Scene& given, const Start& given_start, cons
 }
 
 std::vector<std::string> dependent_rows(const Scene& scene, const Start& start, double tolerance) {
-  const int m = scene.rows();
-  if (m == 0) return {};
+  if (scene.rows() == 0) return {};
   ConstraintsAtPoint rows(scene.constraints, scene.dimension());
   rows.evaluate(start.time, start.q);
-  Columns one_forms = rows.pattern().full(rows.coefficients()).transpose();
-  for (int r = 0; r < m; ++r) {
-    const double size = one_forms.col(r).norm();
-    if (size > 0.0) one_forms.col(r) /= size;  // rows may come in any units
-  }
-  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr;
-  qr.setThreshold(tolerance);
-  qr.compute(one_forms);
-  const auto& order = qr.colsPermutation().indices();
+  const std::vector<int> numbers = scene.rows() <= most_rows_in_full
+                                       ? dependent_columns(full_one_forms(rows), tolerance)
+                                       : dependent_columns(sparse_one_forms(rows), tolerance);
+  if (numbers.empty()) return {};
   const std::vector<std::string> names = scene.row_names();
   std::vector<std::string> dependent;
-  for (Eigen::Index r = qr.rank(); r < m; ++r) dependent.push_back(names[static_cast<std::size_t>(order[r])]);
+  for (const int r : numbers) dependent.push_back(names[static_cast<std::size_t>(r)]);
   std::ranges::sort(dependent);
   return dependent;
 }
@@ -213,11 +257,11 @@ std::vector<std::string> dependent_rows(const Scene& scene, const Start& start, 
 std::shared_ptr<const Scene> without_rows(const Scene& scene, const std::vector<std::string>& names) {
   auto copy = std::make_shared<Scene>(scene);
   copy->constraints.clear();
+  const std::set<std::string> left_out(names.begin(), names.end());
   for (const auto& block : scene.constraints) {
     std::vector<int> kept;
     for (int r = 0; r < block->rows(); ++r)
-      if (std::ranges::find(names, block->names()[static_cast<std::size_t>(r)]) == names.end())
-        kept.push_back(r);
+      if (!left_out.contains(block->names()[static_cast<std::size_t>(r)])) kept.push_back(r);
     if (static_cast<int>(kept.size()) == block->rows())
       copy->constraints.push_back(block);
     else if (!kept.empty())

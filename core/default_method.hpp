@@ -25,9 +25,10 @@ struct DefaultMethod {
 ///   all others                         GL(p/2), or GL(3), the lowest order that is near the least time
 ///                                      for errors of 1e-3; small errors take p = 8 (docs/at_error.md)
 ///
-/// `large` is the integrator's dense_limit.  Through KLU GL(3) takes less time than compositions of the
-/// midpoint step on lattices and on chains of 16 and 64 links at errors of 1e-6 and 1e-9, the same on 256
-/// links (bench/large_scenes_methods).  Throws Misuse for an order that is odd or above 40.
+/// `large` is 40, or the limit of full matrices where one was given (large_from).  Through KLU GL(3) takes
+/// less time than compositions of the midpoint step on lattices and on chains of 16 and 64 links at errors of
+/// 1e-6 and 1e-9, the same on 256 links (bench/large_scenes_methods).  Throws Misuse for an order that is odd
+/// or above 40.
 DefaultMethod default_method(const Scene& scene, int order, const std::optional<ConstraintRule>& rule,
                              int large);
 

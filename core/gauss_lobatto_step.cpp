@@ -15,6 +15,9 @@ namespace {
 /// Compensated sums are worth an iteration more: the residual must fall to this part of its usual bound.
 constexpr double last_bit = 0.01;
 
+/// The splitting takes full matrices.
+constexpr int largest_split = 40;
+
 class GaussLobattoStep final : public StepProblem {
  public:
   GaussLobattoStep(int s, const Scene& scene, bool dense)
@@ -50,7 +53,7 @@ class GaussLobattoStep final : public StepProblem {
     p0_.setZero(n_);
     const auto holonomic = [](const auto& block) { return block->holonomic(); };
     const auto kinds = std::ranges::count_if(scene.constraints, holonomic);
-    if (dense && (kinds == 0 || kinds == std::ssize(scene.constraints)))
+    if (n_ + m_ <= largest_split && (kinds == 0 || kinds == std::ssize(scene.constraints)))
       splitting_.emplace(table_, n_, m_, kinds > 0);
     plan_blocks(dense);
     blocks_.push_back({"momentum", n_ * s_});

@@ -13,9 +13,6 @@ namespace diracstep {
 
 namespace {
 
-/// Above this many rows their dependence is not looked for at the start: the test takes full matrices.
-constexpr int most_rows_to_test = 1000;
-
 std::string joined(const std::vector<std::string>& names) {
   std::string list;
   for (const std::string& name : names) list += (list.empty() ? "'" : ", '") + name + "'";
@@ -29,7 +26,7 @@ Integrator::Preparation Integrator::prepare(std::shared_ptr<const Scene> given,
   Preparation result{completed(std::move(given)), {}};
   auto& scene = result.scene;
   require_size("scene '" + scene->name + "': the start q", scene->start.q.size(), scene->dimension());
-  if (scene->rows() > 0 && scene->rows() <= most_rows_to_test && scene->start.q.allFinite()) {
+  if (scene->rows() > 0 && scene->start.q.allFinite()) {
     const std::vector<std::string> dependent = dependent_rows(*scene, scene->start);
     if (!dependent.empty() && !options.drop_dependent_rows)
       throw Misuse("scene '" + scene->name + "': rows that depend on others at the start: " +
@@ -70,9 +67,9 @@ Integrator::Integrator(Preparation preparation, const Registry& registry, const 
       preparation_(std::move(preparation.lines)),
       options_(std::move(options)),
       method_(choose_method(registry)),
-      dense_(scene_->dimension() + scene_->rows() <= options_.dense_limit),
-      velocity_problem_(*scene_, dense_),
-      acceleration_problem_(*scene_, dense_) {
+      matrices_(matrix_form(*scene_, options_.dense_limit)),
+      solvers_(solvers),
+      velocity_problem_(*scene_, matrices_.full) {
   require_step(options_.step);
   if (options_.substeps < 1)
     throw Misuse("substeps = " + std::to_string(options_.substeps) + "; 1 or more is needed");
@@ -80,24 +77,26 @@ Integrator::Integrator(Preparation preparation, const Registry& registry, const 
     require_discretisation(*options_.constraint_rule->own, scene_->constraints, scene_->start.time,
                            scene_->start.q);
   if (scene_->lagrangian->structure().phase_space()) {
-    phase_space_velocity_problem_.emplace(*scene_, dense_);
+    phase_space_velocity_problem_.emplace(*scene_, matrices_.full);
     velocity_solver_ = solvers(*phase_space_velocity_problem_);
   } else {
     velocity_solver_ = solvers(velocity_problem_);
-    acceleration_solver_ = solvers(acceleration_problem_);
   }
   plan_stages(registry, solvers);
   if (options_.compensated_sums) compensate();
   velocity_unknowns_.setZero(velocity_problem_.size());
   start_velocity_.setZero(scene_->dimension());
-  acceleration_unknowns_.setZero(acceleration_problem_.size());
+  acceleration_unknowns_.setZero(velocity_problem_.size());
+  const Eigen::Index n = scene_->dimension();
+  for (Vector* column : {&q_next_, &p_next_, &q_stage_, &p_stage_, &before_.q, &before_.p, &before_.v})
+    column->setZero(n);
   reset(scene_->start);
 }
 
 Method Integrator::choose_method(const Registry& registry) {
   if (options_.method == automatic_method) {
     const DefaultMethod choice =
-        default_method(*scene_, options_.order, options_.constraint_rule, options_.dense_limit);
+        default_method(*scene_, options_.order, options_.constraint_rule, large_from(options_.dense_limit));
     options_.method = choice.method;
     options_.order = choice.order;
     preparation_.push_back({"method", "by default", choice.reason});
@@ -112,7 +111,7 @@ Integrator::Part Integrator::make_part(const Method& method, bool mirror_rule,
   if (other_rule && given->own)
     throw Misuse("a discrete constraint of one's own has no adjoint; compose a method that is self-adjoint");
   const auto step = [&](const std::optional<ConstraintRule>& rule) {
-    return method.step(*scene_, dense_, rule, options_.force_degenerate);
+    return method.step(*scene_, matrices_.full, rule, options_.force_degenerate);
   };
   Part part{other_rule ? step(mirrored(given->nodes)) : step(given), nullptr, nullptr};
   if (part.problem->size() > 0) {
@@ -237,7 +236,6 @@ SolveReport Integrator::solve_stage(std::size_t number, double t, const Vector& 
 
 StepReport Integrator::failed(const SolveReport& report, const StepProblem& problem, double time) {
   first_stage_solved_ = false;  // the problem holds the data of the stage that failed
-  v_ = before_.v;
   for (Part& part : parts_)
     if (part.solver) part.solver->reset();  // pivots chosen for a matrix that led nowhere
   std::ostringstream message;
@@ -316,24 +314,20 @@ StepReport Integrator::take(double h, Guess guess) {
 StepReport Integrator::take_in_pieces(double whole, int pieces, Guess guess) {
   const double start = time();
   size_ = whole / pieces;
-  before_.clock = clock_;
-  before_.q = q_;
-  before_.p = p_;
-  before_.v = v_;
   retryable_ = false;
   double t = start;
   SolveReport total;
   reached_ = 1.0;
-  q_stage_ = q_;
-  p_stage_ = p_;
+  const Vector *q = &q_, *p = &p_;
   for (std::size_t k = 0; k < stages_.size() * static_cast<std::size_t>(pieces); ++k) {
     const std::size_t number = k % stages_.size();
     Stage& stage = stages_[number];
     StepProblem& problem = *parts_[stage.part].problem;
     const double h = stage.fraction * size_;
     if (k > 0 || !first_stage_solved_) {
-      const SolveReport report = solve_stage(number, t, q_stage_, p_stage_, guess);
+      const SolveReport report = solve_stage(number, t, *q, *p, guess);
       if (!report.ok()) {
+        if (k > 0) v_ = before_.v;
         StepReport failure = failed(report, problem, start);
         failure.failure += describe_singularity(problem, stage.solution, *scene_);
         return failure;
@@ -347,13 +341,20 @@ StepReport Integrator::take_in_pieces(double whole, int pieces, Guess guess) {
     problem.finish(stage.solution, q_next_, p_next_, impulse_);
     if (!(q_next_.allFinite() && p_next_.allFinite())) {
       total.status = SolveStatus::not_finite;
+      if (k > 0) v_ = before_.v;
       return failed(total, problem, start);
     }
-    v_ = (q_next_ - q_stage_) / h;
+    if (k == 0) std::swap(before_.v, v_);
+    v_ = (q_next_ - *q) / h;
     std::swap(q_stage_, q_next_);
     std::swap(p_stage_, p_next_);
+    q = &q_stage_;
+    p = &p_stage_;
     t += h;
   }
+  before_.clock = clock_;
+  std::swap(before_.q, q_);
+  std::swap(before_.p, p_);
   std::swap(q_, q_stage_);
   std::swap(p_, p_stage_);
   remember(pieces);
@@ -384,7 +385,11 @@ SolveReport Integrator::project_velocity(double t, const Vector& q, const Vector
 SolveReport Integrator::solve_velocity(double t, Vector& v) {
   const SolveReport report = project_velocity(t, q_, p_, v);
   if (!report.ok() || phase_space_velocity_problem_) return report;
-  acceleration_problem_.begin(t, q_, v);
+  if (!acceleration_problem_) {  // a run that is not read in between does without
+    acceleration_problem_ = std::make_unique<AccelerationProblem>(*scene_, matrices_.full);
+    acceleration_solver_ = solvers_(*acceleration_problem_);
+  }
+  acceleration_problem_->begin(t, q_, v);
   acceleration_unknowns_.setZero();
   acceleration_solver_->reset();
   return acceleration_solver_->solve(acceleration_unknowns_);

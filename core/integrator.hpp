@@ -1,6 +1,7 @@
 #pragma once
 
 #include <diracstep/core/default_method.hpp>
+#include <diracstep/core/matrix_form.hpp>
 #include <diracstep/core/nonlinear_solver.hpp>
 #include <diracstep/core/phase_space_step.hpp>
 #include <diracstep/core/predictor.hpp>
@@ -33,7 +34,7 @@ struct IntegratorOptions {
                   ///< the method's own
   double step = 0.0;  ///< step size, may be negative; must be given
   std::optional<ConstraintRule> constraint_rule = std::nullopt;  ///< instead of the method's own
-  int dense_limit = 40;           ///< systems of up to this many unknowns use full matrices
+  int dense_limit = as_measured;  ///< up to so many unknowns n + m full matrices; see matrix_form()
   bool force_degenerate = false;  ///< use a method on a degenerate scene that is known to be unstable there
   bool project_start = false;     ///< move an inconsistent start onto the constraints instead of refusing it
   bool drop_dependent_rows =
@@ -217,11 +218,12 @@ class Integrator {
   std::vector<PlanLine> preparation_;
   IntegratorOptions options_;
   Method method_;
-  bool dense_;
+  MatrixForm matrices_;
   std::vector<Part> parts_;
   std::vector<Stage> stages_;
+  SolverFactory solvers_;
   VelocityProblem velocity_problem_;
-  AccelerationProblem acceleration_problem_;
+  std::unique_ptr<AccelerationProblem> acceleration_problem_;  ///< made when it is needed first
   std::optional<PhaseSpaceVelocityProblem>
       phase_space_velocity_problem_;  ///< instead of both, where L is linear in v
   std::unique_ptr<NonlinearSolver> velocity_solver_;
@@ -237,7 +239,7 @@ class Integrator {
   struct {
     Clock clock;
     Vector q, p, v;
-  } before_;                  ///< where the last step started
+  } before_;                  ///< where the last step started; v also while one is under way
   bool retryable_ = false;    ///< before_ is known
   bool unlearned_ = false;    ///< the predictors have not seen the last step yet
   bool on_a_motion_ = false;  ///< the start was given by restart(), so that v_ is near the velocity there

@@ -15,8 +15,9 @@ std::vector<PlanLine> Integrator::plan() const {
     lines.push_back({"nonlinear solver", "left out", "the step is explicit and no rows bind"});
   if (part.solver) {
     const int nonzeros = part.problem->pattern().nonzeros();
-    lines.push_back({"Jacobian", dense_ ? "full" : "sparse",
-                     std::to_string(size) + " unknowns, " + std::to_string(nonzeros) + " entries"});
+    lines.push_back(
+        {"Jacobian", matrices_.full ? "full" : "sparse",
+         std::to_string(size) + " unknowns, " + std::to_string(nonzeros) + " entries: " + matrices_.reason});
   }
   if (m == 0) {
     lines.push_back({"multipliers", "left out", "the scene has no rows"});

@@ -16,21 +16,33 @@ SparsityPattern SparsityPattern::dense(int rows, int columns) {
   return pattern;
 }
 
-SparsityPattern::SparsityPattern(int rows, int columns, std::vector<std::pair<int, int>> entries)
-    : rows_(rows), column_starts_(static_cast<std::size_t>(columns) + 1, 0) {
-  std::ranges::sort(entries, [](const auto& a, const auto& b) {
-    return std::pair(a.second, a.first) < std::pair(b.second, b.first);
-  });
-  entries.erase(std::unique(entries.begin(), entries.end()), entries.end());
-  row_indices_.reserve(entries.size());
+SparsityPattern::SparsityPattern(int rows, int columns, const std::vector<std::pair<int, int>>& entries)
+    : rows_(rows), column_starts_(static_cast<std::size_t>(columns) + 1, 0), row_indices_(entries.size()) {
   for (const auto& [row, column] : entries) {
     if (row < 0 || row >= rows || column < 0 || column >= columns)
       throw Misuse("sparsity pattern: entry (" + std::to_string(row) + ", " + std::to_string(column) +
                    ") lies outside a " + std::to_string(rows) + " by " + std::to_string(columns) + " matrix");
     ++column_starts_[static_cast<std::size_t>(column) + 1];
-    row_indices_.push_back(row);
   }
   std::partial_sum(column_starts_.begin(), column_starts_.end(), column_starts_.begin());
+  std::vector<int> next(column_starts_.begin(), column_starts_.end() - 1);
+  for (const auto& [row, column] : entries)
+    row_indices_[static_cast<std::size_t>(next[static_cast<std::size_t>(column)]++)] = row;
+  sort_columns();
+}
+
+/// Rows in ascending order, each one once.
+void SparsityPattern::sort_columns() {
+  auto kept = row_indices_.begin(), first = kept;
+  for (std::size_t j = 1; j < column_starts_.size(); ++j) {
+    const auto last = row_indices_.begin() + column_starts_[j];
+    std::sort(first, last);
+    kept = std::copy(first, std::unique(first, last), kept);
+    column_starts_[j] = static_cast<int>(kept - row_indices_.begin());
+    first = last;
+  }
+  row_indices_.erase(kept, row_indices_.end());
+  row_indices_.shrink_to_fit();
 }
 
 int SparsityPattern::position(int row, int column) const {
@@ -145,13 +157,14 @@ SparsityPattern BlockPattern::assemble(bool dense) {
   std::vector<std::pair<int, int>> all;
   for (const auto& entries : entries_) all.insert(all.end(), entries.begin(), entries.end());
   const SparsityPattern whole =
-      dense ? SparsityPattern::dense(rows_, columns_) : SparsityPattern(rows_, columns_, std::move(all));
+      dense ? SparsityPattern::dense(rows_, columns_) : SparsityPattern(rows_, columns_, all);
   for (const auto& entries : entries_) {
     auto& positions = positions_.emplace_back();
     positions.reserve(entries.size());
     for (const auto& [row, column] : entries) positions.push_back(whole.position(row, column));
   }
   entries_.clear();
+  entries_.shrink_to_fit();
   return whole;
 }
 

@@ -16,7 +16,7 @@ class SparsityPattern {
   static SparsityPattern dense(int rows, int columns);
 
   /// From (row, column) pairs in any order; repeated pairs count once.
-  SparsityPattern(int rows, int columns, std::vector<std::pair<int, int>> entries);
+  SparsityPattern(int rows, int columns, const std::vector<std::pair<int, int>>& entries);
 
   int rows() const { return rows_; }
   int columns() const { return static_cast<int>(column_starts_.size()) - 1; }
@@ -51,6 +51,8 @@ class SparsityPattern {
   bool operator==(const SparsityPattern&) const = default;
 
  private:
+  void sort_columns();
+
   int rows_ = 0;
   std::vector<int> column_starts_;
   std::vector<int> row_indices_;

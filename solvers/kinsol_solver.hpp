@@ -47,9 +47,9 @@ const char* name(Iteration iteration);
 Iteration iteration(const std::string& name);
 
 /// Solves nonlinear problems with SUNDIALS KINSOL: Newton's method with exact Jacobians, and once more with a
-/// line search where that fails.  Full patterns are factored densely, others with KLU.  The factory throws
-/// Misuse for a sparse problem where the library was built without KLU, and std::runtime_error where SUNDIALS
-/// cannot set itself up.
+/// line search where that fails.  Full patterns are factored densely, others with KLU, or with full matrices
+/// and Eigen's sparse LU where the library was built without it.  The factory throws std::runtime_error where
+/// SUNDIALS cannot set itself up.
 SolverFactory kinsol(KinsolOptions options = {});
 
 }  // namespace diracstep

@@ -46,10 +46,9 @@ JacobianFactors::Factors& JacobianFactors::add() {
 void JacobianFactors::reset() {
   factors_.resize(1);
   factors_.front().parameter = none;
-  factors_.front().factored = false;
+  factors_.front().factored = factors_.front().usable = false;
   factors_.front().solver->reset();
   current_ = &factors_.front();
-  usable_ = false;
   fresh_starts_ = 0;
 }
 
@@ -57,11 +56,11 @@ void JacobianFactors::save(Snapshot& to) const {
   if (!keeps_factors()) return factors_.front().solver->save(to);
   to.put(static_cast<double>(factors_.size()));
   to.put(static_cast<double>(current_ - factors_.data()));
-  to.put(usable_ ? 1.0 : 0.0);
   to.put(fresh_starts_);
   for (const Factors& kept : factors_) {
     kept.solver->save(to);
     to.put(kept.factored ? 1.0 : 0.0);
+    to.put(kept.usable ? 1.0 : 0.0);
     if (!kept.factored) continue;
     to.put(kept.values);
     if (constant_) to.put(kept.parameter);
@@ -74,13 +73,13 @@ void JacobianFactors::restore(Snapshot& from) {
   const long most = most_parameters;
   const long count = from.whole_number(most), current = from.whole_number(most);
   if (count < 1 || current >= count) throw Misuse("the snapshot has no factors of a Jacobian");
-  usable_ = from.whole_number(1) == 1;
   fresh_starts_ = static_cast<int>(from.whole_number(fresh_starts_after_failure));
   while (std::ssize(factors_) < count) add();
   current_ = factors_.data() + current;
   for (Factors& kept : factors_) {
     kept.solver->restore(from);
     kept.factored = from.whole_number(1) == 1;
+    kept.usable = from.whole_number(1) == 1;
     if (!kept.factored) continue;
     from.read(kept.values);
     if (constant_) kept.parameter = from.number();
@@ -109,7 +108,7 @@ void JacobianFactors::begin() {
 }
 
 bool JacobianFactors::wanted(double norm) {
-  if (!usable_) return true;
+  if (!current_->usable) return true;
   const bool too_slow = iterations_ > 0 && norm * std::pow(norm / last_norm_, patience) > done;
   switch (policy_) {
     case JacobianPolicy::per_step:
@@ -124,18 +123,17 @@ bool JacobianFactors::wanted(double norm) {
 
 JacobianFactors::Outcome JacobianFactors::prepare(ConstVectorRef x, double norm) {
   const bool wanted_now =
-      constant_ ? !select(problem_.constant_jacobian_parameter()) || !usable_ : wanted(norm);
+      constant_ ? !select(problem_.constant_jacobian_parameter()) || !current_->usable : wanted(norm);
   last_norm_ = norm;
   ++iterations_;
   if (!wanted_now) return Outcome::ready;
   ++evaluations_;
-  usable_ = false;
-  current_->factored = false;
+  current_->factored = current_->usable = false;
   problem_.jacobian(x, current_->values);
   if (!current_->values.allFinite()) return Outcome::not_finite;
   current_->factored = true;
-  usable_ = current_->solver->factor(current_->values.data());
-  return usable_ ? Outcome::ready : Outcome::singular;
+  current_->usable = current_->solver->factor(current_->values.data());
+  return current_->usable ? Outcome::ready : Outcome::singular;
 }
 
 std::string JacobianFactors::policy() const {

@@ -41,6 +41,7 @@ class JacobianFactors {
     std::unique_ptr<LinearSolver> solver;
     Vector values;          ///< of the Jacobian factored last
     bool factored = false;  ///< since reset()
+    bool usable = false;    ///< and not singular
   };
 
   bool wanted(double norm);
@@ -56,7 +57,6 @@ class JacobianFactors {
   double last_norm_ = 0.0;
   int evaluations_ = 0, iterations_ = 0;
   int fresh_starts_ = 0;  ///< so many solves more begin with a new Jacobian, since an old one failed
-  bool usable_ = false;
 };
 
 }  // namespace diracstep::detail

@@ -25,7 +25,12 @@ class LinearSolver {
   virtual const char* name() const = 0;
 };
 
-/// Dense LU for full patterns, KLU for the others.
+/// For full matrices, column by column.
+std::unique_ptr<LinearSolver> make_dense_lu(int size);
+/// KLU; without it a general sparse LU, or a full one where that is quicker.  The pattern outlives the
+/// solver.
+std::unique_ptr<LinearSolver> make_sparse_lu(const SparsityPattern& pattern);
+/// The dense one for full patterns, the sparse one for the others.
 std::unique_ptr<LinearSolver> make_linear_solver(const SparsityPattern& pattern);
 
 }  // namespace diracstep::detail

@@ -24,6 +24,18 @@ TEST_F(RunCommand, WritesTheTrajectoryAsCsv) {
   EXPECT_DOUBLE_EQ(std::stod(fields(all[11])[0]), 1.0);
 }
 
+TEST_F(RunCommand, OfALargeSceneTheFirstCoordinatesAndTheLastAreShown) {
+  const std::string chain = "run hanging_chain --method type1/midpoint --end 0.01";
+  const Outcome outcome = run(chain);
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  for (const char* part : {"\nx_8 ", "\ny_64 ", "119 of 128 coordinates left out",
+                           "force of row link_8:", "55 of 64 rows left out", "force of row link_64:"})
+    EXPECT_NE(outcome.out.find(part), std::string::npos) << part << " is missing in\n" << outcome.out;
+  EXPECT_LT(lines(outcome.out).size(), 40u);
+  EXPECT_EQ(Json::parse(run(chain + " --json").out)["end"]["q"].size(), 128u);
+  EXPECT_EQ(run("run hanging_chain --set N=12 --end 0.01").out.find("left out"), std::string::npos);
+}
+
 TEST_F(RunCommand, NumbersInTheCsvReadBackExactly) {
   const Outcome outcome = run("run knife_edge --step 0.1 --end 1 --json --out " + path("k.csv"));
   ASSERT_EQ(outcome.status, 0) << outcome.err;

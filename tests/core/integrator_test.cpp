@@ -761,7 +761,6 @@ TEST(Plan, NamesTheUnknownsAndTheSolver) {
   expect_parts(decision(testing::mixed(), options, "nonlinear solver"), {"KINSOL", "dense"});
   const IntegratorOptions sparse{.method = "type1/trapezoidal", .step = 0.1, .dense_limit = 0};
   EXPECT_EQ(decision(testing::mixed(), sparse, "Jacobian"), "sparse");
-  expect_parts(decision(testing::mixed(), sparse, "nonlinear solver"), {"KINSOL", "KLU"});
 }
 
 TEST(Plan, ExplicitStepsLeaveOutTheSolver) {

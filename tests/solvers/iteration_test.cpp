@@ -107,6 +107,19 @@ TEST(JacobianPolicy, ConstantJacobianIsFactoredOnceForEachParameter) {
   EXPECT_NE(solver->strategy().find("constant"), std::string::npos);
 }
 
+TEST(JacobianPolicy, SingularFactorsOfOneParameterAreNotTakenAfterThoseOfAnother) {
+  Ring problem(6, 0.0);
+  const auto solver = kinsol()(problem);
+  Vector x = Vector::Zero(6);
+  for (int k = 0; k < 3; ++k) {
+    problem.scale = 0.0;
+    EXPECT_EQ(solver->solve(x).status, SolveStatus::singular_jacobian) << k;
+    problem.scale = 0.5;
+    EXPECT_TRUE(solver->solve(x).ok()) << k;
+    EXPECT_LT(problem.residual_norm(x), 1e-14) << k;
+  }
+}
+
 TEST(JacobianPolicy, KeptJacobianIsReplacedWhereItFails) {
   Ring problem(6, 0.05);
   const auto solver = kinsol({.jacobian = JacobianPolicy::kept})(problem);

@@ -32,15 +32,39 @@ Json end_json(const RunResult& result, const Scene& scene) {
           {"energy", number(result.end.energy)}};
 }
 
+/// Of a large scene the first few coordinates and rows are shown, and the last one.
+constexpr int most_shown = 24, first_shown = 8;
+
+/// Calls show(k) for those of `count` that are shown, in order, and leave_out(how many) for those between.
+template <class Show, class LeaveOut>
+void for_shown(int count, const Show& show, const LeaveOut& leave_out) {
+  const int first = count <= most_shown ? count : first_shown;
+  for (int k = 0; k < first; ++k) show(k);
+  if (first == count) return;
+  leave_out(count - first - 1);
+  show(count - 1);
+}
+
 std::string end_table(const Sample& end, const Scene& scene) {
   std::vector<std::vector<std::string>> rows{{"", "q", "v", "p"}};
-  for (int i = 0; i < scene.dimension(); ++i)
+  std::string left_out;
+  const auto coordinate = [&](int i) {
     rows.push_back({scene.coordinates[static_cast<std::size_t>(i)], fmt::format("{:.15g}", end.q[i]),
                     fmt::format("{:.15g}", end.v[i]), fmt::format("{:.15g}", end.p[i])});
-  std::string text = aligned(rows);
+  };
+  for_shown(scene.dimension(), coordinate, [&](int count) {
+    rows.push_back({"…", "", "", ""});
+    left_out = fmt::format("{} of {} coordinates left out; --json and --out have them all\n", count,
+                           scene.dimension());
+  });
+  std::string text = aligned(rows) + left_out;
   const auto names = scene.row_names();
-  for (int r = 0; r < scene.rows(); ++r)
-    text += fmt::format("force of row {}: {:.15g}\n", names[static_cast<std::size_t>(r)], end.lambda[r]);
+  for_shown(
+      scene.rows(),
+      [&](int r) {
+        text += fmt::format("force of row {}: {:.15g}\n", names[static_cast<std::size_t>(r)], end.lambda[r]);
+      },
+      [&](int count) { text += fmt::format("… {} of {} rows left out\n", count, scene.rows()); });
   return text;
 }
 
