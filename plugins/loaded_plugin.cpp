@@ -6,6 +6,7 @@
 #include <diracstep/plugins/callback_function.hpp>
 #include <diracstep/plugins/callback_scene.hpp>
 #include <diracstep/plugins/loaded_plugin.hpp>
+#include <diracstep/plugins/shared_object.hpp>
 
 namespace diracstep {
 
@@ -76,6 +77,8 @@ StepRule rule_from(const diracstep_rule& rule, const std::string& owner) {
 std::shared_ptr<const void> open(const fs::path& file, const std::string& owner) {
   std::error_code ignored;
   require(fs::exists(file, ignored), owner, "there is no such file");
+  const std::string damage = damage_of(file);
+  require(damage.empty(), owner, "it cannot be loaded: " + damage);
   void* const handle = dlopen(fs::absolute(file).c_str(), RTLD_NOW | RTLD_LOCAL);
   if (handle == nullptr)
     throw Misuse(owner + ": it cannot be loaded: " + text_or(dlerror(), "no reason given"));

@@ -34,7 +34,8 @@ void BranchDoubt::look(const Integrator& integrator) {
   if (!(turn > sharp_turn * largest_speed_) || !rows_depend_on_the_way(integrator)) return;
   watched_ = false;
   text_ = fmt::format(
-      "within a step before t = {:g} the velocity turned by {:.0f} % of the largest so far, at a pose where the "
+      "within a step before t = {:g} the velocity turned by {:.0f} % of the largest so far, at a pose where "
+      "the "
       "rows may depend on each other: the motion may have left its branch there; compare with a smaller step",
       integrator.time(), 100.0 * turn / largest_speed_);
 }
@@ -48,7 +49,8 @@ bool BranchDoubt::rows_depend_on_the_way(const Integrator& integrator) {
   const Eigen::MatrixXd after = rows_.pattern().full(rows_.coefficients());
   rows_.evaluate(t - h, integrator.position() - h * integrator.rough_velocity());
   const Eigen::MatrixXd before = rows_.pattern().full(rows_.coefficients());
-  const Eigen::MatrixXd ratio = (before * before.transpose()).partialPivLu().solve(before * after.transpose());
+  const Eigen::MatrixXd ratio =
+      (before * before.transpose()).partialPivLu().solve(before * after.transpose());
   if (!ratio.allFinite()) return true;
   const Eigen::VectorXcd eigenvalues = ratio.eigenvalues();
   return std::ranges::any_of(eigenvalues, [](const std::complex<double>& value) {

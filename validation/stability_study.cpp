@@ -7,8 +7,8 @@
 #include <diracstep/core/consistent_start.hpp>
 #include <diracstep/core/errors.hpp>
 #include <diracstep/core/run.hpp>
-#include <diracstep/validation/run_doubt.hpp>
 #include <diracstep/validation/ida_reference.hpp>
+#include <diracstep/validation/run_doubt.hpp>
 #include <diracstep/validation/stability_study.hpp>
 #include <diracstep/validation/study_run.hpp>
 #include <diracstep/validation/work_precision.hpp>
@@ -116,11 +116,7 @@ class CaseRun {
  public:
   CaseRun(const StabilityCase& that, Integrator& integrator, StabilityRow& row,
           const std::function<bool()>& going_on)
-      : case_(that),
-        integrator_(integrator),
-        row_(row),
-        going_on_(going_on),
-        truth_(truth_of(that)) {
+      : case_(that), integrator_(integrator), row_(row), going_on_(going_on), truth_(truth_of(that)) {
     for (const Watch& watch : that.watches) watching_.emplace_back(watch, integrator.scene().start);
   }
 

@@ -22,7 +22,8 @@ void StepDoubt::halve(Integrator& integrator) {
   next_look_ += between_looks_;
   start_time_ = integrator.time();
   start_ = integrator.position();
-  longest_way_ = std::max(longest_way_, std::abs(integrator.options().step) * max_norm(integrator.rough_velocity()));
+  longest_way_ =
+      std::max(longest_way_, std::abs(integrator.options().step) * max_norm(integrator.rough_velocity()));
   const Snapshot state = integrator.save();
   const double half = 0.5 * integrator.options().step;
   halved_ = integrator.step(half).ok() && integrator.step(half).ok();

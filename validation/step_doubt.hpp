@@ -14,8 +14,8 @@ namespace diracstep {
 ///
 /// and doubted above a quarter: methods of order 1 stay below at h times the pace of the motion of 1, the
 /// others at more.  Needs no energy, so that it also sees forced and driven scenes.  The halves are taken
-/// between Integrator::save and restore: the run keeps its bits.  Silence proves nothing: a short event between
-/// the looks is not seen.
+/// between Integrator::save and restore: the run keeps its bits.  Silence proves nothing: a short event
+/// between the looks is not seen.
 class StepDoubt {
  public:
   /// For a run to step number `steps`.

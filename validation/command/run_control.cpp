@@ -6,8 +6,8 @@
 #include <diracstep/validation/command/interrupt.hpp>
 #include <diracstep/validation/command/run_control.hpp>
 #include <diracstep/validation/convergence_study.hpp>
-#include <diracstep/validation/run_doubt.hpp>
 #include <diracstep/validation/progress.hpp>
+#include <diracstep/validation/run_doubt.hpp>
 
 namespace diracstep::command {
 
