@@ -14,6 +14,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr int most_inner_columns = 1000;
+
 std::string text_or(const char* text, const char* otherwise) { return text != nullptr ? text : otherwise; }
 
 void require(bool condition, const std::string& owner, const std::string& what) {
@@ -54,8 +56,9 @@ void require_usable(const diracstep_method& method, const std::string& owner) {
   require(method.order >= 1 && method.constrained_order >= 0, owner,
           "it claims order " + std::to_string(method.order) + " and constrained order " +
               std::to_string(method.constrained_order) + "; 1 or more, and 0 or more, are allowed");
-  require(method.inner_columns >= 0, owner,
-          "it has " + std::to_string(method.inner_columns) + " inner columns; 0 or more are allowed");
+  require(method.inner_columns >= 0 && method.inner_columns <= most_inner_columns, owner,
+          "it has " + std::to_string(method.inner_columns) + " inner columns; 0 to " +
+              std::to_string(most_inner_columns) + " are allowed");
   require(method.value != nullptr || method.gradient != nullptr, owner,
           "value and gradient are NULL; one of them is the least to give");
   require((method.create == nullptr) == (method.destroy == nullptr), owner,
