@@ -339,6 +339,8 @@ StepReport Integrator::take_in_pieces(double whole, int pieces, Guess guess) {
       total.residual_norms = report.residual_norms;
     }
     problem.finish(stage.solution, q_next_, p_next_, impulse_);
+    if (scene_->rows() > 0 && guess == Guess::predicted && stage.predictor.ready())
+      keep_straight_on(stage, h, total);
     if (!(q_next_.allFinite() && p_next_.allFinite())) {
       total.status = SolveStatus::not_finite;
       if (k > 0) v_ = before_.v;

@@ -51,7 +51,9 @@ struct IntegratorOptions {
 /// the plain guess, from the last solution, and by following the solution from small step sizes on
 /// (step_continuation.hpp); then, where the options allow it, the step is taken in smaller ones.  A solution
 /// far from its guess, or the first of a run, is compared with the one that smaller steps lead to, which is
-/// taken where it is another.
+/// taken where it is another.  On a scene with rows, a solution that turns the velocity sharply is compared
+/// with the one found from a guess straight on, which is taken where it turns less: where rows come near to
+/// depending on each other, motions branch, and Newton's method may end on another branch.
 struct [[nodiscard]] StepReport {
   SolveReport solve;
   long step = 0;        ///< number of the step, from 0
@@ -203,6 +205,12 @@ class Integrator {
   bool doubtful(const Stage& stage, Interval step, const Vector& q, const Vector& p,
                 const SolveReport& report);
   SolveReport follow_stage(Stage& stage, Interval step, const Vector& q, const Vector& p, SolveReport found);
+  /// How the velocity changes from the last step (or part of one) to the one from q_stage_ to q_next_.
+  struct Turn {
+    double size, speed;
+  };
+  Turn turn(double h) const;
+  void keep_straight_on(Stage& stage, double h, SolveReport& total);
   void count(const SolveReport& report, long solves = 1);
   void forget();
   void compensate();

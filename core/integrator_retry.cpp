@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <diracstep/core/integrator.hpp>
 #include <diracstep/core/scales.hpp>
@@ -14,6 +15,8 @@ constexpr int old_jacobian_iterations = 3;
 constexpr double far_from_guess = 0.1;
 /// Solutions so far apart are different ones.
 constexpr double another_solution = 1e-6;
+/// A velocity that changes by more than this part of itself within a step turns sharply.
+constexpr double sharp_turn = 0.5;
 
 }  // namespace
 
@@ -90,6 +93,38 @@ SolveReport Integrator::follow_stage(Stage& stage, Interval step, const Vector& 
   found.status = SolveStatus::ok;
   found.residual_norms = path.report.residual_norms;
   return found;
+}
+
+Integrator::Turn Integrator::turn(double h) const {
+  Turn turn{0.0, 0.0};
+  for (Eigen::Index i = 0; i < v_.size(); ++i) {
+    const double v = (q_next_[i] - q_stage_[i]) / h;
+    turn.size = std::max(turn.size, std::abs(v - v_[i]));
+    turn.speed = std::max({turn.speed, std::abs(v), std::abs(v_[i])});
+  }
+  return turn;
+}
+
+/// A solved stage that turns sharply is solved again from the guess along the last velocity; that solution is
+/// taken where it is another one that turns less.
+void Integrator::keep_straight_on(Stage& stage, double h, SolveReport& total) {
+  Part& part = parts_[stage.part];
+  const Turn found = turn(h);
+  if (!part.solver || !(found.size > sharp_turn * found.speed)) return;
+  if (!std::isnan(part.problem->constant_jacobian_parameter())) return;  // affine: one solution
+  ++work_.retries.plain_guesses;
+  part.problem->guess(v_, guess_);
+  const bool solved = solve(part, guess_, total).ok();
+  total.status = SolveStatus::ok;
+  if (solved && part.continuation->distance(q_stage_, stage.solution, guess_) > another_solution) {
+    part.problem->finish(guess_, q_next_, p_next_, impulse_);
+    if (turn(h).size < found.size) {
+      ++work_.retries.other_branches;
+      stage.solution = guess_;
+      return;
+    }
+  }
+  part.problem->finish(stage.solution, q_next_, p_next_, impulse_);
 }
 
 }  // namespace diracstep

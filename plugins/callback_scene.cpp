@@ -7,11 +7,23 @@ namespace diracstep {
 
 namespace {
 
+constexpr int most_entries = 1 << 30;  ///< of a full matrix
+
 /// What every object made of callbacks keeps.
 struct Origin {
   std::string owner;
   std::shared_ptr<const void> library;
 };
+
+void require(bool condition, const std::string& owner, const std::string& what) {
+  if (!condition) throw Misuse(owner + ": " + what);
+}
+
+/// The k-th of the names given, which none of them may lack.
+std::string name_of(const char* const* names, int k, const std::string& owner, const char* what) {
+  require(names[k] != nullptr, owner, std::string(what) + " " + std::to_string(k + 1) + " has no name");
+  return names[k];
+}
 
 PhaseStructure structure_from(int bits) {
   return {.separable = (bits & DIRACSTEP_SEPARABLE) != 0,
@@ -69,10 +81,10 @@ class CallbackLagrangian final : public Lagrangian {
   JacobianByDifferences differences_;
 };
 
-std::vector<std::string> row_names(const diracstep_rows& rows) {
+std::vector<std::string> row_names(const diracstep_rows& rows, const std::string& owner) {
   std::vector<std::string> names;
   for (int r = 0; r < rows.rows; ++r)
-    names.push_back(rows.names != nullptr ? rows.names[r] : std::to_string(r + 1));
+    names.push_back(rows.names != nullptr ? name_of(rows.names, r, owner, "row") : std::to_string(r + 1));
   return names;
 }
 
@@ -81,7 +93,7 @@ class CallbackRows final : public ConstraintRows {
  public:
   CallbackRows(const diracstep_rows& rows, const SparsityPattern& pattern, Origin origin)
       : ConstraintRows(rows.holonomic != 0, pattern, PatternProduct(pattern, true, pattern, false).pattern(),
-                       row_names(rows)),
+                       row_names(rows, origin.owner)),
         rows_(rows),
         origin_(std::move(origin)),
         by_rows_(pattern),
@@ -159,10 +171,6 @@ class CallbackForce final : public Force {
   JacobianByDifferences differences_;
 };
 
-void require(bool condition, const std::string& owner, const std::string& what) {
-  if (!condition) throw Misuse(owner + ": " + what);
-}
-
 std::shared_ptr<const ConstraintRows> rows_from(const diracstep_rows* rows, int n, const Origin& origin) {
   require(rows != nullptr, origin.owner, "a block of rows is NULL");
   require(rows->rows > 0, origin.owner,
@@ -173,10 +181,11 @@ std::shared_ptr<const ConstraintRows> rows_from(const diracstep_rows* rows, int 
   return std::make_shared<const CallbackRows>(*rows, pattern, origin);
 }
 
-std::vector<std::string> coordinate_names(const diracstep_scene& scene) {
+std::vector<std::string> coordinate_names(const diracstep_scene& scene, const std::string& owner) {
   std::vector<std::string> names;
   for (int i = 0; i < scene.dimension; ++i)
-    names.push_back(scene.coordinates != nullptr ? scene.coordinates[i] : "q" + std::to_string(i + 1));
+    names.push_back(scene.coordinates != nullptr ? name_of(scene.coordinates, i, owner, "coordinate")
+                                                 : "q" + std::to_string(i + 1));
   return names;
 }
 
@@ -184,16 +193,20 @@ std::vector<std::string> coordinate_names(const diracstep_scene& scene) {
 
 SparsityPattern pattern_from(const diracstep_pattern& pattern, int rows, int columns,
                              const std::string& owner) {
+  if (pattern.column_starts == nullptr)
+    require(rows <= most_entries / columns, owner,
+            "a matrix of " + std::to_string(rows) + " by " + std::to_string(columns) +
+                " is too large to be full");
   if (pattern.column_starts == nullptr) return SparsityPattern::dense(rows, columns);
   require(pattern.row_indices != nullptr, owner, "the pattern has column_starts and no row_indices");
   require(pattern.column_starts[0] == 0, owner, "the pattern's column_starts do not begin with 0");
   std::vector<std::pair<int, int>> entries;
   for (int column = 0; column < columns; ++column) {
-    const int begin = pattern.column_starts[column], end = pattern.column_starts[column + 1];
+    const long begin = pattern.column_starts[column], end = pattern.column_starts[column + 1];
     require(begin <= end && end - begin <= rows, owner,
             "the pattern's column " + std::to_string(column) + " has " + std::to_string(end - begin) +
                 " entries; 0 to " + std::to_string(rows) + " are allowed");
-    for (int k = begin; k < end; ++k) {
+    for (long k = begin; k < end; ++k) {
       const int row = pattern.row_indices[k];
       require(row >= 0 && row < rows && (k == begin || row > pattern.row_indices[k - 1]), owner,
               "the pattern's column " + std::to_string(column) + " has row " + std::to_string(row) +
@@ -218,7 +231,7 @@ Scene scene_from(const diracstep_scene& scene, const std::string& owner,
   const int n = scene.dimension;
   Scene made;
   made.name = scene.name != nullptr ? scene.name : "scene";
-  made.coordinates = coordinate_names(scene);
+  made.coordinates = coordinate_names(scene, owner);
   made.lagrangian = std::make_shared<const CallbackLagrangian>(*scene.lagrangian, n, origin);
   for (int b = 0; b < scene.row_blocks; ++b) made.constraints.push_back(rows_from(scene.rows[b], n, origin));
   if (scene.force != nullptr) made.force = std::make_shared<const CallbackForce>(*scene.force, n, origin);

@@ -6,12 +6,15 @@
 #include <diracstep/plugins/callback_function.hpp>
 #include <diracstep/plugins/callback_scene.hpp>
 #include <diracstep/plugins/loaded_plugin.hpp>
+#include <diracstep/plugins/shared_object.hpp>
 
 namespace diracstep {
 
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr int most_inner_columns = 1000;
 
 std::string text_or(const char* text, const char* otherwise) { return text != nullptr ? text : otherwise; }
 
@@ -53,8 +56,9 @@ void require_usable(const diracstep_method& method, const std::string& owner) {
   require(method.order >= 1 && method.constrained_order >= 0, owner,
           "it claims order " + std::to_string(method.order) + " and constrained order " +
               std::to_string(method.constrained_order) + "; 1 or more, and 0 or more, are allowed");
-  require(method.inner_columns >= 0, owner,
-          "it has " + std::to_string(method.inner_columns) + " inner columns; 0 or more are allowed");
+  require(method.inner_columns >= 0 && method.inner_columns <= most_inner_columns, owner,
+          "it has " + std::to_string(method.inner_columns) + " inner columns; 0 to " +
+              std::to_string(most_inner_columns) + " are allowed");
   require(method.value != nullptr || method.gradient != nullptr, owner,
           "value and gradient are NULL; one of them is the least to give");
   require((method.create == nullptr) == (method.destroy == nullptr), owner,
@@ -76,6 +80,8 @@ StepRule rule_from(const diracstep_rule& rule, const std::string& owner) {
 std::shared_ptr<const void> open(const fs::path& file, const std::string& owner) {
   std::error_code ignored;
   require(fs::exists(file, ignored), owner, "there is no such file");
+  const std::string damage = damage_of(file);
+  require(damage.empty(), owner, "it cannot be loaded: " + damage);
   void* const handle = dlopen(fs::absolute(file).c_str(), RTLD_NOW | RTLD_LOCAL);
   if (handle == nullptr)
     throw Misuse(owner + ": it cannot be loaded: " + text_or(dlerror(), "no reason given"));

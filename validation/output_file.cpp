@@ -42,10 +42,16 @@ OutputFile::~OutputFile() {
 }
 
 void OutputFile::write(std::string_view bytes) {
+  const off_t begin = ::lseek(descriptor_, 0, SEEK_CUR);  // -1 for a pipe
   while (!bytes.empty()) {
     const ssize_t written = ::write(descriptor_, bytes.data(), bytes.size());
     if (written < 0 && errno == EINTR) continue;
-    if (written < 0) refuse("could not be written in full");
+    if (written < 0) {
+      const int error = errno;
+      if (begin >= 0 && ::ftruncate(descriptor_, begin) == 0) ::lseek(descriptor_, begin, SEEK_SET);
+      errno = error;
+      refuse("could not be written in full");
+    }
     bytes.remove_prefix(static_cast<std::size_t>(written));
   }
 }
@@ -83,12 +89,32 @@ void OutputFile::refuse(const char* what) const {
   throw std::runtime_error(fmt::format("'{}' {}: {}", path_, what, std::strerror(errno)));
 }
 
-void replace_file(const std::string& path, std::string_view bytes) {
-  OutputFile file(path + ".new", OutputFile::Mode::fresh);
+namespace {
+
+void write_once(const std::string& path, std::string_view bytes, bool lasting) {
+  OutputFile file(path, OutputFile::Mode::fresh);
   file.write(bytes);
-  file.sync();
+  if (lasting) file.sync();
   file.close();
-  if (std::rename(file.path().c_str(), path.c_str()) != 0)
+}
+
+}  // namespace
+
+void replace_file(const std::string& given, std::string_view bytes) {
+  namespace fs = std::filesystem;
+  std::error_code none;
+  const fs::file_status status = fs::status(given, none);
+  if (fs::exists(status) && !fs::is_regular_file(status)) return write_once(given, bytes, false);
+  const std::string path =
+      fs::is_symlink(given, none) && fs::exists(status) ? fs::canonical(given, none).string() : given;
+  const std::string fresh = path + ".new";
+  try {
+    write_once(fresh, bytes, true);
+  } catch (const std::runtime_error&) {
+    fs::remove(fresh, none);
+    throw;
+  }
+  if (std::rename(fresh.c_str(), path.c_str()) != 0)
     throw std::runtime_error(fmt::format("'{}' could not be replaced: {}", path, std::strerror(errno)));
   sync_folder_of(path);
 }

@@ -117,16 +117,16 @@ void add_kepler(Cases& cases, bool full) {
   }
 }
 
-/// Largest distance of a window of n_four_bar from the shape in which all uprights are parallel.
+/// Largest distance of n_four_bar from the shape in which all uprights are parallel; its coordinates are
+/// x_0, y_0, x_1, y_1, …
 Watch parallel_watch() {
   return {.name = "uprights not parallel",
           .at =
               [](double, ConstVectorRef q, ConstVectorRef) {
-                const Eigen::Index n = q.size() / 2;
                 double away = 0.0;
-                for (Eigen::Index j = 1; j < n; ++j)
-                  away = std::max(
-                      {away, std::abs(q[j] - static_cast<double>(j) - q[0]), std::abs(q[n + j] - q[n])});
+                for (Eigen::Index j = 1; 2 * j < q.size(); ++j)
+                  away = std::max({away, std::abs(q[2 * j] - static_cast<double>(j) - q[0]),
+                                   std::abs(q[2 * j + 1] - q[1])});
                 return away;
               },
           .bound = 1e-3};

@@ -7,8 +7,8 @@
 #include <diracstep/core/consistent_start.hpp>
 #include <diracstep/core/errors.hpp>
 #include <diracstep/core/run.hpp>
-#include <diracstep/validation/energy_doubt.hpp>
 #include <diracstep/validation/ida_reference.hpp>
+#include <diracstep/validation/run_doubt.hpp>
 #include <diracstep/validation/stability_study.hpp>
 #include <diracstep/validation/study_run.hpp>
 #include <diracstep/validation/work_precision.hpp>
@@ -116,37 +116,56 @@ class CaseRun {
  public:
   CaseRun(const StabilityCase& that, Integrator& integrator, StabilityRow& row,
           const std::function<bool()>& going_on)
-      : case_(that),
-        integrator_(integrator),
-        row_(row),
-        going_on_(going_on),
-        truth_(truth_of(that)),
-        doubt_(integrator.scene()) {
+      : case_(that), integrator_(integrator), row_(row), going_on_(going_on), truth_(truth_of(that)) {
     for (const Watch& watch : that.watches) watching_.emplace_back(watch, integrator.scene().start);
   }
 
   void run(long steps) {
     const double before = thread_seconds();
-    const RunReport report =
-        diracstep::run(integrator_, steps, Momentum::projected, std::max(1L, steps / points_read),
-                       [&](const Sample& sample) { return see(sample); });
+    const StepReport last = step_to(steps);
     row_.cpu_seconds = thread_seconds() - before;
     row_.steps = integrator_.work().steps;
     row_.newton_iterations = integrator_.work().iterations;
     row_.t_reached = integrator_.time();
     for (Watching& watching : watching_) row_.watches.push_back(watching.conclude());
-    if (!report.ok()) row_.failed_solves = 1;
-    row_.message = report.last.failure;
-    row_.outcome = outcome(report.ok());
+    if (!last.ok()) row_.failed_solves = 1;
+    row_.message = last.failure;
+    row_.outcome = outcome(last.ok());
   }
 
  private:
   static constexpr double unwatched_bound = 0.5;  ///< of the error, where there is no watch
 
+  /// The steps, and some 400 points read on the way; what the last step or reading came to.
+  StepReport step_to(long steps) {
+    RunDoubt doubt(integrator_, steps);
+    const long every = std::max(1L, steps / points_read);
+    StepReport last;
+    bool going_on = read(doubt, last);
+    for (long k = 1; going_on && k <= steps; ++k) {
+      doubt.before_step(integrator_);
+      last = integrator_.step();
+      going_on = last.ok();
+      if (going_on) doubt.after_step(integrator_);
+      if (going_on && (k % every == 0 || k == steps)) going_on = read(doubt, last);
+    }
+    doubt_ = doubt.text();
+    return last;
+  }
+
+  bool read(RunDoubt& doubt, StepReport& last) {
+    last.solve = integrator_.sample(Momentum::projected, end_);
+    if (!last.ok()) {
+      last.failure =
+          fmt::format("reading the state at t = {}: {}", integrator_.time(), describe(last.solve.status));
+      return false;
+    }
+    doubt.see(end_);
+    return see(end_);
+  }
+
   bool see(const Sample& sample) {
     for (Watching& watching : watching_) watching.see(sample);
-    doubt_.see(sample);
-    end_ = sample;
     const StudyRow here = judged(integrator_.scene(), sample, nothing_);
     row_.constraint =
         std::isnan(row_.constraint) ? here.constraint : std::max(row_.constraint, here.constraint);
@@ -161,7 +180,7 @@ class CaseRun {
                              ? row_.error <= unwatched_bound
                              : std::ranges::all_of(watching_, [](const Watching& w) { return w.within(); });
     if (bounded) return StabilityOutcome::bounded;
-    row_.message = doubt_.text();
+    row_.message = doubt_;
     return row_.message.empty() ? StabilityOutcome::wrong : StabilityOutcome::doubted;
   }
 
@@ -171,7 +190,7 @@ class CaseRun {
   const std::function<bool()>& going_on_;
   Truth truth_;
   Truth nothing_{.kind = {}, .how = {}, .missing = "not asked", .q = {}, .p = {}};
-  EnergyDoubt doubt_;
+  std::string doubt_;  ///< of a finished run
   std::vector<Watching> watching_;
   Sample end_;
 };

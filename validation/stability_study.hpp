@@ -38,7 +38,7 @@ struct StabilityCase {
 enum class StabilityOutcome {
   accurate,  ///< at the end, and right there to the case's accuracy
   bounded,   ///< at the end, every watch within its bound
-  doubted,   ///< at the end, the energy too far off on the way, and told so: EnergyDoubt
+  doubted,   ///< at the end, and told that the result is not to be believed: RunDoubt
   stopped,   ///< a step or the reading of a point failed and said so
   refused,   ///< not begun: the library threw Misuse, or the method does not take the scene
   wrong      ///< at the end without a word, and none of the above

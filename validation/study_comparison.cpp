@@ -25,6 +25,13 @@ struct Earlier {
 
 bool is_number(const Json& json, const char* key) { return json.contains(key) && json[key].is_number(); }
 
+/// A number too large for an int must not become one.
+int order_of(const Json& row) {
+  const double order = row.at("order");
+  if (order >= 0.0 && order <= 1000.0) return static_cast<int>(order);
+  throw Misuse(fmt::format("the earlier study has a row of order {:g}; 0 to 1000 is needed", order));
+}
+
 Earlier read_earlier(const std::string& text) {
   Earlier earlier;
   const Json json = Json::parse(text, nullptr, false);
@@ -35,10 +42,10 @@ Earlier read_earlier(const std::string& text) {
       const std::string scene = study.at("scene");
       for (const Json& at : study.at("at_error"))
         if (is_number(at, "cpu_seconds"))
-          earlier.seconds[{scene, at.at("method"), at.at("order"), at.at("error")}] = at["cpu_seconds"];
+          earlier.seconds[{scene, at.at("method"), order_of(at), at.at("error")}] = at["cpu_seconds"];
       for (const Json& row : study.at("rows"))
         if (is_number(row, "step") && is_number(row, "error_q") && is_number(row, "error_p"))
-          earlier.error[{scene, row.at("method"), row.at("order"), row["step"]}] =
+          earlier.error[{scene, row.at("method"), order_of(row), row["step"]}] =
               std::max(row["error_q"].get<double>(), row["error_p"].get<double>());
     }
   } catch (const Json::exception& wrong) {

@@ -1,10 +1,14 @@
+#include <unistd.h>
+
 #include <diracstep/core/integrator.hpp>
 #include <diracstep/plugins/callback_error.hpp>
+#include <diracstep/plugins/callback_scene.hpp>
 #include <diracstep/plugins/loaded_plugin.hpp>
 #include <diracstep/plugins/plugin.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
 #include <fstream>
 #include <law_scenes.hpp>
+#include <sstream>
 
 #include "misuse.hpp"
 
@@ -61,6 +65,34 @@ TEST(Loader, RefusesWhatIsNoPlugin) {
   fs::remove(text);
   expect_misuse([] { load_plugin(built("faulty_0")); },
                 {"faulty_0", "does not export diracstep_plugin_entry"});
+}
+
+TEST(Loader, RefusesAnObjectThatWasCutOff) {
+  std::ifstream file(built("harmonic"), std::ios::binary);
+  const std::string whole = (std::ostringstream() << file.rdbuf()).str();
+  ASSERT_GT(whole.size(), 4000u);
+  const fs::path cut = fs::temp_directory_path() / ("diracstep_cut_" + std::to_string(getpid()) + ".so");
+  for (const std::size_t size : {std::size_t{0}, std::size_t{10}, std::size_t{64}, std::size_t{500},
+                                 whole.size() / 4, whole.size() / 2}) {
+    std::ofstream(cut, std::ios::binary) << whole.substr(0, size);
+    expect_misuse([&] { load_plugin(cut); }, {cut.string(), "cannot be loaded"});
+  }
+  fs::remove(cut);
+}
+
+TEST(Loader, RefusesNamesThatAreMissing) {
+  const double start[] = {1.0, 0.0};
+  const char* const names[] = {"x", nullptr};
+  const diracstep_function lagrangian{
+      nullptr, {},     0, [](const void*, double, const double*, const double*, double*) { return 0; },
+      nullptr, nullptr};
+  diracstep_scene scene{};
+  scene.name = "mine";
+  scene.dimension = 2;
+  scene.coordinates = names;
+  scene.lagrangian = &lagrangian;
+  scene.start_q = scene.start_v = start;
+  expect_misuse([&] { (void)scene_from(scene, "plugin 'mine'", {}); }, {"coordinate 2 has no name"});
 }
 
 TEST(Loader, RefusesAnotherVersionNamingBoth) {
@@ -184,6 +216,7 @@ TEST(Description, EveryPartIsLookedAt) {
   refused([](P&, M& m, R&) { m.type = 2; }, {"type1/mine", "type2/"});
   refused([](P&, M& m, R&) { m.order = 0; }, {"order 0"});
   refused([](P&, M& m, R&) { m.inner_columns = -2; }, {"-2 inner columns"});
+  refused([](P&, M& m, R&) { m.inner_columns = 2147483647; }, {"2147483647 inner columns", "0 to 1000"});
   refused([](P&, M& m, R&) { m.value = nullptr; }, {"value and gradient are NULL"});
   refused([](P&, M& m, R&) { m.destroy = [](void*) {}; }, {"create and destroy"});
   refused([](P&, M& m, R&) { m.constraint_rule = "middle"; }, {"'middle'", "midpoint", "centre"});

@@ -32,6 +32,8 @@ void catch_interrupts() {
   action.sa_flags = SA_RESTART;
   sigfillset(&action.sa_mask);
   for (const int signal : {SIGINT, SIGTERM}) sigaction(signal, &action, nullptr);
+  std::signal(SIGXFSZ,
+              SIG_IGN);  // a file above the limit of the shell is an error of write(), like a full disk
 }
 
 bool interrupted() { return flag != 0; }

@@ -25,8 +25,9 @@ void write_new(const std::string& path, const std::string& text) {
     throw Misuse(fmt::format("'{}' is there already; choose another name", path));
   if (file == nullptr) throw std::system_error(errno, std::generic_category(), path);
   const bool written = std::fwrite(text.data(), 1, text.size(), file) == text.size();
-  if (std::fclose(file) != 0 || !written)
-    throw std::runtime_error(fmt::format("'{}' could not be written in full", path));
+  if (std::fclose(file) == 0 && written) return;
+  std::remove(path.c_str());
+  throw std::runtime_error(fmt::format("'{}' could not be written in full", path));
 }
 
 void make(const Options& options) {

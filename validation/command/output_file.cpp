@@ -1,22 +1,19 @@
 #include <fmt/format.h>
 
-#include <cerrno>
-#include <cstdio>
-#include <cstring>
 #include <diracstep/core/errors.hpp>
 #include <diracstep/validation/command/output_file.hpp>
+#include <diracstep/validation/output_file.hpp>
+#include <exception>
 
 namespace diracstep::command {
 
 std::string write_file(const std::filesystem::path& path, const std::string& text) {
-  std::FILE* file = std::fopen(path.c_str(), "w");
-  if (file == nullptr) return fmt::format("'{}' cannot be written: {}", path.string(), std::strerror(errno));
-  const bool written =
-      std::fwrite(text.data(), 1, text.size(), file) == text.size() && std::fflush(file) == 0;
-  const int error = errno;
-  if (std::fclose(file) == 0 && written) return {};
-  return fmt::format("'{}' could not be written in full: {}", path.string(),
-                     std::strerror(written ? errno : error));
+  try {
+    replace_file(path.string(), text);
+  } catch (const std::exception& error) {
+    return error.what();
+  }
+  return {};
 }
 
 std::filesystem::path output_directory(const std::string& path) {

@@ -11,6 +11,7 @@
 #include <diracstep/validation/command/interrupt.hpp>
 #include <diracstep/validation/command/run_control.hpp>
 #include <diracstep/validation/command/verbs.hpp>
+#include <diracstep/validation/energy_doubt.hpp>
 #include <diracstep/validation/progress.hpp>
 #include <memory>
 #include <optional>
@@ -113,7 +114,10 @@ void run_variable(const Options& options, const CatalogueScene& entry, AdaptiveI
                   double end, TrajectoryFile* file, RunResult& result) {
   Progress progress;
   const double start = entry.scene->start.time;
+  const auto scene = completed(entry.scene);
+  EnergyDoubt doubt(*scene);
   const auto keep = [&](const Sample& sample) {
+    doubt.see(sample);
     if (file != nullptr) file->write(sample);
     result.end = sample;
     progress.show((sample.time - start) / (end - start), fmt::format("t = {:g}", sample.time));
@@ -127,6 +131,7 @@ void run_variable(const Options& options, const CatalogueScene& entry, AdaptiveI
   if (result.failure.empty() && interrupted())
     result.failure = fmt::format("interrupted at t = {:.17g}", integrator.time());
   result.work = integrator.work();
+  result.doubt = doubt.text();
   result.variable =
       VariableSteps{integrator.adaptive().eps, integrator.adaptive().control, integrator.control()};
   const std::string told = warning(*result.variable, result.work.steps);

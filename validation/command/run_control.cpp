@@ -7,8 +7,8 @@
 #include <diracstep/validation/command/interrupt.hpp>
 #include <diracstep/validation/command/run_control.hpp>
 #include <diracstep/validation/convergence_study.hpp>
-#include <diracstep/validation/energy_doubt.hpp>
 #include <diracstep/validation/progress.hpp>
+#include <diracstep/validation/run_doubt.hpp>
 
 namespace diracstep::command {
 
@@ -27,7 +27,7 @@ class Run {
         integrator_(integrator),
         keeping_(keeping),
         result_(result),
-        doubt_(integrator.scene()),
+        doubt_(integrator, steps),
         every_look_(std::max(1L, steps / points_looked_at)),
         next_checkpoint_(Clock::now() + between_checkpoints),
         progress_(static_cast<double>(integrator.work().steps) / static_cast<double>(steps)) {}
@@ -36,11 +36,13 @@ class Run {
     long k = integrator_.work().steps;
     if (k == 0 || wanted(k)) keep();
     while (k < steps_ && result_.failure.empty() && !interrupted()) {
+      doubt_.before_step(integrator_);
       const StepReport report = integrator_.step();
       if (!report.ok()) {
         result_.failure = report.failure;
         break;
       }
+      doubt_.after_step(integrator_);
       ++k;
       if (k == steps_ || checkpoint_due(k)) save();
       if (wanted(k))
@@ -104,7 +106,7 @@ class Run {
   Integrator& integrator_;
   const Keeping& keeping_;
   RunResult& result_;
-  EnergyDoubt doubt_;
+  RunDoubt doubt_;
   long every_look_;
   Sample looked_at_;
   double kept_time_ = std::nan("");
