@@ -316,9 +316,6 @@ StepReport Integrator::take(double h, Guess guess) {
 StepReport Integrator::take_in_pieces(double whole, int pieces, Guess guess) {
   const double start = time();
   size_ = whole / pieces;
-  before_.clock = clock_;
-  before_.q = q_;
-  before_.p = p_;
   before_.v = v_;
   retryable_ = false;
   double t = start;
@@ -338,11 +335,7 @@ StepReport Integrator::take_in_pieces(double whole, int pieces, Guess guess) {
         failure.failure += describe_singularity(problem, stage.solution, *scene_);
         return failure;
       }
-      total.iterations += report.iterations;
-      total.residual_evaluations += report.residual_evaluations;
-      total.jacobian_evaluations += report.jacobian_evaluations;
-      total.line_searches += report.line_searches;
-      total.residual_norms = report.residual_norms;
+      total.add(report);
     }
     problem.finish(stage.solution, q_next_, p_next_, impulse_);
     if (!(q_next_.allFinite() && p_next_.allFinite())) {
@@ -354,6 +347,9 @@ StepReport Integrator::take_in_pieces(double whole, int pieces, Guess guess) {
     std::swap(p_stage_, p_next_);
     t += h;
   }
+  before_.clock = clock_;
+  std::swap(before_.q, q_);
+  std::swap(before_.p, p_);
   std::swap(q_, q_stage_);
   std::swap(p_, p_stage_);
   remember(pieces);

@@ -109,7 +109,7 @@ void JacobianFactors::begin() {
 }
 
 bool JacobianFactors::wanted(double norm) {
-  if (!usable_) return true;
+  if (!usable_ || policy_ == JacobianPolicy::fresh) return true;
   const bool too_slow = iterations_ > 0 && norm * std::pow(norm / last_norm_, patience) > done;
   switch (policy_) {
     case JacobianPolicy::per_step:
