@@ -6,6 +6,7 @@
 #include <diracstep/core/errors.hpp>
 #include <diracstep/core/hidden_rows.hpp>
 #include <diracstep/core/integrator.hpp>
+#include <diracstep/core/scales.hpp>
 #include <diracstep/core/singularity.hpp>
 #include <sstream>
 
@@ -179,6 +180,8 @@ void Integrator::reset(const Start& start) {
   scene_->lagrangian->gradient(start.time, q_, v_, lq, p_);
   if (!p_.allFinite())
     throw Misuse("scene '" + scene_->name + "': the momentum ∂L/∂v is not finite at the start");
+  before_.q = q_;  // of their sizes, so that no later step allocates them
+  before_.p = p_;
   forget();
   on_a_motion_ = false;
   work_ = {};
@@ -323,30 +326,30 @@ StepReport Integrator::take_in_pieces(double whole, int pieces, Guess guess) {
   reached_ = 1.0;
   q_stage_ = q_;
   p_stage_ = p_;
-  for (std::size_t k = 0; k < stages_.size() * static_cast<std::size_t>(pieces); ++k) {
-    const std::size_t number = k % stages_.size();
-    Stage& stage = stages_[number];
-    StepProblem& problem = *parts_[stage.part].problem;
-    const double h = stage.fraction * size_;
-    if (k > 0 || !first_stage_solved_) {
-      const SolveReport report = solve_stage(number, t, q_stage_, p_stage_, guess);
-      if (!report.ok()) {
-        StepReport failure = failed(report, problem, start);
-        failure.failure += describe_singularity(problem, stage.solution, *scene_);
-        return failure;
+  for (int piece = 0; piece < pieces; ++piece)
+    for (std::size_t number = 0; number < stages_.size(); ++number) {
+      Stage& stage = stages_[number];
+      StepProblem& problem = *parts_[stage.part].problem;
+      const double h = stage.fraction * size_;
+      if (piece > 0 || number > 0 || !first_stage_solved_) {
+        const SolveReport report = solve_stage(number, t, q_stage_, p_stage_, guess);
+        if (!report.ok()) {
+          StepReport failure = failed(report, problem, start);
+          failure.failure += describe_singularity(problem, stage.solution, *scene_);
+          return failure;
+        }
+        total.add(report);
       }
-      total.add(report);
+      problem.finish(stage.solution, q_next_, p_next_, impulse_);
+      if (!(all_finite(q_next_.data(), q_next_.size()) && all_finite(p_next_.data(), p_next_.size()))) {
+        total.status = SolveStatus::not_finite;
+        return failed(total, problem, start);
+      }
+      v_ = (q_next_ - q_stage_) / h;
+      std::swap(q_stage_, q_next_);
+      std::swap(p_stage_, p_next_);
+      t += h;
     }
-    problem.finish(stage.solution, q_next_, p_next_, impulse_);
-    if (!(q_next_.allFinite() && p_next_.allFinite())) {
-      total.status = SolveStatus::not_finite;
-      return failed(total, problem, start);
-    }
-    v_ = (q_next_ - q_stage_) / h;
-    std::swap(q_stage_, q_next_);
-    std::swap(p_stage_, p_next_);
-    t += h;
-  }
   before_.clock = clock_;
   std::swap(before_.q, q_);
   std::swap(before_.p, p_);

@@ -29,17 +29,21 @@ Predictor::Predictor(StepProblem& problem) : problem_(problem) {
     for (std::size_t terms = 1; terms < longest; ++terms) rules_.push_back({true, terms});
 }
 
-/// x = Σ_k weights[k] x_{first + k}, newest first.
+/// x = Σ_k weights[k] x_{first + k}, newest first; by fours, which the processor adds side by side.
 void Predictor::combine_history(std::size_t first, std::size_t terms, const double* weights,
                                 VectorRef x) const {
-  std::array<const double*, longest> past{};
-  for (std::size_t k = 0; k < terms; ++k) past[k] = history_[first + k].data();
-  double* const to = x.data();
-  const Eigen::Index size = x.size();
-  for (Eigen::Index i = 0; i < size; ++i) {
+  constexpr Eigen::Index side_by_side = 4;
+  const Eigen::Index size = x.size(), whole = size - size % side_by_side;
+  for (Eigen::Index i = 0; i < whole; i += side_by_side) {
+    Eigen::Vector4d sum = Eigen::Vector4d::Zero();
+    for (std::size_t k = 0; k < terms; ++k)
+      sum += weights[k] * Eigen::Map<const Eigen::Vector4d>(history_[first + k].data() + i);
+    Eigen::Map<Eigen::Vector4d>(x.data() + i) = sum;
+  }
+  for (Eigen::Index i = whole; i < size; ++i) {
     double sum = 0.0;
-    for (std::size_t k = 0; k < terms; ++k) sum += weights[k] * past[k][i];
-    to[i] = sum;
+    for (std::size_t k = 0; k < terms; ++k) sum += weights[k] * history_[first + k].data()[i];
+    x.data()[i] = sum;
   }
 }
 

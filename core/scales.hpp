@@ -17,6 +17,12 @@ inline double largest_entry(const double* x, Eigen::Index count) {
   return largest;
 }
 
+inline bool all_finite(const double* x, Eigen::Index count) {
+  for (Eigen::Index i = 0; i < count; ++i)
+    if (!std::isfinite(x[i])) return false;
+  return true;
+}
+
 /// A size of terms to measure residuals by: positive and finite, 1 where none is known.
 inline double usable_scale(double scale) { return scale > 0.0 && std::isfinite(scale) ? scale : 1.0; }
 

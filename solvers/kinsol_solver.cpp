@@ -143,7 +143,8 @@ class KinsolSolver final : public NonlinearSolver {
       report_.status = SolveStatus::not_finite;
     else
       report_.status = SolveStatus::no_convergence;
-    if (report_.ok() && strategy != KIN_FP && !factors_.exact() && report_.iterations > 0) correct_again();
+    const bool quadratic = factors_.exact() || factors_.current();
+    if (report_.ok() && strategy != KIN_FP && !quadratic && report_.iterations > 0) correct_again();
   }
 
   /// Where the convergence is linear, what is left of the error is as large as the last residual and of the
@@ -240,7 +241,7 @@ class KinsolSolver final : public NonlinearSolver {
     return solver.guarded([&] {
       ++solver.report_.residual_evaluations;
       solver.problem_.residual(solver.map(x), solver.last_residual_);
-      solver.finite_residual_ = solver.last_residual_.allFinite();
+      solver.finite_residual_ = all_finite(solver.last_residual_.data(), solver.last_residual_.size());
       solver.not_finite_ = !solver.finite_residual_;
       if (solver.strategy_ == KIN_FP) return solver.contract(solver.map(x), solver.map(f));
       solver.map(f) = solver.last_residual_;

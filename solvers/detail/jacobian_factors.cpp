@@ -110,7 +110,9 @@ void JacobianFactors::begin() {
 
 bool JacobianFactors::wanted(double norm) {
   if (!usable_ || policy_ == JacobianPolicy::fresh) return true;
-  const bool too_slow = iterations_ > 0 && norm * std::pow(norm / last_norm_, patience) > done;
+  double expected = norm;
+  for (int k = 0; k < patience; ++k) expected *= norm / last_norm_;
+  const bool too_slow = iterations_ > 0 && expected > done;
   switch (policy_) {
     case JacobianPolicy::per_step:
       return iterations_ == 0 || too_slow;
@@ -127,6 +129,7 @@ JacobianFactors::Outcome JacobianFactors::prepare(ConstVectorRef x, double norm)
       constant_ ? !select(problem_.constant_jacobian_parameter()) || !usable_ : wanted(norm);
   last_norm_ = norm;
   ++iterations_;
+  current_point_ = wanted_now;
   if (!wanted_now) return Outcome::ready;
   ++evaluations_;
   usable_ = false;
