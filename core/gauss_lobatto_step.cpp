@@ -97,7 +97,8 @@ class GaussLobattoStep final : public StepProblem {
   }
   void save(Snapshot& to) const override {
     to.put(kept_.known ? 1.0 : 0.0);
-    for (const double size : {kept_.force, kept_.curvature, kept_.row_curvature}) to.put(size);
+    for (const double size : {kept_.force, kept_.curvature, kept_.row_curvature, curvature_, row_curvature_})
+      to.put(size);
     to.put(kept_.multipliers);
     if (!sums_) return;
     to.put(q0_);
@@ -106,7 +107,8 @@ class GaussLobattoStep final : public StepProblem {
   }
   void restore(Snapshot& from) override {
     kept_.known = from.whole_number(1) == 1;
-    for (double* size : {&kept_.force, &kept_.curvature, &kept_.row_curvature}) *size = from.number();
+    for (double* size : {&kept_.force, &kept_.curvature, &kept_.row_curvature, &curvature_, &row_curvature_})
+      *size = from.number();
     from.read(kept_.multipliers);
     if (!sums_) return;
     from.read(q0_);
