@@ -9,6 +9,8 @@
 #include <diracstep/validation/scene_catalogue.hpp>
 #include <thread>
 
+#include "timing.hpp"
+
 using namespace diracstep;
 
 namespace {

@@ -6,6 +6,8 @@
 #include <diracstep/solvers/kinsol_solver.hpp>
 #include <diracstep/validation/convergence_study.hpp>
 
+#include "timing.hpp"
+
 namespace {
 
 using namespace diracstep;

@@ -4,8 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
+#include <diracstep/solvers/sundials_build.hpp>
 #include <functional>
 #include <vector>
+
+/// Every benchmark says first which SUNDIALS its times were taken with.
+inline const int build_line = std::printf("%s\n", diracstep::sundials_build().c_str());
 
 /// Processor time of the program: time in which other programs run does not count.
 inline double processor_seconds() {

@@ -6,6 +6,7 @@
 #include <diracstep/core/errors.hpp>
 #include <diracstep/core/hidden_rows.hpp>
 #include <diracstep/core/integrator.hpp>
+#include <diracstep/core/scales.hpp>
 #include <diracstep/core/singularity.hpp>
 #include <sstream>
 
@@ -178,6 +179,8 @@ void Integrator::reset(const Start& start) {
   scene_->lagrangian->gradient(start.time, q_, v_, lq, p_);
   if (!p_.allFinite())
     throw Misuse("scene '" + scene_->name + "': the momentum ∂L/∂v is not finite at the start");
+  before_.q = q_;  // of their sizes, so that no later step allocates them
+  before_.p = p_;
   forget();
   on_a_motion_ = false;
   work_ = {};
@@ -332,16 +335,12 @@ StepReport Integrator::take_in_pieces(double whole, int pieces, Guess guess) {
         failure.failure += describe_singularity(problem, stage.solution, *scene_);
         return failure;
       }
-      total.iterations += report.iterations;
-      total.residual_evaluations += report.residual_evaluations;
-      total.jacobian_evaluations += report.jacobian_evaluations;
-      total.line_searches += report.line_searches;
-      total.residual_norms = report.residual_norms;
+      total.add(report);
     }
     problem.finish(stage.solution, q_next_, p_next_, impulse_);
     if (scene_->rows() > 0 && guess == Guess::predicted && stage.predictor.ready())
       keep_straight_on(stage, h, total);
-    if (!(q_next_.allFinite() && p_next_.allFinite())) {
+    if (!(all_finite(q_next_.data(), q_next_.size()) && all_finite(p_next_.data(), p_next_.size()))) {
       total.status = SolveStatus::not_finite;
       if (k > 0) v_ = before_.v;
       return failed(total, problem, start);

@@ -24,12 +24,7 @@ constexpr double sharp_turn = 0.5;
 SolveReport Integrator::solve(Part& part, Vector& x, SolveReport& total) {
   const SolveReport report = part.solver->solve(x);
   count(report);
-  total.status = report.status;
-  total.iterations += report.iterations;
-  total.line_searches += report.line_searches;
-  total.residual_evaluations += report.residual_evaluations;
-  total.jacobian_evaluations += report.jacobian_evaluations;
-  total.residual_norms = report.residual_norms;
+  total.add(report);
   return report;
 }
 
@@ -78,10 +73,7 @@ SolveReport Integrator::follow_stage(Stage& stage, Interval step, const Vector& 
   guess_ = stage.solution;
   const StepContinuation::Result path = part.continuation->follow(step, q, p, start_velocity_, guess_);
   count(path.report, path.solves);
-  found.iterations += path.report.iterations;
-  found.line_searches += path.report.line_searches;
-  found.residual_evaluations += path.report.residual_evaluations;
-  found.jacobian_evaluations += path.report.jacobian_evaluations;
+  found.add_work(path.report);
   reached_ = path.reached;
   if (!path.report.ok()) {
     if (found.ok() && path.reached > 0.0) found.status = SolveStatus::other_branch;

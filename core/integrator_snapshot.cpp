@@ -72,12 +72,12 @@ void Integrator::read(Snapshot& from) {
     from.read(stage.solution);
     stage.predictor.restore(from);
   }
-  for (Part& part : parts_) {
+  const Stage& first = stages_.front();
+  if (first_stage_solved_) parts_[first.part].problem->begin({time(), first.fraction * size_}, q_, p_);
+  for (Part& part : parts_) {  // what the solution of a first stage left behind stands over its beginning
     part.problem->restore(from);
     if (part.solver) part.solver->restore(from);
   }
-  const Stage& first = stages_.front();
-  if (first_stage_solved_) parts_[first.part].problem->begin({time(), first.fraction * size_}, q_, p_);
 }
 
 }  // namespace diracstep

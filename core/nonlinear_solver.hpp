@@ -62,6 +62,20 @@ struct [[nodiscard]] SolveReport {
   std::array<double, 4> residual_norms{};
 
   bool ok() const { return status == SolveStatus::ok; }
+
+  /// Adds the work of a further solve.
+  void add_work(const SolveReport& further) {
+    iterations += further.iterations;
+    residual_evaluations += further.residual_evaluations;
+    jacobian_evaluations += further.jacobian_evaluations;
+    line_searches += further.line_searches;
+  }
+  /// Takes in a further solve, whose outcome is now that of both.
+  void add(const SolveReport& further) {
+    add_work(further);
+    status = further.status;
+    residual_norms = further.residual_norms;
+  }
 };
 
 /// Solves F(x) = 0 from the guess in x.  On failure x is the last iterate.

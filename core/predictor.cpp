@@ -29,19 +29,35 @@ Predictor::Predictor(StepProblem& problem) : problem_(problem) {
     for (std::size_t terms = 1; terms < longest; ++terms) rules_.push_back({true, terms});
 }
 
-void Predictor::evaluate(const Rule& rule, VectorRef x) {
-  if (!rule.through_stages) {
-    x = extrapolation[rule.terms][0] * history_[0];
-    for (std::size_t k = 1; k < rule.terms; ++k) x += extrapolation[rule.terms][k] * history_[k];
-    return;
+/// x = Σ_k weights[k] x_{first + k}, newest first; by fours, which the processor adds side by side.
+void Predictor::combine_history(std::size_t first, std::size_t terms, const double* weights,
+                                VectorRef x) const {
+  constexpr Eigen::Index side_by_side = 4;
+  const Eigen::Index size = x.size(), whole = size - size % side_by_side;
+  for (Eigen::Index i = 0; i < whole; i += side_by_side) {
+    Eigen::Vector4d sum = Eigen::Vector4d::Zero();
+    for (std::size_t k = 0; k < terms; ++k)
+      sum += weights[k] * Eigen::Map<const Eigen::Vector4d>(history_[first + k].data() + i);
+    Eigen::Map<Eigen::Vector4d>(x.data() + i) = sum;
   }
+  for (Eigen::Index i = whole; i < size; ++i) {
+    double sum = 0.0;
+    for (std::size_t k = 0; k < terms; ++k) sum += weights[k] * history_[first + k].data()[i];
+    x.data()[i] = sum;
+  }
+}
+
+void Predictor::evaluate(const Rule& rule, VectorRef x) {
+  if (!rule.through_stages) return combine_history(0, rule.terms, extrapolation[rule.terms].data(), x);
   // E x_1 + Σ_k w_k d_k with d_k = x_k − E x_{k+1}, the defects of the stage polynomials in the past.
   const std::size_t defects = rule.terms - 1;
-  problem_.extrapolate_stages(history_[0], x);
-  for (std::size_t k = 0; k < defects; ++k) {
-    problem_.extrapolate_stages(history_[k + 1], missed_);
-    x += extrapolation[defects][k] * (history_[k] - missed_);
-  }
+  const double* const weights = extrapolation[defects].data();
+  combine_history(1, defects, weights, missed_);
+  missed_ = history_[0] - missed_;
+  problem_.extrapolate_stages(missed_, x);
+  if (defects == 0) return;
+  combine_history(0, defects, weights, missed_);
+  x += missed_;
 }
 
 void Predictor::predict(VectorRef x) {

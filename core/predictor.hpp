@@ -39,6 +39,7 @@ class Predictor {
   };
 
   void evaluate(const Rule& rule, VectorRef x);
+  void combine_history(std::size_t first, std::size_t terms, const double* weights, VectorRef x) const;
   void elect(ConstVectorRef solution);
 
   StepProblem& problem_;

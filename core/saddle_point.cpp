@@ -30,19 +30,11 @@ void SaddlePointProblem::move_to(double t, ConstVectorRef q) {
   if (m_ > 0) rows_.evaluate(t, q);
 }
 
-void SaddlePointProblem::assemble(ConstVectorRef v, VectorRef values) {
-  scene_.lagrangian->hessian(t_, q_, v, lqq_, lqv_, lvv_);
+void SaddlePointProblem::assemble(VectorRef values) const {
   values.setZero();
-  const auto& mass_places = layout_.positions(0);
-  for (std::size_t k = 0; k < mass_places.size(); ++k)
-    values[mass_places[k]] = lvv_[static_cast<Eigen::Index>(k)];
-  const Vector& a = rows_.coefficients();
-  const auto& force_places = layout_.positions(1);
-  const auto& row_places = layout_.positions(2);
-  for (std::size_t k = 0; k < row_places.size(); ++k) {
-    values[force_places[k]] = -a[static_cast<Eigen::Index>(k)];
-    values[row_places[k]] = a[static_cast<Eigen::Index>(k)];
-  }
+  layout_.add_to(values, 0, 1.0, lvv_.data());
+  layout_.add_to(values, 1, -1.0, rows_.coefficients().data());
+  layout_.add_to(values, 2, 1.0, rows_.coefficients().data());
 }
 
 void SaddlePointProblem::set_scales(double momentum, double velocity) {
@@ -76,14 +68,19 @@ void VelocityProblem::residual(ConstVectorRef x, VectorRef f) {
   rows_.velocity_residual(v, f.tail(m_));
 }
 
-void VelocityProblem::jacobian(ConstVectorRef x, VectorRef values) { assemble(x.head(n_), values); }
+void VelocityProblem::jacobian(ConstVectorRef x, VectorRef values) {
+  if (!mass_known_) scene_.lagrangian->hessian(t_, q_, x.head(n_), lqq_, lqv_, lvv_);
+  mass_known_ = scene_.lagrangian->structure().y_hessian_constant;
+  assemble(values);
+}
 
 void AccelerationProblem::begin(double t, ConstVectorRef q, ConstVectorRef v) {
   move_to(t, q);
   v_ = v;
   const Lagrangian& lagrangian = *scene_.lagrangian;
   lagrangian.gradient(t, q, v, lq_, lv_);
-  lagrangian.hessian(t, q, v, lqq_, lqv_, lvv_);
+  if (!hessian_known_) lagrangian.hessian(t, q, v, lqq_, lqv_, lvv_);
+  hessian_known_ = lagrangian.structure().quadratic;
   known_force_.resize(n_);
   lagrangian.gradient_rate(t, q, v, known_force_);
   known_force_ = lq_ - known_force_;
@@ -114,6 +111,6 @@ void AccelerationProblem::residual(ConstVectorRef x, VectorRef f) {
   rows_.pattern().multiply_add(rows_.coefficients().data(), x.data(), f.data() + n_);
 }
 
-void AccelerationProblem::jacobian(ConstVectorRef, VectorRef values) { assemble(v_, values); }
+void AccelerationProblem::jacobian(ConstVectorRef, VectorRef values) { assemble(values); }
 
 }  // namespace diracstep

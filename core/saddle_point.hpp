@@ -24,8 +24,8 @@ class SaddlePointProblem : public NonlinearProblem {
 
  protected:
   void move_to(double t, ConstVectorRef q);
-  /// The saddle-point matrix with ∂²L/∂v² taken at v.
-  void assemble(ConstVectorRef v, VectorRef values);
+  /// The saddle-point matrix with ∂²L/∂v² as it stands in lvv_.
+  void assemble(VectorRef values) const;
   void set_scales(double momentum, double velocity);
   /// The scales cover the terms at x as well: ∂²L/∂v² or ∂L/∂v of size `momentum`, and A times both parts of
   /// x.
@@ -56,6 +56,7 @@ class VelocityProblem final : public SaddlePointProblem {
 
  private:
   Vector p_;
+  bool mass_known_ = false;  ///< ∂²L/∂v² is constant and was taken
 };
 
 /// Unknowns (a, Λ), linear:   d/dt(∂L/∂v) − ∂L/∂q − f = A(q)ᵀΛ,   d/dt(A(q) v + b(q)) = 0,   a = dv/dt.
@@ -69,6 +70,7 @@ class AccelerationProblem final : public SaddlePointProblem {
 
  private:
   Vector v_, known_force_, known_rate_, row_derivative_;
+  bool hessian_known_ = false;  ///< that of a quadratic L, taken once
 };
 
 }  // namespace diracstep

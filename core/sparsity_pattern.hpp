@@ -93,6 +93,12 @@ class BlockPattern {
   /// positions(b)[k] is the place in the whole of value k of block b.
   const std::vector<int>& positions(int block) const { return positions_[static_cast<std::size_t>(block)]; }
 
+  /// Adds factor times the values of a block to those of the whole.
+  void add_to(VectorRef whole, int block, double factor, const double* values) const {
+    double* const to = whole.data();
+    for (const int place : positions(block)) to[place] += factor * *values++;
+  }
+
  private:
   int rows_;
   int columns_;

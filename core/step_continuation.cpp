@@ -25,15 +25,6 @@ constexpr double round_off = 1e-9;
 /// … and below this part of q/h.
 constexpr double rounded_positions = 16.0 * std::numeric_limits<double>::epsilon();
 
-void add(SolveReport& total, const SolveReport& report) {
-  total.status = report.status;
-  total.iterations += report.iterations;
-  total.line_searches += report.line_searches;
-  total.residual_evaluations += report.residual_evaluations;
-  total.jacobian_evaluations += report.jacobian_evaluations;
-  total.residual_norms = report.residual_norms;
-}
-
 }  // namespace
 
 StepContinuation::StepContinuation(StepProblem& problem, NonlinearSolver& solver)
@@ -55,7 +46,7 @@ double StepContinuation::change(double h, const Vector& q0, const Vector& v0, Co
 bool StepContinuation::solve(double h, const Vector& q0, const Vector& v0, Point& point, Result& work) {
   const SolveReport report = solver_.solve(point.x);
   ++work.solves;
-  add(work.report, report);
+  work.report.add(report);
   if (!report.ok()) return false;
   point.change = change(h, q0, v0, point.x);
   work.reached = std::max(work.reached, point.part);

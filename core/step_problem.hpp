@@ -26,8 +26,8 @@ class StepProblem : public NonlinearProblem {
   /// entered at q0 as A(q0)ᵀλ.
   virtual void finish(ConstVectorRef x, Vector& q1, Vector& p1, Vector& impulse) = 0;
 
-  /// For steps with stages: x from the polynomials through the stages of the last step, taken into this one.
-  /// False where the step has none.
+  /// For steps with several stages: x from the polynomials through the stages of the last step, taken into
+  /// this one; linear in `last`.  False where the step has no such polynomials.
   virtual bool extrapolate_stages(ConstVectorRef /*last*/, VectorRef /*x*/) const { return false; }
 
   /// How many unknowns come before the multipliers, whose guess hardly matters.

@@ -2,6 +2,7 @@
 #include <array>
 #include <cmath>
 #include <diracstep/core/errors.hpp>
+#include <diracstep/core/scales.hpp>
 #include <diracstep/solvers/detail/jacobian_factors.hpp>
 #include <diracstep/solvers/detail/shells.hpp>
 #include <diracstep/solvers/detail/vector.hpp>
@@ -141,7 +142,8 @@ class KinsolSolver final : public NonlinearSolver {
       report_.status = SolveStatus::not_finite;
     else
       report_.status = SolveStatus::no_convergence;
-    if (report_.ok() && strategy != KIN_FP && !factors_.exact() && report_.iterations > 0) correct_again();
+    const bool quadratic = factors_.exact() || factors_.current();
+    if (report_.ok() && strategy != KIN_FP && !quadratic && report_.iterations > 0) correct_again();
   }
 
   /// Where the convergence is linear, what is left of the error is as large as the last residual and of the
@@ -191,27 +193,26 @@ class KinsolSolver final : public NonlinearSolver {
     return largest;
   }
 
-  /// Norm of each block at the last evaluation into the report; the largest one, scaled, back.
+  /// Norm of each block at the last evaluation into the report, NaN where an entry is no number; the largest
+  /// one, scaled, back.
   double measure_residual() {
     double largest = 0.0;
-    int row = 0;
+    Eigen::Index row = 0;
     std::size_t b = 0;
     for (const ResidualBlock& block : problem_.blocks()) {
-      double norm = 0.0;
-      for (int k = 0; k < block.rows; ++k, ++row) {
-        const double entry = std::abs(last_residual_[row]);
-        if (!(entry <= norm)) norm = entry;  // NaN as well, and then nothing replaces it
-        if (!std::isfinite(norm)) norm = std::nan("");
+      double& norm = report_.residual_norms.at(b++) = largest_entry(last_residual_.data() + row, block.rows);
+      if (!finite_residual_ && !last_residual_.segment(row, block.rows).allFinite()) {
+        norm = std::nan("");
+        return HUGE_VAL;
       }
-      report_.residual_norms.at(b++) = norm;
-      if (std::isnan(norm)) return HUGE_VAL;
       largest = std::max(largest, norm / block.scale);
+      row += block.rows;
     }
     return largest;
   }
 
   void set_scales() {
-    const double size = guess_.lpNorm<Eigen::Infinity>();
+    const double size = largest_entry(guess_.data(), guess_.size());
     const double unit = size > 0.0 && std::isfinite(size) ? 1.0 / size : 1.0;
     std::fill_n(data_of(unknown_scale_.get()), guess_.size(), unit);
     double* scale = data_of(residual_scale_.get());
@@ -228,7 +229,8 @@ class KinsolSolver final : public NonlinearSolver {
     return solver.callbacks_.guarded([&] {
       ++solver.report_.residual_evaluations;
       solver.problem_.residual(solver.map(x), solver.last_residual_);
-      solver.not_finite_ = !solver.last_residual_.allFinite();
+      solver.finite_residual_ = all_finite(solver.last_residual_.data(), solver.last_residual_.size());
+      solver.not_finite_ = !solver.finite_residual_;
       if (solver.strategy_ == KIN_FP) return solver.contract(solver.map(x), solver.map(f));
       solver.map(f) = solver.last_residual_;
       return solver.not_finite_ ? 1 : 0;  // KINSOL then tries a shorter step
@@ -302,7 +304,8 @@ class KinsolSolver final : public NonlinearSolver {
   bool given_up_ = false;            ///< the fixed-point iteration was slow
   double smallest_norm_ = HUGE_VAL;  ///< of the fixed-point iteration so far
   bool singular_ = false;
-  bool not_finite_ = false;
+  bool not_finite_ = false;  ///< the last residual or Jacobian
+  bool finite_residual_ = true;
 };
 
 template <class Enum, std::size_t N>

@@ -108,8 +108,10 @@ void JacobianFactors::begin() {
 }
 
 bool JacobianFactors::wanted(double norm) {
-  if (!current_->usable) return true;
-  const bool too_slow = iterations_ > 0 && norm * std::pow(norm / last_norm_, patience) > done;
+  if (!current_->usable || policy_ == JacobianPolicy::fresh) return true;
+  double expected = norm;
+  for (int k = 0; k < patience; ++k) expected *= norm / last_norm_;
+  const bool too_slow = iterations_ > 0 && expected > done;
   switch (policy_) {
     case JacobianPolicy::per_step:
       return iterations_ == 0 || too_slow;
@@ -126,6 +128,7 @@ JacobianFactors::Outcome JacobianFactors::prepare(ConstVectorRef x, double norm)
       constant_ ? !select(problem_.constant_jacobian_parameter()) || !current_->usable : wanted(norm);
   last_norm_ = norm;
   ++iterations_;
+  current_point_ = wanted_now;
   if (!wanted_now) return Outcome::ready;
   ++evaluations_;
   current_->factored = current_->usable = false;

@@ -26,6 +26,8 @@ class JacobianFactors {
   int evaluations() const { return evaluations_; }
   /// Whether Newton's method converges quadratically with these factors.
   bool exact() const { return policy_ == JacobianPolicy::fresh || constant_; }
+  /// Whether the last iteration took a Jacobian of its own point.
+  bool current() const { return current_point_; }
   /// Forgets every factor and pivot.
   void reset();
   /// Writes and reads all that the next solves depend on, old factors among it.
@@ -57,6 +59,7 @@ class JacobianFactors {
   double last_norm_ = 0.0;
   int evaluations_ = 0, iterations_ = 0;
   int fresh_starts_ = 0;  ///< so many solves more begin with a new Jacobian, since an old one failed
+  bool current_point_ = false;
 };
 
 }  // namespace diracstep::detail

@@ -11,6 +11,8 @@ namespace diracstep::detail {
 
 namespace {
 
+constexpr int shortest_unrolled = 5;
+
 /// Elimination by columns with row exchanges, for few unknowns: of fixed size N, or of any size for N = 0.
 /// Multipliers that vanish, of which saddle-point matrices have many, are skipped.
 template <int N>
@@ -44,6 +46,7 @@ class SmallLu final : public LinearSolver {
   void solve(double* b) override {
     const int n = size();
     for (int k = 0; k < n; ++k) std::swap(b[k], b[exchanges_[static_cast<std::size_t>(k)]]);
+    if constexpr (N >= shortest_unrolled) return substitute(b);
     for (int k = 0; k < n; ++k) subtract(column(k), k, b[k], b);
     for (int k = n - 1; k >= 0; --k) {
       b[k] *= inverse_pivots_[static_cast<std::size_t>(k)];
@@ -56,6 +59,27 @@ class SmallLu final : public LinearSolver {
  private:
   int size() const { return N > 0 ? N : size_; }
   double* column(int j) { return lu_.data() + static_cast<std::ptrdiff_t>(j) * size(); }
+
+  /// Substitution with b in registers: each entry waits for the one before it, and where that goes through
+  /// memory the waiting takes twice the time.
+  void substitute(double* b) const {
+    const double* const lu = lu_.data();
+    const double* const inverse_pivots = inverse_pivots_.data();
+    std::array<double, std::max(N, 1)> held;
+    double* const x = held.data();
+    std::copy_n(b, N, x);
+#pragma GCC unroll 16
+    for (int k = 0; k < N; ++k)
+#pragma GCC unroll 16
+      for (int i = k + 1; i < N; ++i) x[i] -= x[k] * lu[k * N + i];
+#pragma GCC unroll 16
+    for (int k = N - 1; k >= 0; --k) {
+      x[k] *= inverse_pivots[k];
+#pragma GCC unroll 16
+      for (int i = 0; i < k; ++i) x[i] -= lu[k * N + i] * x[k];
+    }
+    std::copy_n(x, N, b);
+  }
 
   /// to −= factor · from, below row k.
   void subtract(const double* from, int k, double factor, double* to) const {

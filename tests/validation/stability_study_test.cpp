@@ -209,9 +209,9 @@ TEST(EnergyDoubt, NamesTheWorstPoint) {
   EXPECT_NE(doubt.text().find("t = 1:"), std::string::npos) << doubt.text();
 }
 
-/// What the methods below do on a case, a letter each: A accurate, B bounded, t told (a reported failure, or a
-/// doubt the user is told of), r refused by Misuse.  Where it is chance, both letters stand.  W, a wrong number
-/// without a word, stands nowhere.
+/// What the methods below do on a case, a letter each: A accurate, B bounded, t told (a reported failure, or
+/// a doubt the user is told of), r refused by Misuse.  Where it is chance, both letters stand.  W, a wrong
+/// number without a word, stands nowhere.
 const std::vector<StabilityMethod> tabled_methods{
     {"type1/midpoint", 2}, {"type1/gl:3", 6}, {"type1/trapezoidal", 2}, {"type2/euler", 1}};
 const std::map<std::string, std::vector<std::string>> expected{
