@@ -15,6 +15,7 @@ namespace {
 
 constexpr double shown_error = 1e-6;
 constexpr long most_numbers = 60'000;  // positions kept of a run, give or take half
+constexpr long finer_track = 4;        // points of a motion to those of the other curves
 constexpr long fewest_points = 50;     // … and the points kept of the largest scene
 
 /// Better: below the shown error, and there the least work; else the smaller error.
@@ -145,7 +146,8 @@ void record_track(History& history, const Study& study, const StudyRow& row, lon
                   const IntegratorOf& integrator_of) {
   const auto& coordinates = history.motion.coordinates;
   const auto drawn = static_cast<long>(coordinates.size());
-  const long kept = std::clamp(most_numbers / std::max(drawn, 1L), std::min(fewest_points, points), points);
+  const long kept =
+      std::clamp(most_numbers / std::max(drawn, 1L), std::min(fewest_points, points), finer_track * points);
   const StepGrid grid = grid_of(study, std::max(row.steps, kept / 2));
   Integrator integrator = integrator_of(grid.step);
   const RunReport report =

@@ -212,10 +212,11 @@ std::string time_unit(const std::vector<SymbolNote>& notes) {
   };
   if (any({"d"})) return "d";
   if (any({"s", "N", "kg", "F", "H", "V", "A", "W", "J"})) return "s";
+  const bool any_pure = std::ranges::find(notes, "1", &SymbolNote::unit) != notes.end();
   const bool all_pure = std::ranges::all_of(notes, [](const SymbolNote& note) {
     return note.unit.empty() || note.unit == "1" || note.unit == "rad";
   });
-  return all_pure ? "1" : "";
+  return any_pure && all_pure ? "1" : "";
 }
 
 }  // namespace diracstep

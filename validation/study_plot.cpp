@@ -272,7 +272,8 @@ std::string draw_summary(const std::vector<Study>& studies, const std::filesyste
   const std::string script =
       std::string(style) +
       fmt::format(
-          "unset logscale y\nset format y '%s'\nset format x '%g'\nset yrange [{}:-0.7]\nset ytics ({}) "
+          "unset logscale y\nset format y '%s'\nset format x '%g'\nset xrange [*<0.5:2<*]\nset yrange "
+          "[{}:-0.7]\nset ytics ({}) "
           "noenhanced\n"
           "set ylabel ''\nset xlabel 'time of the yardstick over ours at the error 1e-6: right of 1 ours is "
           "faster'\n"

@@ -43,14 +43,23 @@ double violation(const ConstraintRows& rows, const Sample& end) {
   return std::max(residual.lpNorm<Eigen::Infinity>(), phi.lpNorm<Eigen::Infinity>());
 }
 
+/// In the first posing that completes of those that keep φ = 0.
 Truth true_end_by_ida(const Scene& scene, double t_end) {
-  const ReferenceRun fine = integrate_with_ida(scene, t_end, {.rtol = reference_rtol});
-  const ReferenceRun coarse = integrate_with_ida(scene, t_end, {.rtol = 10.0 * reference_rtol});
+  ReferenceRun fine;
+  ReferenceOptions options{.rtol = reference_rtol};
+  for (const Posing posing : {Posing::rates, Posing::rates_loose, Posing::index_2}) {
+    options.posing = posing;
+    fine = integrate_with_ida(scene, t_end, options);
+    if (fine.ok() || scene.rows() == 0) break;
+  }
+  options.rtol *= 10.0;
+  const ReferenceRun coarse = fine.ok() ? integrate_with_ida(scene, t_end, options) : ReferenceRun{};
   Truth truth{.kind = ida_method,
-              .how = fmt::format("IDA at rtol {:g}, beside {:g}", reference_rtol, 10.0 * reference_rtol),
+              .how = fmt::format("IDA at rtol {:g}, beside {:g}", reference_rtol, options.rtol),
               .missing = fine.ok() ? "" : "no reference: IDA stopped: " + fine.failure,
               .q = fine.end.q,
               .p = fine.end.p};
+  if (options.posing != Posing::rates) truth.how += std::string(", posing ") + name(options.posing);
   if (fine.ok() && coarse.ok()) truth.self_error = truth.distance(coarse.end);
   return truth;
 }

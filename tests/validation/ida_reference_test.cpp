@@ -195,6 +195,16 @@ TEST(Posings, AllReachTheClosedFormAndOnlyOneDrifts) {
   EXPECT_GT(off_the_circle(Posing::velocity), 1e-7);
 }
 
+TEST(TrueEnd, TakesAnotherPosingWhereTheUsualOneStops) {
+  const CatalogueScene chain = make_scene("hanging_chain");
+  constexpr double end = 0.02;
+  EXPECT_FALSE(integrate_with_ida(*chain.scene, end, {.rtol = 1e-13}).ok());
+  const Truth truth = true_end(chain, end);
+  EXPECT_EQ(truth.missing, "");
+  EXPECT_LT(truth.self_error, 1e-6);
+  EXPECT_NE(truth.how.find("rates-loose"), std::string::npos) << truth.how;
+}
+
 TEST(BestPosings, ReachAnErrorThatTheUsualOneDoesNotOnAStiffMechanism) {
   const CatalogueScene entry = make_scene("andrews_squeezer");
   const Truth truth = true_end(entry, entry.t_end);

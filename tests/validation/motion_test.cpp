@@ -64,6 +64,7 @@ TEST(TimeUnit, IsReadOffTheUnitsOfASceneAndElseUnknown) {
   EXPECT_EQ(time_unit(make_scene("outer_solar_system").notes), "d");
   EXPECT_EQ(time_unit(make_scene("kepler_e06").notes), "1");
   EXPECT_EQ(time_unit({{"x", "m", ""}}), "");
+  EXPECT_EQ(time_unit({{"angle", "rad", ""}, {"m1", "", ""}}), "");
   EXPECT_EQ(time_unit({{"x", "rads", ""}}), "");  // no symbol inside of a word
 }
 

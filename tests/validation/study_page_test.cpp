@@ -42,7 +42,7 @@ TEST(History, RepeatsTheRunOfAStudyWithWhatShouldStay) {
   for (const double violation : history.constraint) EXPECT_LT(violation, 1e-13);
   EXPECT_FALSE(history.plan.empty());
   EXPECT_TRUE(history.failure.empty());
-  EXPECT_EQ(history.track_time.size(), 251u) << "the picture takes shorter steps";
+  EXPECT_EQ(history.track_time.size(), 1001u) << "the picture takes shorter steps";
   ASSERT_EQ(history.positions.size(), history.track_time.size());
   EXPECT_EQ(history.positions.back().size(), 3);
 }

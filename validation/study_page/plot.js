@@ -77,12 +77,12 @@ const Plot = (() => {
     return ticks.filter(t => t.at >= range.low && t.at <= range.high);
   }
 
-  // Leaves out labels that would touch the one before.
-  function apart(ticks, at) {
-    let end = -Infinity;
+  // Leaves out labels that would touch the one before or the edge of the picture.
+  function apart(ticks, at, width) {
+    let end = -gap;
     return ticks.filter(t => {
       const half = widthOf(t.label) / 2;
-      if (at(t.at) - half < end + gap) return false;
+      if (at(t.at) - half < end + gap || at(t.at) + half > width) return false;
       end = at(t.at) + half;
       return true;
     });
@@ -156,9 +156,7 @@ const Plot = (() => {
     const seen = [];
     const curves = spec.series.map(series => {
       const group = make('g', { class: 'series' }, layer);
-      const points = series.points.filter(p => Number.isFinite(p.x) && Number.isFinite(p.y) &&
-        (!spec.x.log || p.x > 0) && (!spec.y.log || p.y > 0))
-        .map(p => ({ x: at.x(ranges.x.place(p.x)), y: at.y(ranges.y.place(p.y)), tip: p.tip, series }));
+      const points = series.points.map(p => ({ x: at.x(ranges.x.place(p.x)), y: at.y(ranges.y.place(p.y)), tip: p.tip, series }));
       if (series.line !== false && points.length)
         make('path', { d: 'M' + points.map(p => `${p.x.toFixed(1)},${p.y.toFixed(1)}`).join('L'), style: stroke(series) }, group);
       if (series.marker !== undefined) points.forEach(p => mark(series, p.x, p.y, group));
@@ -198,39 +196,53 @@ const Plot = (() => {
     svg.addEventListener('pointerleave', hide);
   }
 
-  function plot(figure, spec) {
-    const width = Math.max(280, Math.floor(figure.clientWidth)), narrow = width < 560;
-    const shown = spec.legend === false ? [] : spec.series.filter(s => s.label && s.points.length);
+  const drawable = spec => p => Number.isFinite(p.x) && Number.isFinite(p.y) && (!spec.x.log || p.x > 0) && (!spec.y.log || p.y > 0);
+
+  // Where everything goes in a picture of a width: the plot's area, its scales and ticks, the legend.
+  function layoutOf(spec, width) {
+    const narrow = width < 560, shown = spec.legend === false ? [] : spec.series.filter(s => s.label && s.points.length);
     const beside = width >= 760 && shown.length > 3;
     const keys = shown.length ? arrange(shown, width, beside) : { width: 0, height: 0 };
     const ranges = { x: scale(spec.x, spec.series.flatMap(s => s.points.map(p => p.x))),
       y: scale(spec.y, spec.series.flatMap(s => s.points.map(p => p.y))) };
-    if (spec.y.categories) Object.assign(ranges.y, { low: -0.7, high: spec.y.categories.length - 0.3 });
-    const rows = spec.y.categories ? spec.y.categories.length * (narrow ? 44 : 32) + 20 : 0;
-    const plotHeight = rows || Math.round(Math.min(400, Math.max(240, (width - (beside ? keys.width : 0)) * 0.56)));
-    const area = { top: 10, bottom: 10 + plotHeight, left: 0, right: width - (beside ? keys.width + 22 : 14) };
-    const yTicks = ticksOf(spec.y, ranges.y, plotHeight, 30);
-    const named = spec.y.categories && narrow ? 4 : Math.max(0, ...yTicks.map(t => widthOf(t.label))) + tick + 5;
-    area.left = Math.ceil(named + (spec.y.label ? fontSize + gap + 4 : 2));
+    const categories = spec.y.categories && spec.y.categories.length;
+    if (categories) Object.assign(ranges.y, { low: -0.7, high: categories - 0.3 });
+    const rest = width - (beside ? keys.width : 0);
+    const tall = categories ? categories * (narrow ? 44 : 32) + 20 : Math.round(Math.min(400, Math.max(240, rest * 0.56)));
+    const area = { top: 10, bottom: 10 + tall, left: 0, right: rest - (beside ? 22 : 14) };
+    const names = categories && narrow ? [] : ticksOf(spec.y, ranges.y, tall, 30).map(t => widthOf(t.label));
+    area.left = Math.ceil(Math.max(0, ...names) + tick + 5 + (spec.y.label ? fontSize + gap + 4 : 2));
     if (spec.equal) equalise(ranges, area);
-    const place = (range, from, to) => value => from + (value - range.low) / (range.high - range.low) * (to - from);
-    const at = { x: place(ranges.x, area.left, area.right),
-      y: spec.y.categories ? place(ranges.y, area.top, area.bottom) : place(ranges.y, area.bottom, area.top) };
-    const ticks = { x: apart(ticksOf(spec.x, ranges.x, area.right - area.left, 56), at.x),
-      y: spec.equal ? ticksOf(spec.y, ranges.y, plotHeight, 30) : yTicks };
-    const foot = area.bottom + 2 * fontSize + 22, height = beside ? Math.max(foot, keys.height + 20) : foot + keys.height;
+    const at = scalesOf(ranges, area, categories);
+    const ticks = { x: apart(ticksOf(spec.x, ranges.x, area.right - area.left, 56), at.x, width),
+      y: ticksOf(spec.y, ranges.y, tall, 30) };
+    const foot = area.bottom + 2 * fontSize + 22;
+    return { narrow, shown, beside, keys, ranges, area, at, ticks, foot,
+      height: beside ? Math.max(foot, keys.height + 20) : foot + keys.height };
+  }
 
+  function scalesOf(ranges, area, categories) {
+    const place = (range, from, to) => value => from + (value - range.low) / (range.high - range.low) * (to - from);
+    const [from, to] = categories ? [area.top, area.bottom] : [area.bottom, area.top];
+    return { x: place(ranges.x, area.left, area.right), y: place(ranges.y, from, to) };
+  }
+
+  function plot(figure, given) {
+    const spec = { ...given, series: given.series.map(s => ({ ...s, points: s.points.filter(drawable(given)) })) };
+    const width = Math.max(280, Math.floor(figure.clientWidth)), layout = layoutOf(spec, width);
+    const { area, at, ranges, beside } = layout, height = layout.height;
     const svg = make('svg', { class: 'picture', width, height, viewBox: `0 0 ${width} ${height}`, role: 'img',
       'aria-label': spec.description || spec.name, 'font-size': fontSize, 'font-family': font });
-    drawAxes(svg, spec, area, at, ticks, narrow);
+    drawAxes(svg, spec, area, at, layout.ticks, layout.narrow);
     const { layer, curves, seen } = drawCurves(svg, spec, at, area, ranges);
-    if (shown.length)
-      legend(svg, shown, keys, beside ? area.right + 20 : Math.min(area.left, 10), beside ? area.top : foot + 4,
-        shown.map(s => curves[spec.series.indexOf(s)]));
+    svg.append(...svg.querySelectorAll('.tick'));  // names of categories lie on the curves where there is little room
+    if (layout.shown.length)
+      legend(svg, layout.shown, layout.keys, beside ? area.right + 20 : Math.min(area.left, 10),
+        beside ? area.top : layout.foot + 4, layout.shown.map(s => curves[spec.series.indexOf(s)]));
     figure.querySelectorAll(':scope > svg, :scope > img').forEach(old => old.remove());
     figure.querySelector('figcaption').after(svg);
     showValues(svg, figure, seen, width);
-    return { svg, layer, x: v => at.x(ranges.x.place(v)), y: v => at.y(ranges.y.place(v)), area };
+    return { svg, layer, x: v => at.x(ranges.x.place(v)), y: v => at.y(ranges.y.place(v)) };
   }
 
   // One unit is as long across as upwards: the shorter side is given more room.
