@@ -92,8 +92,8 @@ class StudyInProgress {
 
   Series chosen(const std::string& method, int order) const {
     if (method != automatic_method) return {method, order, false};
-    const DefaultMethod choice =
-        default_method(*entry_.scene, order, options_.constraint_rule, large_from(IntegratorOptions{}.dense_limit));
+    const DefaultMethod choice = default_method(*entry_.scene, order, options_.constraint_rule,
+                                                large_from(IntegratorOptions{}.dense_limit));
     return {choice.method, choice.order, false};
   }
 
