@@ -117,8 +117,8 @@ struct BareKlu {
 
 /// Steps past the first ones, in which predictors are compared, again and again from the start.
 bool measure_steps(Integrator& integrator, Measurement& m) {
-  constexpr int before = 20, timed = 16;
-  const int rounds = m[unknowns] > 3e5 ? 3 : 6;
+  constexpr int before = 16, timed = 16;
+  const int rounds = m[unknowns] > 3e5 ? 2 : 6;
   m[step] = HUGE_VAL;
   for (int round = 0; round < rounds; ++round) {
     integrator.reset();
@@ -152,12 +152,11 @@ void measure_bare(const Integrator& integrator, const char* method, Measurement&
     m.at(static_cast<std::size_t>(refactor + k)) = ns[static_cast<std::size_t>(k)] / m[unknowns];
 }
 
-/// A step that grows with the root of a link's length, so that links move as far beside their length in all
-/// sizes.
+/// Steps that grow with the length of a link, so that every size has the same step beside its fastest motion.
 bool measure(const std::string& scene, const char* method, Measurement& m) {
   const bool chain = scene == "hanging_chain";
   const double sites = std::floor(m[unknowns] / (chain ? 3.0 : 1.0));
-  const double h = chain ? 7.5e-4 * std::sqrt(1000.0 / m[unknowns]) : 0.05;
+  const double h = chain ? 0.75 / m[unknowns] : 0.05;
   const double memory_before = resident_kilobytes(), start = processor_seconds();
   const CatalogueScene entry = make_scene(scene, {{"N", sites}});
   Integrator integrator(entry.scene, Registry::with_built_ins(), kinsol(), {.method = method, .step = h});

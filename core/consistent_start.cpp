@@ -1,5 +1,5 @@
 #include <Eigen/QR>
-#include <Eigen/SparseQR>
+#include <Eigen/SparseCholesky>
 #include <algorithm>
 #include <diracstep/core/consistent_start.hpp>
 #include <diracstep/core/constraint_distribution.hpp>
@@ -185,23 +185,27 @@ Eigen::SparseMatrix<double> sparse_one_forms(const ConstraintsAtPoint& rows) {
   return one_forms;
 }
 
-template <class Qr>
-std::vector<int> beyond_rank(const Qr& qr) {
-  const auto& order = qr.colsPermutation().indices();
-  return {order.data() + qr.rank(), order.data() + order.size()};
-}
-
 std::vector<int> dependent_columns(const Columns& one_forms, double tolerance) {
   Eigen::ColPivHouseholderQR<Columns> qr;
   qr.setThreshold(tolerance);
   qr.compute(one_forms);
-  return beyond_rank(qr);
+  const auto& order = qr.colsPermutation().indices();
+  return {order.data() + qr.rank(), order.data() + order.size()};
 }
+
+/// The pivots of the Gram matrix are squared distances from the columns before.  The shift keeps those that
+/// vanish from dividing, and 1e-12 is what round-off leaves to be told from zero.
 std::vector<int> dependent_columns(const Eigen::SparseMatrix<double>& one_forms, double tolerance) {
-  Eigen::SparseQR<Eigen::SparseMatrix<double>, Eigen::COLAMDOrdering<int>> qr;
-  qr.setPivotThreshold(tolerance);
-  qr.compute(one_forms);
-  return beyond_rank(qr);
+  const Eigen::SparseMatrix<double> products = one_forms.transpose() * one_forms;
+  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factors;
+  factors.setShift(1e-14);
+  factors.compute(products);
+  const Vector pivots = factors.vectorD();
+  const auto& order = factors.permutationPinv().indices();
+  std::vector<int> dependent;
+  for (Eigen::Index k = 0; k < pivots.size(); ++k)
+    if (!(pivots[k] > std::max(tolerance * tolerance, 1e-12))) dependent.push_back(order[k]);
+  return dependent;
 }
 
 }  // namespace

@@ -21,9 +21,9 @@ struct ConsistentStart {
 /// place of v is given its velocity first.  Throws Misuse where no such point is found, saying why.
 ConsistentStart project_start(const Scene& scene, const Start& start, const SolverFactory& solvers);
 
-/// Names of the rows of A(t,q) that depend on the others to within `tolerance` of their size, by a QR
-/// decomposition of Aᵀ: full with column pivoting for few rows, sparse and in time that grows with the number
-/// of entries for many.  Empty where all rows are independent.
+/// Names of the rows of A(t,q) that depend on the others to within `tolerance` of their size, found with
+/// column pivoting; of more than 100 rows, where sparse products are factored, to within 1e-6 at best.  Empty
+/// where all rows are independent.
 std::vector<std::string> dependent_rows(const Scene& scene, const Start& start, double tolerance = 1e-10);
 
 /// The same scene without the rows of these names.

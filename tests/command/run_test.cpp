@@ -28,7 +28,7 @@ TEST_F(RunCommand, OfALargeSceneTheFirstCoordinatesAndTheLastAreShown) {
   const std::string chain = "run hanging_chain --method type1/midpoint --end 0.01";
   const Outcome outcome = run(chain);
   ASSERT_EQ(outcome.status, 0) << outcome.err;
-  for (const char* part : {"\nx_8 ", "\ny_64 ", "119 of 128 coordinates left out",
+  for (const char* part : {"\nx_4 ", "\ny_64 ", "119 of 128 coordinates left out",
                            "force of row link_8:", "55 of 64 rows left out", "force of row link_64:"})
     EXPECT_NE(outcome.out.find(part), std::string::npos) << part << " is missing in\n" << outcome.out;
   EXPECT_LT(lines(outcome.out).size(), 40u);
