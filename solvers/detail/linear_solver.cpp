@@ -123,7 +123,7 @@ class DenseLu final : public LinearSolver {
 
 /// Up to this size plain loops are faster than Eigen's blocks.
 constexpr int largest_small = 32;
-constexpr std::size_t largest_fixed = 12;
+constexpr std::size_t largest_fixed = 16;
 
 template <int N>
 std::unique_ptr<LinearSolver> small_lu(int size) {
