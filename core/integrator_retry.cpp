@@ -97,13 +97,14 @@ Integrator::Turn Integrator::turn(double h) const {
   return turn;
 }
 
-/// A solved stage that turns sharply is solved again from the guess along the last velocity; that solution is
-/// taken where it is another one that turns less.
+/// A solved stage that turns sharply, far from where it was predicted, is solved again from the guess along
+/// the last velocity; that solution is taken where it is another one that turns less.
 void Integrator::keep_straight_on(Stage& stage, double h, SolveReport& total) {
   Part& part = parts_[stage.part];
   const Turn found = turn(h);
   if (!part.solver || !(found.size > sharp_turn * found.speed)) return;
   if (!std::isnan(part.problem->constant_jacobian_parameter())) return;  // affine: one solution
+  if (part.continuation->distance(q_stage_, stage.solution, guess_) <= far_from_guess) return;  // expected
   ++work_.retries.plain_guesses;
   part.problem->guess(v_, guess_);
   const bool solved = solve(part, guess_, total).ok();
