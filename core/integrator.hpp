@@ -209,8 +209,8 @@ class Integrator {
   struct Turn {
     double size, speed;
   };
-  Turn turn(double h) const;
-  void keep_straight_on(Stage& stage, double h, SolveReport& total);
+  Turn turn(const Vector& q, double h) const;
+  void keep_straight_on(Stage& stage, const Vector& q, double h, SolveReport& total);
   void count(const SolveReport& report, long solves = 1);
   void forget();
   void compensate();

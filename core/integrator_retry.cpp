@@ -87,10 +87,10 @@ SolveReport Integrator::follow_stage(Stage& stage, Interval step, const Vector& 
   return found;
 }
 
-Integrator::Turn Integrator::turn(double h) const {
+Integrator::Turn Integrator::turn(const Vector& q, double h) const {
   Turn turn{0.0, 0.0};
   for (Eigen::Index i = 0; i < v_.size(); ++i) {
-    const double v = (q_next_[i] - q_stage_[i]) / h;
+    const double v = (q_next_[i] - q[i]) / h;
     turn.size = std::max(turn.size, std::abs(v - v_[i]));
     turn.speed = std::max({turn.speed, std::abs(v), std::abs(v_[i])});
   }
@@ -99,19 +99,19 @@ Integrator::Turn Integrator::turn(double h) const {
 
 /// A solved stage that turns sharply, far from where it was predicted, is solved again from the guess along
 /// the last velocity; that solution is taken where it is another one that turns less.
-void Integrator::keep_straight_on(Stage& stage, double h, SolveReport& total) {
+void Integrator::keep_straight_on(Stage& stage, const Vector& q, double h, SolveReport& total) {
   Part& part = parts_[stage.part];
-  const Turn found = turn(h);
+  const Turn found = turn(q, h);
   if (!part.solver || !(found.size > sharp_turn * found.speed)) return;
   if (!std::isnan(part.problem->constant_jacobian_parameter())) return;  // affine: one solution
-  if (part.continuation->distance(q_stage_, stage.solution, guess_) <= far_from_guess) return;  // expected
+  if (part.continuation->distance(q, stage.solution, guess_) <= far_from_guess) return;  // expected
   ++work_.retries.plain_guesses;
   part.problem->guess(v_, guess_);
   const bool solved = solve(part, guess_, total).ok();
   total.status = SolveStatus::ok;
-  if (solved && part.continuation->distance(q_stage_, stage.solution, guess_) > another_solution) {
+  if (solved && part.continuation->distance(q, stage.solution, guess_) > another_solution) {
     part.problem->finish(guess_, q_next_, p_next_, impulse_);
-    if (turn(h).size < found.size) {
+    if (turn(q, h).size < found.size) {
       ++work_.retries.other_branches;
       stage.solution = guess_;
       return;

@@ -59,7 +59,7 @@ TEST_F(FullDisk, ACheckpointThatDoesNotFitLeavesTheOldOne) {
 TEST_F(FullDisk, AStudyKeepsWhatIsThere) {
   const std::string study = "study knife_edge --methods type1/midpoint --steps 0.1 --rtols 1e-4 --repeat 1";
   write("table.md", "before\n");
-  expect_told(run(study + " --out " + path("out") + " --table " + path("table.md"), limit(1)), "out/");
+  expect_told(run(study + " --out " + path("out") + " --table " + path("table.md"), limit(4)), "out/");
   EXPECT_EQ(contents(path("table.md")), "before\n");
   for (const auto& entry : fs::recursive_directory_iterator(path("out")))
     EXPECT_NE(entry.path().extension(), ".new") << entry.path();
