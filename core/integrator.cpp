@@ -70,7 +70,7 @@ Integrator::Integrator(Preparation preparation, const Registry& registry, const 
       method_(choose_method(registry)),
       matrices_(matrix_form(*scene_, options_.dense_limit)),
       solvers_(solvers),
-      velocity_problem_(*scene_, matrices_.full) {
+      velocity_problem_(std::make_unique<VelocityProblem>(*scene_, matrices_.full)) {
   require_step(options_.step);
   if (options_.substeps < 1)
     throw Misuse("substeps = " + std::to_string(options_.substeps) + "; 1 or more is needed");
@@ -78,16 +78,16 @@ Integrator::Integrator(Preparation preparation, const Registry& registry, const 
     require_discretisation(*options_.constraint_rule->own, scene_->constraints, scene_->start.time,
                            scene_->start.q);
   if (scene_->lagrangian->structure().phase_space()) {
-    phase_space_velocity_problem_.emplace(*scene_, matrices_.full);
+    phase_space_velocity_problem_ = std::make_unique<PhaseSpaceVelocityProblem>(*scene_, matrices_.full);
     velocity_solver_ = solvers(*phase_space_velocity_problem_);
   } else {
-    velocity_solver_ = solvers(velocity_problem_);
+    velocity_solver_ = solvers(*velocity_problem_);
   }
   plan_stages(registry, solvers);
   if (options_.compensated_sums) compensate();
-  velocity_unknowns_.setZero(velocity_problem_.size());
+  velocity_unknowns_.setZero(velocity_problem_->size());
   start_velocity_.setZero(scene_->dimension());
-  acceleration_unknowns_.setZero(velocity_problem_.size());
+  acceleration_unknowns_.setZero(velocity_problem_->size());
   const Eigen::Index n = scene_->dimension();
   for (Vector* column : {&q_next_, &p_next_, &q_stage_, &p_stage_, &before_.q, &before_.p, &before_.v})
     column->setZero(n);
@@ -373,7 +373,7 @@ SolveReport Integrator::project_velocity(double t, const Vector& q, const Vector
     v = v_;
     return velocity_solver_->solve(v);
   }
-  velocity_problem_.begin(t, q, p);
+  velocity_problem_->begin(t, q, p);
   velocity_unknowns_.head(n) = v_;
   velocity_unknowns_.tail(velocity_unknowns_.size() - n).setZero();
   const SolveReport report = velocity_solver_->solve(velocity_unknowns_);

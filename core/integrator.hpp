@@ -230,9 +230,9 @@ class Integrator {
   std::vector<Part> parts_;
   std::vector<Stage> stages_;
   SolverFactory solvers_;
-  VelocityProblem velocity_problem_;
+  std::unique_ptr<VelocityProblem> velocity_problem_;  // the solvers refer to the problems, also after a move
   std::unique_ptr<AccelerationProblem> acceleration_problem_;  ///< made when it is needed first
-  std::optional<PhaseSpaceVelocityProblem>
+  std::unique_ptr<PhaseSpaceVelocityProblem>
       phase_space_velocity_problem_;  ///< instead of both, where L is linear in v
   std::unique_ptr<NonlinearSolver> velocity_solver_;
   std::unique_ptr<NonlinearSolver> acceleration_solver_;

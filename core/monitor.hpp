@@ -38,8 +38,8 @@ class PointwiseMotion {
  private:
   bool dense_;
   Eigen::Index n_;
-  VelocityProblem velocity_problem_;
-  AccelerationProblem acceleration_problem_;
+  std::unique_ptr<VelocityProblem> velocity_problem_;
+  std::unique_ptr<AccelerationProblem> acceleration_problem_;
   std::unique_ptr<NonlinearSolver> velocity_solver_, acceleration_solver_;
   Eigen::PartialPivLU<Eigen::MatrixXd> factors_;
   Columns matrix_;

@@ -236,11 +236,12 @@ std::string draw_work_precision(const Study& study, const std::vector<SeriesStyl
   const std::size_t height = std::max<std::size_t>(480, 90 + 28 * static_cast<std::size_t>(drawn));
   const std::string title = fmt::format("{}: t = {:g} … {:g}", study.scene, study.t_start, study.t_end);
   const std::string stem = (directory / file_name(study.scene)).string(), error = "relative error of q and p";
-  const bool any_of_ours = std::ranges::any_of(steps, [](const Curve& c) { return !c.data.empty(); });
+  const bool two_steps =  // an order takes two
+      std::ranges::any_of(steps, [](const Curve& c) { return std::ranges::count(c.data, '\n') > 1; });
   return first_failure(
       {render(std::string(style) + axes(title, "CPU time [s]", error + " at the end [1]") + plotted(work),
               stem, 980, height),
-       any_of_ours
+       two_steps
            ? render(std::string(style) + axes(title, "step size", error + " at the end [1]") + plotted(steps),
                     stem + "-orders", 980, height)
            : ""});
