@@ -15,7 +15,7 @@ ConstraintDistribution::ConstraintDistribution(const ConstraintBlocks& blocks, i
 
 /// Calls evaluate(block, first row, values of that block) and puts the values in their places.
 template <class Evaluate>
-void ConstraintDistribution::for_each_block(VectorRef values, Evaluate evaluate) {
+void ConstraintDistribution::for_each_block(VectorRef& values, Evaluate evaluate) {
   if (blocks_.size() == 1) return evaluate(*blocks_.front(), 0, values);
   int row = 0;
   for (std::size_t k = 0; k < blocks_.size(); ++k) {
@@ -28,14 +28,14 @@ void ConstraintDistribution::for_each_block(VectorRef values, Evaluate evaluate)
 }
 
 void ConstraintDistribution::coefficients(double t, ConstVectorRef q, VectorRef a, VectorRef b) {
-  for_each_block(a, [&](const ConstraintRows& block, int row, VectorRef values) {
+  for_each_block(a, [&](const ConstraintRows& block, int row, auto& values) {
     block.coefficients(t, q, values, b.segment(row, block.rows()));
   });
 }
 
 void ConstraintDistribution::derivative(double t, ConstVectorRef q, ConstVectorRef w, double s, VectorRef d) {
   for_each_block(
-      d, [&](const ConstraintRows& block, int, VectorRef values) { block.derivative(t, q, w, s, values); });
+      d, [&](const ConstraintRows& block, int, auto& values) { block.derivative(t, q, w, s, values); });
 }
 
 void ConstraintDistribution::time_derivative(double t, ConstVectorRef q, ConstVectorRef v, VectorRef d) {

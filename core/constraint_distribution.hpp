@@ -24,7 +24,7 @@ class ConstraintDistribution {
 
  private:
   template <class Evaluate>
-  void for_each_block(VectorRef values, Evaluate evaluate);
+  void for_each_block(VectorRef& values, Evaluate evaluate);
 
   ConstraintBlocks blocks_;
   SparsityPattern pattern_;

@@ -284,7 +284,7 @@ class GaussLobattoStep final : public StepProblem {
 
   /// values = ∂(momentum rows)/∂V without the curvature of the constraint rows.  Of a quadratic L they are
   /// those of the last Jacobian with this step size.
-  void add_momentum_blocks(VectorRef values) {
+  void add_momentum_blocks(VectorRef& values) {
     if (same_momentum_blocks_ && momentum_blocks_step_ == step_size()) {
       values = momentum_blocks_;
       return;
@@ -301,7 +301,7 @@ class GaussLobattoStep final : public StepProblem {
   }
 
   /// −h² Σ_j â_ij a_jk ∂²L/∂q²_j − h â_ik ∂²L/∂q∂v_k + h a_ik ∂²L/∂v∂q_i + δ_ik ∂²L/∂v²_i.
-  void add_momentum_block(int i, int k, VectorRef values) {
+  void add_momentum_block(int i, int k, VectorRef& values) {
     const StageWeights& weights = points_.weights;
     const auto size = static_cast<int>(block_.size());
     combine(size, s_, &weights.stiffness(0, i * s_ + k), lqq_.data(), nullptr, block_.data());
@@ -310,15 +310,15 @@ class GaussLobattoStep final : public StepProblem {
         block_[e] += weights.force(k, i) * lqv_(e, k) +
                      weights.position(k, i) * lqv_(mirror_[static_cast<std::size_t>(e)], i);
     if (i == k) block_ += lvv_.col(i);
-    layout_.add_to(values, i * s_ + k, 1.0, block_.data());
+    layout_.add_to(values.data(), i * s_ + k, 1.0, block_.data());
   }
 
-  void add_force_block(int i, int k, VectorRef values) {
+  void add_force_block(int i, int k, VectorRef& values) {
     const StageWeights& weights = points_.weights;
     combine(static_cast<int>(force_block_.size()), s_, &weights.stiffness(0, i * s_ + k), fq_.data(), nullptr,
             force_block_.data());
     force_block_ += weights.force(k, i) * fv_.col(k);
-    layout_.add_to(values, s_ * s_ + i * s_ + k, 1.0, force_block_.data());
+    layout_.add_to(values.data(), s_ * s_ + i * s_ + k, 1.0, force_block_.data());
   }
 
   /// Size of the impulses of such multipliers, and of what they lose to the round-off of positions.

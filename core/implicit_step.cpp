@@ -112,7 +112,7 @@ class ImplicitStep final : public StepProblem {
     values.setZero();
     for (const HessianBlock& block : hessian_blocks_) {
       const double factor = block.row_factor(*this) * block.column_factor(*this);
-      layout_.add_to(values, block.layout, factor, hessian_.col(block.pair).data());
+      layout_.add_to(values.data(), block.layout, factor, hessian_.col(block.pair).data());
     }
     if (force_) add_force(values);
     if (m_ == 0) return;
@@ -253,9 +253,10 @@ class ImplicitStep final : public StepProblem {
     }
   }
 
-  void add_force(VectorRef values) {
+  void add_force(VectorRef& values) {
     force_->minus_by_end(data_.step, data_.q0, q1_, force_by_end_);
-    if (force_layout_ >= 0) return layout_.add_to(values, force_layout_, row_factor(), force_by_end_.data());
+    if (force_layout_ >= 0)
+      return layout_.add_to(values.data(), force_layout_, row_factor(), force_by_end_.data());
     for (ProductBlock& block : force_products_) {
       const double* s = hessian_.col(block.pair).data();
       const double* f = force_by_end_.data();
@@ -264,35 +265,35 @@ class ImplicitStep final : public StepProblem {
       double factor = 1.0;
       if (!in_argument) factor = row_factor() * graph_.end_sign * (block.column == 1 ? end_factor() : 1.0);
       if (in_argument && block.column == 0) factor = -graph_.start_sign;
-      layout_.add_to(values, block.layout, factor, block.values.data());
+      layout_.add_to(values.data(), block.layout, factor, block.values.data());
     }
   }
 
   /// ∂/∂(hλ) of the graph and stationarity rows.
-  void add_constraint_columns(VectorRef values) {
+  void add_constraint_columns(VectorRef& values) {
     const Vector& a0 = data_.start_rows.coefficients();
-    if (graph_.starts_from_position) return layout_.add_to(values, impulse_layout_, 1.0, a0.data());
+    if (graph_.starts_from_position) return layout_.add_to(values.data(), impulse_layout_, 1.0, a0.data());
     for (ProductBlock& block : columns_of_impulse_) {
       block.product.multiply(hessian_.col(block.pair).data(), a0.data(), block.values.data());
       if (block.column == 1) continue;  // the end is no row; see add_constraint_rows
       const double factor = block.column == 0 ? -graph_.start_sign : 1.0;
-      layout_.add_to(values, block.layout, factor / data_.step.size, block.values.data());
+      layout_.add_to(values.data(), block.layout, factor / data_.step.size, block.values.data());
     }
   }
 
   /// The rows c(q0,q1): ∂/∂(end) and ∂/∂(inner), and ∂/∂(hλ) for type four.
-  void add_constraint_rows(VectorRef values) {
+  void add_constraint_rows(VectorRef& values) {
     const Vector& c1 = data_.end_derivative;
-    if (graph_.ends_at_position) return layout_.add_to(values, end_layout_, 1.0, c1.data());
+    if (graph_.ends_at_position) return layout_.add_to(values.data(), end_layout_, 1.0, c1.data());
     for (ProductBlock& block : rows_of_end_) {
       block.product.multiply(c1.data(), hessian_.col(block.pair).data(), block.values.data());
       const double factor = block.column == 1 ? end_factor() : 1.0;
-      layout_.add_to(values, block.layout, graph_.end_sign * factor, block.values.data());
+      layout_.add_to(values.data(), block.layout, graph_.end_sign * factor, block.values.data());
     }
     if (graph_.starts_from_position) return;
     impulse_through_end_.multiply(c1.data(), columns_of_impulse_[1].values.data(),
                                   through_end_values_.data());
-    layout_.add_to(values, impulse_through_end_layout_, graph_.end_sign / data_.step.size,
+    layout_.add_to(values.data(), impulse_through_end_layout_, graph_.end_sign / data_.step.size,
                    through_end_values_.data());
   }
 

@@ -56,7 +56,7 @@ class MultiplierStep final : public StepProblem {
                            displacement_values_.data());
     response_.multiply(data_.end_derivative.data(), displacement_values_.data(), response_values_.data());
     values.setZero();
-    layout_.add_to(values, 0, 1.0 / data_.step.size, response_values_.data());
+    layout_.add_to(values.data(), 0, 1.0 / data_.step.size, response_values_.data());
   }
 
   void finish(ConstVectorRef x, Vector& q1, Vector& p1, Vector& impulse) override {

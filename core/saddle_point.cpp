@@ -30,11 +30,11 @@ void SaddlePointProblem::move_to(double t, ConstVectorRef q) {
   if (m_ > 0) rows_.evaluate(t, q);
 }
 
-void SaddlePointProblem::assemble(VectorRef values) const {
+void SaddlePointProblem::assemble(VectorRef& values) const {
   values.setZero();
-  layout_.add_to(values, 0, 1.0, lvv_.data());
-  layout_.add_to(values, 1, -1.0, rows_.coefficients().data());
-  layout_.add_to(values, 2, 1.0, rows_.coefficients().data());
+  layout_.add_to(values.data(), 0, 1.0, lvv_.data());
+  layout_.add_to(values.data(), 1, -1.0, rows_.coefficients().data());
+  layout_.add_to(values.data(), 2, 1.0, rows_.coefficients().data());
 }
 
 void SaddlePointProblem::set_scales(double momentum, double velocity) {

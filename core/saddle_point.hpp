@@ -25,7 +25,7 @@ class SaddlePointProblem : public NonlinearProblem {
  protected:
   void move_to(double t, ConstVectorRef q);
   /// The saddle-point matrix with ∂²L/∂v² as it stands in lvv_.
-  void assemble(VectorRef values) const;
+  void assemble(VectorRef& values) const;
   void set_scales(double momentum, double velocity);
   /// The scales cover the terms at x as well: ∂²L/∂v² or ∂L/∂v of size `momentum`, and A times both parts of
   /// x.

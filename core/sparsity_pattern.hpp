@@ -94,9 +94,8 @@ class BlockPattern {
   const std::vector<int>& positions(int block) const { return positions_[static_cast<std::size_t>(block)]; }
 
   /// Adds factor times the values of a block to those of the whole.
-  void add_to(VectorRef whole, int block, double factor, const double* values) const {
-    double* const to = whole.data();
-    for (const int place : positions(block)) to[place] += factor * *values++;
+  void add_to(double* whole, int block, double factor, const double* values) const {
+    for (const int place : positions(block)) whole[place] += factor * *values++;
   }
 
  private:

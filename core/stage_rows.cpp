@@ -46,12 +46,13 @@ void StageRows::add_impulses(const StagePoints& at, ConstVectorRef x, Columns& i
   }
 }
 
-void StageRows::residual(const StagePoints& at, ConstVectorRef x, VectorRef f) {
+void StageRows::residual(const StagePoints& at, ConstVectorRef x, VectorRef& f) {
+  const double per_step = 1.0 / at.step.size;
   for (int j = 0; j < s_; ++j) {
     auto out = f.segment(first_ + stride_ * j, rows_->rows());
     if (rows_->holonomic()) {
       rows_->position(at.lobatto_time(j + 1), at.lobatto.col(j + 1), out);
-      out /= at.step.size;
+      out *= per_step;
       continue;
     }
     evaluate_gauss(at, j);
@@ -62,35 +63,37 @@ void StageRows::residual(const StagePoints& at, ConstVectorRef x, VectorRef f) {
 }
 
 void StageRows::add_to_jacobian(const StagePoints& at, const BlockPattern& layout, ConstVectorRef x,
-                                VectorRef values) {
+                                VectorRef& values) {
   for (int j = 1; j < s_; ++j)
     rows_->annihilator_derivative(at.lobatto_time(j), at.lobatto.col(j),
                                   x.segment(first_ + stride_ * j, rows_->rows()), curvature_.col(j));
   for (int i = 0; i < s_; ++i)
     for (int k = 0; k < s_; ++k) {
       const int place = first_layout_ + 3 * (i * s_ + k);
-      layout.add_to(values, place, at.weights.impulse(k, i), at_lobatto_.col(k).data());
+      layout.add_to(values.data(), place, at.weights.impulse(k, i), at_lobatto_.col(k).data());
       if (s_ == 1) continue;
       combine(static_cast<int>(sum_.size()), s_ - 1, &at.weights.row_curvature(1, i * s_ + k),
               curvature_.col(1).data(), nullptr, sum_.data());
-      layout.add_to(values, place + 1, 1.0, sum_.data());
+      layout.add_to(values.data(), place + 1, 1.0, sum_.data());
     }
   for (int j = 0; j < s_; ++j) add_constraint(at, layout, j, x, values);
 }
 
 void StageRows::add_constraint(const StagePoints& at, const BlockPattern& layout, int j, ConstVectorRef x,
-                               VectorRef values) {
+                               VectorRef& values) {
   const auto place = [&](int k) { return first_layout_ + 3 * (j * s_ + k) + 2; };
   if (rows_->holonomic()) {
     if (j + 1 == s_) evaluate_lobatto(at, s_);  // no impulse enters there
     for (int k = 0; k < s_; ++k)
-      layout.add_to(values, place(k), at.weights.table.lobatto_a(j + 1, k), at_lobatto_.col(j + 1).data());
+      layout.add_to(values.data(), place(k), at.weights.table.lobatto_a(j + 1, k),
+                    at_lobatto_.col(j + 1).data());
     return;
   }
   if (!gauss_known_) evaluate_gauss(at, j);
-  layout.add_to(values, place(j), 1.0, at_gauss_.col(j).data());
+  layout.add_to(values.data(), place(j), 1.0, at_gauss_.col(j).data());
   rows_->derivative(at.gauss_time(j), at.gauss.col(j), x.segment(n_ * j, n_), 1.0, derivative_);
-  for (int k = 0; k < s_; ++k) layout.add_to(values, place(k), at.weights.position(k, j), derivative_.data());
+  for (int k = 0; k < s_; ++k)
+    layout.add_to(values.data(), place(k), at.weights.position(k, j), derivative_.data());
 }
 
 double StageRows::form_size() const { return largest_entry(at_lobatto_.col(0).data(), at_lobatto_.rows()); }

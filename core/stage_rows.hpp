@@ -24,10 +24,11 @@ class StageRows {
   /// impulses += A(Q~_j)ᵀ λ_j, column j, with the multipliers in x.
   void add_impulses(const StagePoints& at, ConstVectorRef x, Columns& impulses);
   /// Their rows of f.
-  void residual(const StagePoints& at, ConstVectorRef x, VectorRef f);
+  void residual(const StagePoints& at, ConstVectorRef x, VectorRef& f);
   /// Their rows and columns of the Jacobian, and the curvature ∂(Aᵀλ)/∂q in the rows of the momentum; after
   /// add_impulses() at the same x.
-  void add_to_jacobian(const StagePoints& at, const BlockPattern& layout, ConstVectorRef x, VectorRef values);
+  void add_to_jacobian(const StagePoints& at, const BlockPattern& layout, ConstVectorRef x,
+                       VectorRef& values);
 
   /// A at Lobatto node j, values.
   auto lobatto(int j) const { return at_lobatto_.col(j); }
@@ -45,7 +46,7 @@ class StageRows {
   void evaluate_lobatto(const StagePoints& at, int j);
   void evaluate_gauss(const StagePoints& at, int j);
   void add_constraint(const StagePoints& at, const BlockPattern& layout, int j, ConstVectorRef x,
-                      VectorRef values);
+                      VectorRef& values);
 
   std::shared_ptr<const ConstraintRows> rows_;
   int s_, n_, first_, stride_;

@@ -59,7 +59,7 @@ void StageSplitting::factor_rows() {
   response_factors_.compute(response_);
 }
 
-void StageSplitting::solve(VectorRef f) {
+void StageSplitting::solve(VectorRef& f) {
   velocities_ = f.head(n_ * s_).reshaped(n_, s_);
   solve_mass(velocities_);
   if (m_ > 0) {

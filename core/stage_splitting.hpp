@@ -27,7 +27,7 @@ class StageSplitting {
   void factor_rows();
 
   /// f = (r, g), stage by stage, is replaced by (δV, δλ).
-  void solve(VectorRef f);
+  void solve(VectorRef& f);
 
  private:
   int s_, n_, m_;

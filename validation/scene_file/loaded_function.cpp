@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <diracstep/validation/scene_file/loaded_function.hpp>
 
@@ -26,6 +27,7 @@ LoadedFunction::LoadedFunction(LoadedScenePtr scene, const SceneFunction& functi
     : scene_(std::move(scene)), function_(&function), table_(table_of(*scene_, function)) {
   place_rows();
   for (const Piece& piece : function.pieces) load(piece);
+  plan_jobs();
 }
 
 void LoadedFunction::place_rows() {
@@ -109,26 +111,42 @@ void LoadedFunction::find_positions(const SparsityPattern& pattern, bool curvatu
     auto& positions = curvature ? loaded.curvature_positions : loaded.positions;
     for_each_entry(loaded, curvature, [&](int i, int j) { positions.push_back(pattern.position(i, j)); });
   }
+  plan_jobs();
 }
 
-void LoadedFunction::run(std::size_t number, KernelCall call) const {
+/// What does nothing is left out, and all that is not an argument is looked up once.
+void LoadedFunction::plan_jobs() {
+  jobs_.clear();
   const CompiledKernel* compiled = table_;
-  call.known = scene_->known.data();
   for (const LoadedPiece& loaded : pieces_) {
-    const Piece& piece = *loaded.piece;
-    const Kernel& kernel = piece.kernels[number];
-    if (!kernel.empty()) {
-      call.count = loaded.count;
-      call.slots = loaded.slots.data();
-      call.instance = loaded.instance.data();
+    const auto& kernels = loaded.piece->kernels;
+    jobs_.resize(std::max(jobs_.size(), kernels.size()));
+    for (std::size_t number = 0; number < kernels.size(); ++number) {
+      if (kernels[number].empty()) continue;
       const bool curvature = function_->kind == FunctionKind::rows && number == annihilator_kernel;
-      call.positions = (curvature ? loaded.curvature_positions : loaded.positions).data();
-      if (compiled != nullptr)
-        compiled[number](&call);
-      else
-        kernel.run(call, piece.instance_width(), piece.position_width(function_->kind, number));
+      jobs_[number].push_back({compiled != nullptr ? compiled[number] : nullptr, &kernels[number], &loaded,
+                               loaded.count, loaded.slots.data(),
+                               (curvature ? loaded.curvature_positions : loaded.positions).data(),
+                               loaded.instance.data()});
     }
-    if (compiled != nullptr) compiled += piece.kernels.size();
+    if (compiled != nullptr) compiled += kernels.size();
+  }
+}
+
+void LoadedFunction::run(std::size_t number, KernelCall& call) const {
+  if (number >= jobs_.size()) return;  // a function without pieces
+  call.known = scene_->known.data();
+  for (const Job& job : jobs_[number]) {
+    call.count = job.count;
+    call.slots = job.slots;
+    call.positions = job.positions;
+    call.instance = job.instance;
+    if (job.compiled != nullptr) {
+      job.compiled(&call);
+      continue;
+    }
+    const Piece& piece = *job.loaded->piece;
+    job.kernel->run(call, piece.instance_width(), piece.position_width(function_->kind, number));
   }
 }
 

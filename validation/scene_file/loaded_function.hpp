@@ -14,6 +14,7 @@ namespace diracstep {
 class LoadedFunction {
  public:
   LoadedFunction(LoadedScenePtr scene, const scene_compiler::SceneFunction& function);
+  LoadedFunction(LoadedFunction&&) = default;  // its jobs point into its pieces
 
   const scene_compiler::SceneFunction& function() const { return *function_; }
   const std::vector<std::string>& row_names() const { return row_names_; }
@@ -25,8 +26,9 @@ class LoadedFunction {
   /// Finds where each instance's derivatives go in the values of `pattern`.
   void find_positions(const SparsityPattern& pattern, bool curvature);
 
-  /// Adds kernel `number` of every piece to call.out.
-  void run(std::size_t number, scene_compiler::KernelCall call) const;
+  /// Adds kernel `number` of every piece to call.out; the rest of the call, but in, t, s and multipliers, is
+  /// filled in here.
+  void run(std::size_t number, scene_compiler::KernelCall& call) const;
 
  private:
   /// A piece with all its instances laid out.
@@ -37,6 +39,16 @@ class LoadedFunction {
     std::vector<double> instance = {};
     std::vector<int> positions = {}, curvature_positions = {};
   };
+  /// One kernel of one piece with all that it is called with but the arguments.
+  struct Job {
+    scene_compiler::CompiledKernel compiled;  ///< null where it is interpreted
+    const scene_compiler::Kernel* kernel;
+    const LoadedPiece* loaded;
+    long count;
+    const int *slots, *positions;
+    const double* instance;
+  };
+  void plan_jobs();
   template <class Visit>
   void for_each_entry(const LoadedPiece& loaded, bool curvature, const Visit& visit) const;
   void place_rows();
@@ -48,6 +60,7 @@ class LoadedFunction {
   const scene_compiler::SceneFunction* function_;
   const scene_compiler::CompiledKernel* table_;  ///< null where kernels are interpreted
   std::vector<LoadedPiece> pieces_;
+  std::vector<std::vector<Job>> jobs_;  ///< by the number of the kernel
   std::vector<int> first_rows_;
   std::vector<std::string> row_names_;
 };

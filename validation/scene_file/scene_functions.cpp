@@ -2,6 +2,7 @@
 #include <array>
 #include <diracstep/validation/scene_file/loaded_function.hpp>
 #include <diracstep/validation/scene_file/scene_functions.hpp>
+#include <utility>
 
 namespace diracstep {
 
@@ -14,6 +15,25 @@ SparsityPattern symmetric_pattern(int n, std::vector<std::pair<int, int>> entrie
   const std::size_t count = entries.size();
   for (std::size_t k = 0; k < count; ++k) entries.emplace_back(entries[k].second, entries[k].first);
   return {n, n, std::move(entries)};
+}
+
+/// Member by member: a struct set to zero as a whole costs more than the kernel of a small scene.
+KernelCall call_at(double t, const double* x, const double* y) {
+  return {0, nullptr, nullptr, nullptr, nullptr, {x, y, nullptr}, nullptr, {nullptr, nullptr, nullptr},
+          t, 0.0};
+}
+
+constexpr int few = 8;
+
+template <int... I>
+void clear_few(double* x, Eigen::Index size, std::integer_sequence<int, I...>) {
+  ((I < size ? void(x[I] = 0.0) : void()), ...);
+}
+
+/// x = 0, without a call for the few entries of a small scene.
+void clear(VectorRef& x) {  // by reference: copies of references are not free
+  if (x.size() > few) return void(x.setZero());
+  clear_few(x.data(), x.size(), std::make_integer_sequence<int, few>());
 }
 
 template <class Base>
@@ -35,8 +55,8 @@ class FilePhaseFunction final : public Base {
   }
 
   void gradient(double t, ConstVectorRef x, ConstVectorRef y, VectorRef fx, VectorRef fy) const override {
-    fx.setZero();
-    fy.setZero();
+    clear(fx);
+    clear(fy);
     KernelCall call = at(t, x, y);
     call.out[0] = fx.data();
     call.out[1] = fy.data();
@@ -45,9 +65,9 @@ class FilePhaseFunction final : public Base {
 
   void hessian(double t, ConstVectorRef x, ConstVectorRef y, VectorRef fxx, VectorRef fxy,
                VectorRef fyy) const override {
-    fxx.setZero();
-    fxy.setZero();
-    fyy.setZero();
+    clear(fxx);
+    clear(fxy);
+    clear(fyy);
     KernelCall call = at(t, x, y);
     call.out[0] = fxx.data();
     call.out[1] = fxy.data();
@@ -56,14 +76,14 @@ class FilePhaseFunction final : public Base {
   }
 
   void gradient_rate(double t, ConstVectorRef x, ConstVectorRef y, VectorRef fyt) const override {
-    fyt.setZero();
+    clear(fyt);
     KernelCall call = at(t, x, y);
     call.out[0] = fyt.data();
     function_.run(3, call);
   }
 
   void position_gradient_rate(double t, ConstVectorRef x, ConstVectorRef y, VectorRef fxt) const override {
-    fxt.setZero();
+    clear(fxt);
     KernelCall call = at(t, x, y);
     call.out[0] = fxt.data();
     function_.run(4, call);
@@ -74,11 +94,7 @@ class FilePhaseFunction final : public Base {
     return {f.separable, f.y_hessian_constant, f.y_hessian_diagonal, f.quadratic, f.y_hessian_zero};
   }
   static KernelCall at(double t, ConstVectorRef x, ConstVectorRef y) {
-    KernelCall call{};
-    call.t = t;
-    call.in[0] = x.data();
-    call.in[1] = y.data();
-    return call;
+    return call_at(t, x.data(), y.data());
   }
 
   LoadedFunction function_;
@@ -105,15 +121,15 @@ class FileRows final : public ConstraintRows {
 
   void position(double t, ConstVectorRef q, VectorRef phi) const override {
     if (!holonomic()) return ConstraintRows::position(t, q, phi);
-    phi.setZero();
+    clear(phi);
     KernelCall call = at(t, q);
     call.out[0] = phi.data();
     function_.run(0, call);
   }
 
   void coefficients(double t, ConstVectorRef q, VectorRef a, VectorRef b) const override {
-    a.setZero();
-    b.setZero();
+    clear(a);
+    clear(b);
     KernelCall call = at(t, q);
     call.out[0] = a.data();
     call.out[1] = b.data();
@@ -121,7 +137,7 @@ class FileRows final : public ConstraintRows {
   }
 
   void derivative(double t, ConstVectorRef q, ConstVectorRef w, double s, VectorRef d) const override {
-    d.setZero();
+    clear(d);
     KernelCall call = at(t, q);
     call.in[2] = w.data();
     call.s = s;
@@ -130,7 +146,7 @@ class FileRows final : public ConstraintRows {
   }
 
   void time_derivative(double t, ConstVectorRef q, ConstVectorRef v, VectorRef d) const override {
-    d.setZero();
+    clear(d);
     KernelCall call = at(t, q);
     call.in[2] = v.data();
     call.out[0] = d.data();
@@ -138,7 +154,7 @@ class FileRows final : public ConstraintRows {
   }
 
   void annihilator_derivative(double t, ConstVectorRef q, ConstVectorRef lambda, VectorRef d) const override {
-    d.setZero();
+    clear(d);
     KernelCall call = at(t, q);
     call.multipliers = lambda.data();
     call.out[0] = d.data();
@@ -146,12 +162,7 @@ class FileRows final : public ConstraintRows {
   }
 
  private:
-  static KernelCall at(double t, ConstVectorRef q) {
-    KernelCall call{};
-    call.t = t;
-    call.in[0] = q.data();
-    return call;
-  }
+  static KernelCall at(double t, ConstVectorRef q) { return call_at(t, q.data(), nullptr); }
 
   LoadedFunction function_;
 };
@@ -165,15 +176,15 @@ class FileForce final : public Force {
   }
 
   void value(double t, ConstVectorRef q, ConstVectorRef v, VectorRef f) const override {
-    f.setZero();
+    clear(f);
     KernelCall call = at(t, q, v);
     call.out[0] = f.data();
     function_.run(0, call);
   }
 
   void derivatives(double t, ConstVectorRef q, ConstVectorRef v, VectorRef fq, VectorRef fv) const override {
-    fq.setZero();
-    fv.setZero();
+    clear(fq);
+    clear(fv);
     KernelCall call = at(t, q, v);
     call.out[0] = fq.data();
     call.out[1] = fv.data();
@@ -182,11 +193,7 @@ class FileForce final : public Force {
 
  private:
   static KernelCall at(double t, ConstVectorRef q, ConstVectorRef v) {
-    KernelCall call{};
-    call.t = t;
-    call.in[0] = q.data();
-    call.in[1] = v.data();
-    return call;
+    return call_at(t, q.data(), v.data());
   }
 
   LoadedFunction function_;
@@ -221,10 +228,7 @@ InvariantFunction file_invariant(const LoadedScenePtr& scene, std::size_t number
   auto function = std::make_shared<const LoadedFunction>(scene, scene->program->invariants[number].function);
   return [function](double t, ConstVectorRef q, ConstVectorRef y) {
     double sum = 0.0;
-    KernelCall call{};
-    call.t = t;
-    call.in[0] = q.data();
-    call.in[1] = y.data();
+    KernelCall call = call_at(t, q.data(), y.data());
     call.out[0] = &sum;
     function->run(0, call);
     return sum;
