@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <diracstep/core/scales.hpp>
 #include <diracstep/solvers/detail/linear_solver.hpp>
 #include <limits>
 #include <utility>
@@ -26,14 +25,14 @@ class SmallLu final : public LinearSolver {
     const int n = size();
     std::copy_n(values, n * n, lu_.data());
     const double round_off = std::numeric_limits<double>::epsilon() * n;
-    const double surely_no_round_off = round_off * largest_entry(values, n * n);
     for (int k = 0; k < n; ++k) {
       double* const pivot_column = column(k);
       int pivot = k;
       for (int i = k + 1; i < n; ++i)
         if (std::abs(pivot_column[i]) > std::abs(pivot_column[pivot])) pivot = i;
-      const double size = std::abs(pivot_column[pivot]);
-      if (!(size > surely_no_round_off || size > round_off * largest_entry(values + k * n, n))) return false;
+      double largest = 0.0;
+      for (int i = 0; i < n; ++i) largest = std::max(largest, std::abs(values[i + k * n]));
+      if (!(std::abs(pivot_column[pivot]) > round_off * largest)) return false;
       exchanges_[static_cast<std::size_t>(k)] = pivot;
       if (pivot != k)
         for (int j = 0; j < n; ++j) std::swap(column(j)[k], column(j)[pivot]);
