@@ -9,7 +9,7 @@ namespace diracstep {
 
 StageRows::StageRows(std::shared_ptr<const ConstraintRows> rows, int stages, int first, int stride)
     : rows_(std::move(rows)), s_(stages), n_(rows_->dimension()), first_(first), stride_(stride) {
-  const int nonzeros = rows_->pattern().nonzeros(), curved = rows_->curvature_pattern().nonzeros();
+  const int nonzeros = rows_->pattern().nonzeros(), curved = curvature_pattern().nonzeros();
   at_lobatto_.setZero(nonzeros, s_ + 1);
   at_gauss_.setZero(nonzeros, s_);
   curvature_.setZero(curved, s_);
@@ -18,13 +18,18 @@ StageRows::StageRows(std::shared_ptr<const ConstraintRows> rows, int stages, int
   offset_.setZero(rows_->rows());
 }
 
+const SparsityPattern& StageRows::curvature_pattern() const {
+  static const SparsityPattern none;
+  return s_ > 1 ? rows_->curvature_pattern() : none;
+}
+
 void StageRows::plan(BlockPattern& layout) {
   const SparsityPattern& a = rows_->pattern();
   for (int i = 0; i < s_; ++i)
     for (int k = 0; k < s_; ++k) {
       const int number = layout.add(a, n_ * i, first_ + stride_ * k, true);
       if (first_layout_ < 0) first_layout_ = number;
-      layout.add(rows_->curvature_pattern(), n_ * i, n_ * k);
+      layout.add(curvature_pattern(), n_ * i, n_ * k);
       layout.add(a, first_ + stride_ * i, n_ * k);
     }
 }
