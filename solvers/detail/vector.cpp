@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <diracstep/core/scales.hpp>
 #include <diracstep/solvers/detail/vector.hpp>
 #include <utility>
 
@@ -29,9 +30,8 @@ struct Operations {
     for (long i = 0; i < n; ++i) to[i] = entry(i);
   }
 
-  static void constant(sunrealtype c, N_Vector z) {
-    fill(z, [c](long) { return c; });
-  }
+  /// KINSOL clears the unknowns of a linear system first, which a direct solver overwrites.
+  static void constant(sunrealtype, N_Vector) {}
   static void scale(sunrealtype c, N_Vector x, N_Vector z) {
     const double *const a = data_of(x);
     fill(z, [=](long i) { return c * a[i]; });
@@ -56,13 +56,7 @@ struct Operations {
     const double *const a = data_of(x);
     fill(z, [=](long i) { return 1.0 / a[i]; });
   }
-  static sunrealtype max_norm(N_Vector x) {
-    const double *const a = data_of(x);
-    const long n = length(x);
-    std::array<double, strands> largest{};
-    for (long i = 0; i < n; ++i) largest[i % strands] = std::max(largest[i % strands], std::abs(a[i]));
-    return *std::max_element(largest.begin(), largest.end());
-  }
+  static sunrealtype max_norm(N_Vector x) { return largest_entry(data_of(x), length(x)); }
   static sunrealtype minimum(N_Vector x) {
     const double *const a = data_of(x);
     return *std::min_element(a, a + length(x));
@@ -78,7 +72,14 @@ struct Operations {
     const double *const a = data_of(x), *const b = data_of(w);
     const long n = length(x);
     std::array<double, strands> sum{};
-    for (long i = 0; i < n; ++i) sum[i % strands] += (a[i] * b[i]) * (a[i] * b[i]);
+    const long whole = n - n % static_cast<long>(strands);
+    for (long i = 0; i < whole; i += strands)
+      for (std::size_t s = 0; s < strands; ++s) {
+        const double term = a[i + static_cast<long>(s)] * b[i + static_cast<long>(s)];
+        sum[s] += term * term;
+      }
+    for (long i = whole; i < n; ++i)
+      sum[static_cast<std::size_t>(i - whole)] += (a[i] * b[i]) * (a[i] * b[i]);
     return std::sqrt(sum[0] + sum[1] + sum[2] + sum[3]);
   }
 
@@ -106,9 +107,9 @@ constexpr auto installers(std::index_sequence<N...>) {
 
 }  // namespace
 
-VectorHandle make_vector(int size, SUNContext context) {
+VectorHandle make_view(int size, SUNContext context) {
   static constexpr auto install = installers(std::make_index_sequence<longest_fixed + 1>());
-  VectorHandle x(require(N_VNew_Serial(size, context), "N_VNew_Serial"));
+  VectorHandle x(require(N_VNewEmpty_Serial(size, context), "N_VNewEmpty_Serial"));
   const auto length = static_cast<std::size_t>(size);
   install.at(length <= longest_fixed ? length : 0)(*x->ops);
   return x;
