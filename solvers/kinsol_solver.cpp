@@ -46,8 +46,8 @@ class KinsolSolver final : public NonlinearSolver {
                    " residual blocks; at most 4 are reported");
     const int size = problem.size();
     x_ = detail::make_view(size, context_);
-    unknown_scale_.reset(require(N_VClone(x_.get()), "N_VClone"));
-    residual_scale_.reset(require(N_VClone(x_.get()), "N_VClone"));
+    unknown_scale_ = detail::make_weights(x_.get());
+    residual_scale_ = detail::make_weights(x_.get());
     for (Vector* column : {&guess_, &last_}) column->setZero(size);
     if (fixed_point_) contraction_residual_.setZero(size);
     matrix_shell_ = detail::make_matrix_shell(context_);
@@ -124,7 +124,7 @@ class KinsolSolver final : public NonlinearSolver {
 
   /// From the guess to a status.
   void attempt(int strategy) {
-    if (report_.residual_evaluations > 0) unknowns() = guess_;
+    if (report_.residual_evaluations > 0) unknowns() = guess_;  // the first attempt starts there
     strategy_ = strategy;
     int code = run();
     double norm = report_residual();
@@ -220,13 +220,15 @@ class KinsolSolver final : public NonlinearSolver {
   void set_scales() {
     const double size = largest_entry(guess_.data(), guess_.size());
     const double unit = size > 0.0 && std::isfinite(size) ? 1.0 / size : 1.0;
-    std::fill_n(data_of(unknown_scale_.get()), guess_.size(), unit);
-    double* scale = data_of(residual_scale_.get());
+    detail::set_weights(unknown_scale_.get(), std::array{detail::Run{guess_.size(), unit}});
+    std::array<detail::Run, 4> runs{};
     std::size_t b = 0;
     for (const ResidualBlock& block : problem_.blocks()) {
-      const double inverse = inverse_scales_.at(b++) = 1.0 / block.scale;
-      scale = std::fill_n(scale, block.rows, inverse);
+      inverse_scales_.at(b) = 1.0 / block.scale;
+      runs.at(b) = {block.rows, inverse_scales_.at(b)};
+      ++b;
     }
+    detail::set_weights(residual_scale_.get(), std::span(runs).first(b));
   }
 
   static KinsolSolver& self(void* data) { return *static_cast<KinsolSolver*>(data); }

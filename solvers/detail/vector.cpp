@@ -9,7 +9,7 @@ namespace diracstep::detail {
 
 namespace {
 
-/// Reductions go in so many strands: in a single one each addition waits for the last.
+/// Sums go in so many strands: in a single one each addition waits for the last.
 constexpr std::size_t strands = 4;
 
 /// The operations that KINSOL calls, on N entries; N = 0 reads the length from the vector.
@@ -72,14 +72,7 @@ struct Operations {
     const double *const a = data_of(x), *const b = data_of(w);
     const long n = length(x);
     std::array<double, strands> sum{};
-    const long whole = n - n % static_cast<long>(strands);
-    for (long i = 0; i < whole; i += strands)
-      for (std::size_t s = 0; s < strands; ++s) {
-        const double term = a[i + static_cast<long>(s)] * b[i + static_cast<long>(s)];
-        sum[s] += term * term;
-      }
-    for (long i = whole; i < n; ++i)
-      sum[static_cast<std::size_t>(i - whole)] += (a[i] * b[i]) * (a[i] * b[i]);
+    for (long i = 0; i < n; ++i) sum[i % strands] += (a[i] * b[i]) * (a[i] * b[i]);
     return std::sqrt(sum[0] + sum[1] + sum[2] + sum[3]);
   }
 
@@ -100,6 +93,58 @@ struct Operations {
 
 constexpr std::size_t longest_fixed = 16;
 
+/// Weights of a long vector, and what KINSOL does with them.  In each operation on a long vector that takes
+/// weights they are such ones.
+struct Weights {
+  std::array<Run, 4> runs{};
+  std::size_t count = 0;
+
+  static Weights &of(N_Vector w) { return *static_cast<Weights *>(w->content); }
+  static bool are(N_Vector w) { return w->ops->nvmin == minimum; }
+
+  /// Calls visit(first, behind the last, weight) for each run.
+  template <class Visit>
+  static void for_each(N_Vector w, Visit visit) {
+    long first = 0;
+    for (const Run &run : std::span(of(w).runs).first(of(w).count)) {
+      visit(first, first + run.length, run.value);
+      first += run.length;
+    }
+  }
+
+  static sunrealtype minimum(N_Vector w) {
+    double least = HUGE_VAL;
+    for_each(w, [&](long, long, double value) { least = std::min(least, value); });
+    return least;
+  }
+  static void inverse(N_Vector w, N_Vector z) {
+    for_each(w,
+             [to = data_of(z)](long i, long end, double value) { std::fill(to + i, to + end, 1.0 / value); });
+  }
+  /// Either factor is the weights.
+  static void product(N_Vector x, N_Vector w, N_Vector z) {
+    if (are(x)) std::swap(x, w);
+    for_each(w, [a = data_of(x), to = data_of(z)](long i, long end, double value) {
+      for (; i < end; ++i) to[i] = a[i] * value;
+    });
+  }
+  static sunrealtype norm(N_Vector x, N_Vector w) {
+    double sum = 0.0;
+    for_each(w, [&, a = data_of(x)](long first, long end, double value) {
+      std::array<double, 2 * strands> part{};
+      long i = first;
+      for (; i + static_cast<long>(part.size()) <= end; i += static_cast<long>(part.size()))
+        for (std::size_t s = 0; s < part.size(); ++s) {
+          const double term = a[i + static_cast<long>(s)] * value;
+          part[s] += term * term;
+        }
+      for (; i < end; ++i) sum += (a[i] * value) * (a[i] * value);
+      for (const double of : part) sum += of;
+    });
+    return std::sqrt(sum);
+  }
+};
+
 template <std::size_t... N>
 constexpr auto installers(std::index_sequence<N...>) {
   return std::array{&Operations<static_cast<int>(N)>::install...};
@@ -112,7 +157,35 @@ VectorHandle make_view(int size, SUNContext context) {
   VectorHandle x(require(N_VNewEmpty_Serial(size, context), "N_VNewEmpty_Serial"));
   const auto length = static_cast<std::size_t>(size);
   install.at(length <= longest_fixed ? length : 0)(*x->ops);
+  if (length > longest_fixed) {
+    x->ops->nvinv = Weights::inverse;
+    x->ops->nvprod = Weights::product;
+    x->ops->nvwl2norm = Weights::norm;
+  }
   return x;
+}
+
+VectorHandle make_weights(N_Vector vector) {
+  if (N_VGetLength(vector) <= static_cast<long>(longest_fixed))
+    return VectorHandle(require(N_VClone(vector), "N_VClone"));
+  VectorHandle w(require(N_VNewEmpty(vector->sunctx), "N_VNewEmpty"));
+  w->content = new Weights;  // NOLINT(cppcoreguidelines-owning-memory): nvdestroy deletes it
+  w->ops->nvdestroy = [](N_Vector v) {
+    delete static_cast<Weights *>(v->content);  // NOLINT(cppcoreguidelines-owning-memory)
+    N_VFreeEmpty(v);
+  };
+  w->ops->nvmin = Weights::minimum;
+  return w;
+}
+
+void set_weights(N_Vector weights, std::span<const Run> runs) {
+  if (Weights::are(weights)) {
+    Weights::of(weights).count = runs.size();
+    std::ranges::copy(runs, Weights::of(weights).runs.begin());
+    return;
+  }
+  double *to = data_of(weights);
+  for (const Run &run : runs) to = std::fill_n(to, run.length, run.value);
 }
 
 }  // namespace diracstep::detail

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <diracstep/solvers/detail/sundials.hpp>
+#include <span>
 
 namespace diracstep::detail {
 
@@ -11,5 +12,16 @@ namespace diracstep::detail {
 VectorHandle make_view(int size, SUNContext context);
 
 inline double*& data_of(N_Vector x) { return static_cast<N_VectorContent_Serial>(x->content)->data; }
+
+/// So many equal entries.
+struct Run {
+  long length;
+  double value;
+};
+
+/// Scales for vectors like this one, the only weights that KINSOL then takes with them.  They are equal over
+/// long runs, at most four: of a long vector only these are kept.
+VectorHandle make_weights(N_Vector vector);
+void set_weights(N_Vector weights, std::span<const Run> runs);
 
 }  // namespace diracstep::detail
