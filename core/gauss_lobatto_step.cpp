@@ -55,7 +55,6 @@ class GaussLobattoStep final : public StepProblem {
     same_momentum_blocks_ = quadratic && dense;
     last_x_.setZero(size());
     kept_.multipliers.setZero(m_ * s_);
-    q0_.setZero(n_);
     p0_.setZero(n_);
     const auto holonomic = [](const auto& block) { return block->holonomic(); };
     const auto kinds = std::ranges::count_if(scene.constraints, holonomic);
@@ -81,6 +80,7 @@ class GaussLobattoStep final : public StepProblem {
 
   bool compensate() override {
     sums_.emplace(s_, n_);
+    q0_.setZero(n_);
     return true;
   }
 
@@ -138,11 +138,13 @@ class GaussLobattoStep final : public StepProblem {
   void begin(Interval step, const Vector& q0, const Vector& p0) override {
     points_.step = step;
     points_.weights.scale_to(step.size);
-    if (sums_) sums_->begin(q0, p0, q0_, p0_);
-    q0_ = q0;
+    if (sums_) {
+      sums_->begin(q0, p0, q0_, p0_);
+      q0_ = q0;
+    }
     p0_ = p0;
     points_.lobatto.col(0) = q0;
-    position_size_ = largest_entry(q0_.data(), n_);
+    position_size_ = largest_entry(q0.data(), n_);
     splitting_known_ = false;
     force_size_ = kept_.force;
     curvature_ = kept_.curvature;
@@ -352,8 +354,9 @@ class GaussLobattoStep final : public StepProblem {
   /// Before the first solve: the derivatives at the start, for the round-off scales.
   void sample_start(const Vector& v0) {
     const double t = points_.step.start;
-    lagrangian_->gradient(t, q0_, v0, lq_.col(0), lv_.col(0));
-    lagrangian_->hessian(t, q0_, v0, lqq_.col(0), lqv_.col(0), lvv_.col(0));
+    const auto q0 = points_.lobatto.col(0);
+    lagrangian_->gradient(t, q0, v0, lq_.col(0), lv_.col(0));
+    lagrangian_->hessian(t, q0, v0, lqq_.col(0), lqv_.col(0), lvv_.col(0));
     const double before = blocks_[0].scale;  // of impulses nothing is known yet
     force_size_ = largest_entry(lq_.data(), n_);
     curvature_ = largest_entry(lqq_.data(), lqq_.rows());
@@ -391,7 +394,7 @@ class GaussLobattoStep final : public StepProblem {
 
   std::optional<CompensatedSums> sums_;
 
-  Vector q0_, p0_;
+  Vector q0_, p0_;  ///< q0_ for compensated sums alone; it is the first Lobatto point
   Vector last_x_, f_;
   Columns lq_, lv_;   ///< ∂L/∂q + f and ∂L/∂v at the Gauss nodes
   Columns impulses_;  ///< A(Q~_j)ᵀ λ_j

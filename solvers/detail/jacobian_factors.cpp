@@ -1,5 +1,6 @@
 #include <cmath>
 #include <diracstep/core/errors.hpp>
+#include <diracstep/core/scales.hpp>
 #include <diracstep/solvers/detail/jacobian_factors.hpp>
 #include <iterator>
 #include <limits>
@@ -133,7 +134,7 @@ JacobianFactors::Outcome JacobianFactors::prepare(ConstVectorRef x, double norm)
   ++evaluations_;
   current_->factored = current_->usable = false;
   problem_.jacobian(x, current_->values);
-  if (!current_->values.allFinite()) return Outcome::not_finite;
+  if (!all_finite(current_->values.data(), current_->values.size())) return Outcome::not_finite;
   current_->factored = true;
   current_->usable = current_->solver->factor(current_->values.data());
   return current_->usable ? Outcome::ready : Outcome::singular;
