@@ -1,7 +1,7 @@
 /// Large scenes from a thousand to a million unknowns: processor time of a step for each unknown, beside the
 /// bare work of such a step, and memory.
-///   large_scenes [LARGEST]   default 1e6 unknowns, some minutes; memory is read from /proc and left out
-///   elsewhere
+///   large_scenes [LARGEST [SCENE]]   default 1e6 unknowns of hanging_chain and toda_200, some minutes;
+///   memory is read from /proc and left out elsewhere
 ///
 /// Columns, times in nanoseconds for each unknown:
 ///   step        a step;   /least  beside the least of all sizes
@@ -12,7 +12,8 @@
 ///   /same       step beside  Jac · (refactor + Jacobian) + it · solve + res · residual
 ///   kB          resident memory;   build s  seconds for scene and integrator
 #include <klu.h>
-#include <stdio.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -167,14 +168,27 @@ bool measure(const std::string& scene, const char* method, Measurement& m) {
   return true;
 }
 
-/// Each size is measured by a program of its own, so that the memory of one is not that of the next.
-Measurement measure_apart(const std::string& program, const std::string& what, double size) {
-  const std::string command = '"' + program + "\" " + what + ' ' + std::to_string(std::lround(size));
-  FILE* const output = popen(command.c_str(), "r");
+/// Each size is measured by a process of its own, so that the memory of one is not that of the next.  Ends
+/// the program where a size cannot be measured.
+Measurement measure_apart(const std::string& scene, const char* method, double size) {
+  std::array<int, 2> ends{};
+  const pid_t child = pipe(ends.data()) == 0 ? fork() : -1;
   Measurement m{};
-  for (double& value : m)
-    if (output == nullptr || std::fscanf(output, "%lf", &value) != 1) value = std::nan("");
-  if (output != nullptr) pclose(output);
+  m[unknowns] = size;
+  if (child == 0) {
+    const bool measured = measure(scene, method, m);
+    const auto written = measured ? write(ends[1], m.data(), sizeof m) : 0;
+    _exit(written == sizeof m ? 0 : 1);
+  }
+  close(ends[1]);
+  const auto got = child > 0 ? read(ends[0], m.data(), sizeof m) : 0;
+  close(ends[0]);
+  int status = 1;
+  if (child < 0 || waitpid(child, &status, 0) != child || status != 0 || got != sizeof m) {
+    std::fprintf(stderr, "large_scenes: %s, %s with %.0f unknowns could not be measured\n", scene.c_str(),
+                 method, size);
+    std::exit(1);
+  }
   return m;
 }
 
@@ -204,19 +218,15 @@ void print(const std::string& what, const std::vector<Measurement>& sizes) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc == 4) {
-    Measurement m{};
-    m[unknowns] = std::strtod(argv[3], nullptr);
-    if (!measure(argv[1], argv[2], m)) return 1;
-    for (const double value : m) std::printf("%.6g ", value);
-    return 0;
-  }
-  if (argc > 2) return std::fputs("large_scenes [LARGEST | SCENE METHOD UNKNOWNS]\n", stderr), 2;
+  if (argc > 3) return std::fputs("large_scenes [LARGEST [SCENE]]\n", stderr), 2;
   const double largest = argc > 1 ? std::strtod(argv[1], nullptr) : 1e6;
-  for (const char* what : {"hanging_chain type1/midpoint", "toda_200 type1/midpoint"}) {
+  const char* const method = "type1/midpoint";
+  std::vector<std::string> scenes{"hanging_chain", "toda_200"};
+  if (argc > 2) scenes = {argv[2]};
+  for (const std::string& scene : scenes) {
     std::vector<Measurement> sizes;
     for (double size = 1000.0; size <= largest; size *= 10.0)
-      sizes.push_back(measure_apart(argv[0], what, size));
-    print(what, sizes);
+      sizes.push_back(measure_apart(scene, method, size));
+    print(scene + ", " + method, sizes);
   }
 }

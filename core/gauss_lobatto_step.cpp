@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <diracstep/core/combination.hpp>
 #include <diracstep/core/compensated_sums.hpp>
 #include <diracstep/core/gauss_lobatto_step.hpp>
@@ -54,7 +55,6 @@ class GaussLobattoStep final : public StepProblem {
     same_momentum_blocks_ = quadratic && dense;
     last_x_.setZero(size());
     kept_.multipliers.setZero(m_ * s_);
-    q0_.setZero(n_);
     p0_.setZero(n_);
     const auto holonomic = [](const auto& block) { return block->holonomic(); };
     const auto kinds = std::ranges::count_if(scene.constraints, holonomic);
@@ -80,6 +80,7 @@ class GaussLobattoStep final : public StepProblem {
 
   bool compensate() override {
     sums_.emplace(s_, n_);
+    q0_.setZero(n_);
     return true;
   }
 
@@ -137,18 +138,20 @@ class GaussLobattoStep final : public StepProblem {
   void begin(Interval step, const Vector& q0, const Vector& p0) override {
     points_.step = step;
     points_.weights.scale_to(step.size);
-    if (sums_) sums_->begin(q0, p0, q0_, p0_);
-    q0_ = q0;
+    if (sums_) {
+      sums_->begin(q0, p0, q0_, p0_);
+      q0_ = q0;
+    }
     p0_ = p0;
     points_.lobatto.col(0) = q0;
-    position_size_ = largest_entry(q0_.data(), n_);
+    position_size_ = largest_entry(q0.data(), n_);
     splitting_known_ = false;
     force_size_ = kept_.force;
     curvature_ = kept_.curvature;
     row_curvature_ = kept_.row_curvature;
     for (StageRows& rows : rows_) rows.begin(points_);
     update_scales();
-    last_x_[0] = std::nan("");
+    evaluated_ = false;
   }
 
   void guess(const Vector& v0, VectorRef x) override {
@@ -165,9 +168,11 @@ class GaussLobattoStep final : public StepProblem {
         sums_->momentum_row(i, step_size(), lv_.col(i), p0_, lq_, impulses_, f.segment(n_ * i, n_));
         continue;
       }
-      for (int k = 0; k < n_; ++k) momentum[k] = lv_(k, i) - p0_[k];
-      combine(n_, s_, &points_.weights.force(0, i), lq_.data(), momentum, momentum);
-      if (m_ > 0) combine(n_, s_, &points_.weights.impulse(0, i), impulses_.data(), momentum, momentum);
+      for_each_piece(n_, [&](int first, int rows) {
+        for (int k = first; k < first + rows; ++k) momentum[k] = lv_(k, i) - p0_[k];
+        add_forces_and_impulses(first, rows, &points_.weights.force(0, i), &points_.weights.impulse(0, i),
+                                momentum, momentum);
+      });
     }
     for (StageRows& rows : rows_) rows.residual(points_, x, f);
   }
@@ -191,8 +196,10 @@ class GaussLobattoStep final : public StepProblem {
     } else {
       q1 = points_.lobatto.col(s_);
       p1.resize(n_);
-      combine(n_, s_, weights.end_force.data(), lq_.data(), p0_.data(), p1.data());
-      if (m_ > 0) combine(n_, s_, weights.table.lobatto_b.data(), impulses_.data(), p1.data(), p1.data());
+      for_each_piece(n_, [&](int first, int rows) {
+        add_forces_and_impulses(first, rows, weights.end_force.data(), weights.table.lobatto_b.data(),
+                                p0_.data(), p1.data());
+      });
     }
     // The impulse at q0 is that part of λ_0 which enters there.
     impulse = weights.table.lobatto_b[0] * x.segment(n_ * s_, m_);
@@ -206,8 +213,10 @@ class GaussLobattoStep final : public StepProblem {
 
   /// Everything the residual is made of, at x, unless x is where it was last taken.
   void evaluate(ConstVectorRef x) {
-    if (last_x_ == x) return;
-    last_x_ = x;
+    if (evaluated_ &&
+        std::memcmp(x.data(), last_x_.data(), sizeof(double) * static_cast<std::size_t>(size())) == 0)
+      return;
+    evaluated_ = true;
     move_points(x);
     for (int i = 0; i < s_; ++i) {
       const auto v = x.segment(n_ * i, n_);
@@ -222,10 +231,18 @@ class GaussLobattoStep final : public StepProblem {
     blocks_[0].scale = std::max(blocks_[0].scale, (sums_ ? last_bit : 1.0) * impulse_scale(x.tail(m_ * s_)));
   }
 
-  /// q0 + h Σ_k a_ik V_k at the Gauss nodes, and so at those Lobatto nodes that are looked at.
+  /// to = base + Σ_j force_j ∂L/∂q_j + Σ_j impulse_j Aᵀλ_j in these rows.
+  void add_forces_and_impulses(int first, int rows, const double* force, const double* impulse,
+                               const double* base, double* to) const {
+    combine_piece(first, rows, n_, s_, force, lq_.data(), base, to);
+    if (m_ > 0) combine_piece(first, rows, n_, s_, impulse, impulses_.data(), to, to);
+  }
+
+  /// q0 + h Σ_k a_ik V_k at the Gauss nodes, and so at those Lobatto nodes that are looked at; x is kept.
   void move_points(ConstVectorRef x) {
     const int first_lobatto = m_ > 0 ? 1 : s_;
     if (sums_) {
+      last_x_ = x;
       const ExtendedGaussLobattoTableau& table = sums_->table;
       for (int i = 0; i < s_; ++i)
         sums_->position(step_size(), table.a.row(i), q0_, velocities(x), points_.gauss.col(i));
@@ -234,10 +251,16 @@ class GaussLobattoStep final : public StepProblem {
       return;
     }
     const StageWeights& weights = points_.weights;
-    for (int i = 0; i < s_; ++i)
-      combine(n_, s_, &weights.position(0, i), x.data(), q0_.data(), &points_.gauss(0, i));
-    for (int j = first_lobatto; j <= s_; ++j)
-      combine(n_, s_, &weights.lobatto(0, j), x.data(), q0_.data(), &points_.lobatto(0, j));
+    const double* const q0 = points_.lobatto.data();
+    for_each_piece(n_, [&](int first, int rows) {
+      for (int i = 0; i < s_; ++i) {
+        std::copy_n(x.data() + n_ * i + first, rows, last_x_.data() + n_ * i + first);
+        combine_piece(first, rows, n_, s_, &weights.position(0, i), x.data(), q0, &points_.gauss(0, i));
+      }
+      for (int j = first_lobatto; j <= s_; ++j)
+        combine_piece(first, rows, n_, s_, &weights.lobatto(0, j), x.data(), q0, &points_.lobatto(0, j));
+    });
+    last_x_.tail(m_ * s_) = x.tail(m_ * s_);
   }
 
   /// Those of L and of the force at the Gauss nodes; of a quadratic L they are taken once.
@@ -331,12 +354,13 @@ class GaussLobattoStep final : public StepProblem {
   /// Before the first solve: the derivatives at the start, for the round-off scales.
   void sample_start(const Vector& v0) {
     const double t = points_.step.start;
-    lagrangian_->gradient(t, q0_, v0, lq_.col(0), lv_.col(0));
-    lagrangian_->hessian(t, q0_, v0, lqq_.col(0), lqv_.col(0), lvv_.col(0));
+    const auto q0 = points_.lobatto.col(0);
+    lagrangian_->gradient(t, q0, v0, lq_.col(0), lv_.col(0));
+    lagrangian_->hessian(t, q0, v0, lqq_.col(0), lqv_.col(0), lvv_.col(0));
     const double before = blocks_[0].scale;  // of impulses nothing is known yet
     force_size_ = largest_entry(lq_.data(), n_);
     curvature_ = largest_entry(lqq_.data(), lqq_.rows());
-    last_x_[0] = std::nan("");
+    evaluated_ = false;
     update_scales();
     blocks_[0].scale = std::max(blocks_[0].scale, before);
   }
@@ -370,7 +394,7 @@ class GaussLobattoStep final : public StepProblem {
 
   std::optional<CompensatedSums> sums_;
 
-  Vector q0_, p0_;
+  Vector q0_, p0_;  ///< q0_ for compensated sums alone; it is the first Lobatto point
   Vector last_x_, f_;
   Columns lq_, lv_;   ///< ∂L/∂q + f and ∂L/∂v at the Gauss nodes
   Columns impulses_;  ///< A(Q~_j)ᵀ λ_j
@@ -392,6 +416,7 @@ class GaussLobattoStep final : public StepProblem {
   bool splitting_known_ = false, mass_known_ = false;
   bool affine_ = false;  ///< the residual is affine in the unknowns
   bool hessians_known_ = false;
+  bool evaluated_ = false;  ///< at last_x_
 };
 
 }  // namespace

@@ -2,6 +2,8 @@
 #include <array>
 #include <cmath>
 #include <diracstep/core/predictor.hpp>
+#include <diracstep/core/scales.hpp>
+#include <iterator>
 
 namespace diracstep {
 
@@ -22,27 +24,29 @@ constexpr long always_until = 12, later_every = 16;
 
 Predictor::Predictor(StepProblem& problem) : problem_(problem) {
   for (std::size_t terms = 2; terms <= longest; ++terms) rules_.push_back({false, terms});
-  candidate_.setZero(problem.size());
-  missed_ = candidate_;
-  history_.assign(longest, candidate_);
-  if (problem.extrapolate_stages(candidate_, missed_))
-    for (std::size_t terms = 1; terms < longest; ++terms) rules_.push_back({true, terms});
+  const Vector zero = Vector::Zero(problem.size());
+  history_.assign(longest, zero);
+  Vector any = zero;
+  if (!problem.extrapolate_stages(zero, any)) return;
+  for (std::size_t terms = 1; terms < longest; ++terms) rules_.push_back({true, terms});
+  candidate_ = missed_ = zero;
 }
 
-/// x = Σ_k weights[k] x_{first + k}, newest first; by fours, which the processor adds side by side.
-void Predictor::combine_history(std::size_t first, std::size_t terms, const double* weights,
-                                VectorRef x) const {
+/// x = Σ_k weights[k] x_{first + k}, newest first, of the entries from `begin` on; by fours, which the
+/// processor adds side by side.
+void Predictor::combine_history(std::size_t first, std::size_t terms, const double* weights, VectorRef x,
+                                Eigen::Index begin) const {
   constexpr Eigen::Index side_by_side = 4;
   const Eigen::Index size = x.size(), whole = size - size % side_by_side;
   for (Eigen::Index i = 0; i < whole; i += side_by_side) {
     Eigen::Vector4d sum = Eigen::Vector4d::Zero();
     for (std::size_t k = 0; k < terms; ++k)
-      sum += weights[k] * Eigen::Map<const Eigen::Vector4d>(history_[first + k].data() + i);
+      sum += weights[k] * Eigen::Map<const Eigen::Vector4d>(history_[first + k].data() + begin + i);
     Eigen::Map<Eigen::Vector4d>(x.data() + i) = sum;
   }
   for (Eigen::Index i = whole; i < size; ++i) {
     double sum = 0.0;
-    for (std::size_t k = 0; k < terms; ++k) sum += weights[k] * history_[first + k].data()[i];
+    for (std::size_t k = 0; k < terms; ++k) sum += weights[k] * history_[first + k].data()[begin + i];
     x.data()[i] = sum;
   }
 }
@@ -65,15 +69,32 @@ void Predictor::predict(VectorRef x) {
   evaluate(rules_[best_], x);
 }
 
-void Predictor::elect(ConstVectorRef solution) {
+/// Largest error of a rule among the leading unknowns; of a long column piece by piece, which takes no
+/// memory.
+double Predictor::error(const Rule& rule, ConstVectorRef solution) {
   const Eigen::Index leading = problem_.leading_unknowns();
+  if (rule.through_stages) {
+    evaluate(rule, candidate_);
+    return (candidate_ - solution).head(leading).lpNorm<Eigen::Infinity>();
+  }
+  std::array<double, 512> piece;
+  double largest = 0.0;
+  for (Eigen::Index i = 0; i < leading; i += std::ssize(piece)) {
+    Eigen::Map<Vector> guess(piece.data(), std::min(std::ssize(piece), leading - i));
+    combine_history(0, rule.terms, extrapolation[rule.terms].data(), guess, i);
+    guess -= solution.segment(i, guess.size());
+    largest = std::max(largest, largest_entry(guess.data(), guess.size()));
+  }
+  return largest;
+}
+
+void Predictor::elect(ConstVectorRef solution) {
   double smallest = HUGE_VAL;
   for (std::size_t r = 0; r < rules_.size(); ++r) {
     if (rules_[r].terms > known_) continue;
-    evaluate(rules_[r], candidate_);
-    const double error = (candidate_ - solution).head(leading).lpNorm<Eigen::Infinity>();
-    if (!(error < smallest)) continue;
-    smallest = error;
+    const double missed = error(rules_[r], solution);
+    if (!(missed < smallest)) continue;
+    smallest = missed;
     best_ = r;
   }
 }

@@ -39,7 +39,9 @@ class Predictor {
   };
 
   void evaluate(const Rule& rule, VectorRef x);
-  void combine_history(std::size_t first, std::size_t terms, const double* weights, VectorRef x) const;
+  void combine_history(std::size_t first, std::size_t terms, const double* weights, VectorRef x,
+                       Eigen::Index begin = 0) const;
+  double error(const Rule& rule, ConstVectorRef solution);
   void elect(ConstVectorRef solution);
 
   StepProblem& problem_;
@@ -48,7 +50,7 @@ class Predictor {
   std::vector<Vector> history_;  ///< newest first
   std::size_t known_ = 0;
   long learned_ = 0;
-  Vector candidate_, missed_;
+  Vector candidate_, missed_;  ///< of rules through stages
 };
 
 }  // namespace diracstep

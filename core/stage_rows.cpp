@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <diracstep/core/combination.hpp>
 #include <diracstep/core/scales.hpp>
@@ -7,9 +8,26 @@
 
 namespace diracstep {
 
+namespace {
+
+/// max |a_k λ_{places[k]}|, in strands: in a single one each entry waits for the last.
+double largest_product(const double* a, std::span<const int> places, const double* lambda) {
+  constexpr std::size_t strands = 4;
+  std::array<double, strands> largest{};
+  const std::size_t whole = places.size() - places.size() % strands;
+  for (std::size_t k = 0; k < whole; k += strands)
+    for (std::size_t s = 0; s < strands; ++s)
+      largest[s] = std::max(largest[s], std::abs(a[k + s] * lambda[places[k + s]]));
+  for (std::size_t k = whole; k < places.size(); ++k)
+    largest[0] = std::max(largest[0], std::abs(a[k] * lambda[places[k]]));
+  return *std::max_element(largest.begin(), largest.end());
+}
+
+}  // namespace
+
 StageRows::StageRows(std::shared_ptr<const ConstraintRows> rows, int stages, int first, int stride)
     : rows_(std::move(rows)), s_(stages), n_(rows_->dimension()), first_(first), stride_(stride) {
-  const int nonzeros = rows_->pattern().nonzeros(), curved = rows_->curvature_pattern().nonzeros();
+  const int nonzeros = rows_->pattern().nonzeros(), curved = curvature_pattern().nonzeros();
   at_lobatto_.setZero(nonzeros, s_ + 1);
   at_gauss_.setZero(nonzeros, s_);
   curvature_.setZero(curved, s_);
@@ -18,13 +36,18 @@ StageRows::StageRows(std::shared_ptr<const ConstraintRows> rows, int stages, int
   offset_.setZero(rows_->rows());
 }
 
+const SparsityPattern& StageRows::curvature_pattern() const {
+  static const SparsityPattern none;
+  return s_ > 1 ? rows_->curvature_pattern() : none;
+}
+
 void StageRows::plan(BlockPattern& layout) {
   const SparsityPattern& a = rows_->pattern();
   for (int i = 0; i < s_; ++i)
     for (int k = 0; k < s_; ++k) {
       const int number = layout.add(a, n_ * i, first_ + stride_ * k, true);
       if (first_layout_ < 0) first_layout_ = number;
-      layout.add(rows_->curvature_pattern(), n_ * i, n_ * k);
+      layout.add(curvature_pattern(), n_ * i, n_ * k);
       layout.add(a, first_ + stride_ * i, n_ * k);
     }
 }
@@ -104,8 +127,7 @@ double StageRows::impulse_size(ConstVectorRef multipliers) const {
   double largest = 0.0;
   for (int j = 0; j < s_; ++j) {
     const double* const lambda = multipliers.data() + first_ - n_ * s_ + stride_ * j;
-    for (std::size_t k = 0; k < places.size(); ++k)
-      largest = std::max(largest, std::abs(a[k] * lambda[places[k]]));
+    largest = std::max(largest, largest_product(a, places, lambda));
   }
   return largest;
 }

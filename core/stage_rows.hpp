@@ -43,6 +43,8 @@ class StageRows {
   double curvature_size() const;
 
  private:
+  /// Of the curvature; empty for one stage, whose only impulse enters at the start and so has none.
+  const SparsityPattern& curvature_pattern() const;
   void evaluate_lobatto(const StagePoints& at, int j);
   void evaluate_gauss(const StagePoints& at, int j);
   void add_constraint(const StagePoints& at, const BlockPattern& layout, int j, ConstVectorRef x,

@@ -45,10 +45,11 @@ class KinsolSolver final : public NonlinearSolver {
       throw Misuse("a problem with " + std::to_string(problem.blocks().size()) +
                    " residual blocks; at most 4 are reported");
     const int size = problem.size();
-    x_ = detail::make_vector(size, context_);
-    unknown_scale_.reset(require(N_VClone(x_.get()), "N_VClone"));
-    residual_scale_.reset(require(N_VClone(x_.get()), "N_VClone"));
-    for (Vector* column : {&guess_, &last_, &last_residual_}) column->setZero(size);
+    x_ = detail::make_view(size, context_);
+    unknown_scale_ = detail::make_weights(x_.get());
+    residual_scale_ = detail::make_weights(x_.get());
+    for (Vector* column : {&guess_, &last_}) column->setZero(size);
+    if (fixed_point_) contraction_residual_.setZero(size);
     matrix_shell_ = detail::make_matrix_shell(context_);
     make_linear_solver_shell();
     kinsol_.reset(require(KINCreate(context_), "KINCreate"));
@@ -70,6 +71,7 @@ class KinsolSolver final : public NonlinearSolver {
   SolveReport solve(VectorRef x) override {
     report_ = {};
     guess_ = x;
+    data_of(x_.get()) = x.data();
     set_scales();
     report_.status = SolveStatus::no_convergence;
     if (fixed_point_ && !given_up_) attempt(KIN_FP);
@@ -79,7 +81,6 @@ class KinsolSolver final : public NonlinearSolver {
       ++report_.line_searches;
       attempt(KIN_LINESEARCH);
     }
-    x = unknowns();
     return report_;
   }
 
@@ -123,10 +124,10 @@ class KinsolSolver final : public NonlinearSolver {
 
   /// From the guess to a status.
   void attempt(int strategy) {
-    unknowns() = guess_;
+    if (report_.residual_evaluations > 0) unknowns() = guess_;  // the first attempt starts there
     strategy_ = strategy;
     int code = run();
-    double norm = measure_residual();
+    double norm = report_residual();
     // KINSOL ends where its steps are small beside the unknowns, which may be far from the origin or of
     // different sizes; it goes on for as long as the residual falls.
     while (code == KIN_STEP_LT_STPTOL && norm > round_off * options_.tolerance &&
@@ -150,9 +151,8 @@ class KinsolSolver final : public NonlinearSolver {
   /// same sign in one step after the other; a last correction, which is not evaluated any more, makes it
   /// small beside round-off.
   void correct_again() {
-    last_ = last_residual_;
-    factors_.solve(last_.data());
-    unknowns() -= last_;
+    factors_.solve(residual_);
+    unknowns() -= Eigen::Map<const Vector>(residual_, guess_.size());
   }
 
   /// Goes on from the last point and keeps the better one; false where the residual does not halve.
@@ -161,7 +161,7 @@ class KinsolSolver final : public NonlinearSolver {
     const auto norms = report_.residual_norms;
     last_ = unknowns();
     code = run();
-    norm = measure_residual();
+    norm = report_residual();
     if (norm > before) {
       unknowns() = last_;
       report_.residual_norms = norms;
@@ -184,29 +184,35 @@ class KinsolSolver final : public NonlinearSolver {
     return code;
   }
 
+  /// Norm of each block of the residual; NaN where an entry is no number.
+  void measure_blocks() {
+    const double* row = residual_;
+    std::size_t b = 0;
+    not_finite_ = false;
+    for (const ResidualBlock& block : problem_.blocks()) {
+      double& norm = norms_.at(b++) = largest_if_finite(row, block.rows);
+      not_finite_ = not_finite_ || std::isnan(norm);
+      row += block.rows;
+    }
+  }
+
   /// The largest scaled entry of the last residual.
   double scaled_norm() const {
-    const double* const scale = data_of(residual_scale_.get());
     double largest = 0.0;
-    for (Eigen::Index i = 0; i < last_residual_.size(); ++i)
-      largest = std::max(largest, std::abs(last_residual_[i]) * scale[i]);
+    for (std::size_t b = 0; b < norms_.size(); ++b)
+      largest = std::max(largest, norms_[b] * inverse_scales_[b]);
     return largest;
   }
 
-  /// Norm of each block at the last evaluation into the report, NaN where an entry is no number; the largest
-  /// one, scaled, back.
-  double measure_residual() {
+  /// The last norms into the report; the largest one in units of its block back.
+  double report_residual() {
+    report_.residual_norms = norms_;
     double largest = 0.0;
-    Eigen::Index row = 0;
     std::size_t b = 0;
     for (const ResidualBlock& block : problem_.blocks()) {
-      double& norm = report_.residual_norms.at(b++) = largest_entry(last_residual_.data() + row, block.rows);
-      if (!finite_residual_ && !last_residual_.segment(row, block.rows).allFinite()) {
-        norm = std::nan("");
-        return HUGE_VAL;
-      }
+      const double norm = norms_.at(b++);
+      if (std::isnan(norm)) return HUGE_VAL;
       largest = std::max(largest, norm / block.scale);
-      row += block.rows;
     }
     return largest;
   }
@@ -214,10 +220,15 @@ class KinsolSolver final : public NonlinearSolver {
   void set_scales() {
     const double size = largest_entry(guess_.data(), guess_.size());
     const double unit = size > 0.0 && std::isfinite(size) ? 1.0 / size : 1.0;
-    std::fill_n(data_of(unknown_scale_.get()), guess_.size(), unit);
-    double* scale = data_of(residual_scale_.get());
-    for (const ResidualBlock& block : problem_.blocks())
-      scale = std::fill_n(scale, block.rows, 1.0 / block.scale);
+    detail::set_weights(unknown_scale_.get(), std::array{detail::Run{guess_.size(), unit}});
+    std::array<detail::Run, 4> runs{};
+    std::size_t b = 0;
+    for (const ResidualBlock& block : problem_.blocks()) {
+      inverse_scales_.at(b) = 1.0 / block.scale;
+      runs.at(b) = {block.rows, inverse_scales_.at(b)};
+      ++b;
+    }
+    detail::set_weights(residual_scale_.get(), std::span(runs).first(b));
   }
 
   static KinsolSolver& self(void* data) { return *static_cast<KinsolSolver*>(data); }
@@ -228,11 +239,11 @@ class KinsolSolver final : public NonlinearSolver {
     KinsolSolver& solver = self(data);
     return solver.callbacks_.guarded([&] {
       ++solver.report_.residual_evaluations;
-      solver.problem_.residual(solver.map(x), solver.last_residual_);
-      solver.finite_residual_ = all_finite(solver.last_residual_.data(), solver.last_residual_.size());
-      solver.not_finite_ = !solver.finite_residual_;
-      if (solver.strategy_ == KIN_FP) return solver.contract(solver.map(x), solver.map(f));
-      solver.map(f) = solver.last_residual_;
+      const bool fixed_point = solver.strategy_ == KIN_FP;
+      solver.residual_ = fixed_point ? solver.contraction_residual_.data() : data_of(f);
+      solver.problem_.residual(solver.map(x), Eigen::Map<Vector>(solver.residual_, solver.guess_.size()));
+      solver.measure_blocks();
+      if (fixed_point) return solver.contract(solver.map(x), solver.map(f));
       return solver.not_finite_ ? 1 : 0;  // KINSOL then tries a shorter step
     });
   }
@@ -251,7 +262,7 @@ class KinsolSolver final : public NonlinearSolver {
   }
 
   void contract_to(const Eigen::Map<Vector>& x, Eigen::Map<Vector> g) {
-    g = last_residual_;
+    g = contraction_residual_;
     problem_.solve_splitting(g);
     g = x - g;
   }
@@ -280,7 +291,10 @@ class KinsolSolver final : public NonlinearSolver {
     auto& ops = *linear_shell_->ops;
     ops.setup = [](SUNLinearSolver, SUNMatrix) { return 0; };  // jacobian() has done it
     ops.solve = [](SUNLinearSolver s, SUNMatrix, N_Vector x, N_Vector b, sunrealtype) {
-      std::copy_n(data_of(b), self(s).guess_.size(), data_of(x));
+      if (self(s).strategy_ == KIN_LINESEARCH)  // which looks at b again
+        std::copy_n(data_of(b), self(s).guess_.size(), data_of(x));
+      else
+        std::swap(data_of(b), data_of(x));
       self(s).factors_.solve(data_of(x));
       return 0;
     };
@@ -296,7 +310,9 @@ class KinsolSolver final : public NonlinearSolver {
   detail::MatrixHandle matrix_shell_;
   detail::LinearSolverHandle linear_shell_;
   detail::KinsolHandle kinsol_;
-  Vector guess_, last_, last_residual_;
+  Vector guess_, last_, contraction_residual_;
+  double* residual_ = nullptr;                        ///< the last one
+  std::array<double, 4> norms_{}, inverse_scales_{};  ///< of its blocks
   SolveReport report_;
   detail::ExceptionKeeper callbacks_;
   int strategy_ = KIN_NONE;
@@ -305,7 +321,6 @@ class KinsolSolver final : public NonlinearSolver {
   double smallest_norm_ = HUGE_VAL;  ///< of the fixed-point iteration so far
   bool singular_ = false;
   bool not_finite_ = false;  ///< the last residual or Jacobian
-  bool finite_residual_ = true;
 };
 
 template <class Enum, std::size_t N>

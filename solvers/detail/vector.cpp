@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <diracstep/core/scales.hpp>
 #include <diracstep/solvers/detail/vector.hpp>
 #include <utility>
 
@@ -8,7 +9,7 @@ namespace diracstep::detail {
 
 namespace {
 
-/// Reductions go in so many strands: in a single one each addition waits for the last.
+/// Sums go in so many strands: in a single one each addition waits for the last.
 constexpr std::size_t strands = 4;
 
 /// The operations that KINSOL calls, on N entries; N = 0 reads the length from the vector.
@@ -29,9 +30,8 @@ struct Operations {
     for (long i = 0; i < n; ++i) to[i] = entry(i);
   }
 
-  static void constant(sunrealtype c, N_Vector z) {
-    fill(z, [c](long) { return c; });
-  }
+  /// KINSOL clears the unknowns of a linear system first, which a direct solver overwrites.
+  static void constant(sunrealtype, N_Vector) {}
   static void scale(sunrealtype c, N_Vector x, N_Vector z) {
     const double *const a = data_of(x);
     fill(z, [=](long i) { return c * a[i]; });
@@ -56,13 +56,7 @@ struct Operations {
     const double *const a = data_of(x);
     fill(z, [=](long i) { return 1.0 / a[i]; });
   }
-  static sunrealtype max_norm(N_Vector x) {
-    const double *const a = data_of(x);
-    const long n = length(x);
-    std::array<double, strands> largest{};
-    for (long i = 0; i < n; ++i) largest[i % strands] = std::max(largest[i % strands], std::abs(a[i]));
-    return *std::max_element(largest.begin(), largest.end());
-  }
+  static sunrealtype max_norm(N_Vector x) { return largest_entry(data_of(x), length(x)); }
   static sunrealtype minimum(N_Vector x) {
     const double *const a = data_of(x);
     return *std::min_element(a, a + length(x));
@@ -99,6 +93,58 @@ struct Operations {
 
 constexpr std::size_t longest_fixed = 16;
 
+/// Weights of a long vector, and what KINSOL does with them.  In each operation on a long vector that takes
+/// weights they are such ones.
+struct Weights {
+  std::array<Run, 4> runs{};
+  std::size_t count = 0;
+
+  static Weights &of(N_Vector w) { return *static_cast<Weights *>(w->content); }
+  static bool are(N_Vector w) { return w->ops->nvmin == minimum; }
+
+  /// Calls visit(first, behind the last, weight) for each run.
+  template <class Visit>
+  static void for_each(N_Vector w, Visit visit) {
+    long first = 0;
+    for (const Run &run : std::span(of(w).runs).first(of(w).count)) {
+      visit(first, first + run.length, run.value);
+      first += run.length;
+    }
+  }
+
+  static sunrealtype minimum(N_Vector w) {
+    double least = HUGE_VAL;
+    for_each(w, [&](long, long, double value) { least = std::min(least, value); });
+    return least;
+  }
+  static void inverse(N_Vector w, N_Vector z) {
+    for_each(w,
+             [to = data_of(z)](long i, long end, double value) { std::fill(to + i, to + end, 1.0 / value); });
+  }
+  /// Either factor is the weights.
+  static void product(N_Vector x, N_Vector w, N_Vector z) {
+    if (are(x)) std::swap(x, w);
+    for_each(w, [a = data_of(x), to = data_of(z)](long i, long end, double value) {
+      for (; i < end; ++i) to[i] = a[i] * value;
+    });
+  }
+  static sunrealtype norm(N_Vector x, N_Vector w) {
+    double sum = 0.0;
+    for_each(w, [&, a = data_of(x)](long first, long end, double value) {
+      std::array<double, 2 * strands> part{};
+      long i = first;
+      for (; i + static_cast<long>(part.size()) <= end; i += static_cast<long>(part.size()))
+        for (std::size_t s = 0; s < part.size(); ++s) {
+          const double term = a[i + static_cast<long>(s)] * value;
+          part[s] += term * term;
+        }
+      for (; i < end; ++i) sum += (a[i] * value) * (a[i] * value);
+      for (const double of : part) sum += of;
+    });
+    return std::sqrt(sum);
+  }
+};
+
 template <std::size_t... N>
 constexpr auto installers(std::index_sequence<N...>) {
   return std::array{&Operations<static_cast<int>(N)>::install...};
@@ -106,12 +152,40 @@ constexpr auto installers(std::index_sequence<N...>) {
 
 }  // namespace
 
-VectorHandle make_vector(int size, SUNContext context) {
+VectorHandle make_view(int size, SUNContext context) {
   static constexpr auto install = installers(std::make_index_sequence<longest_fixed + 1>());
-  VectorHandle x(require(N_VNew_Serial(size, context), "N_VNew_Serial"));
+  VectorHandle x(require(N_VNewEmpty_Serial(size, context), "N_VNewEmpty_Serial"));
   const auto length = static_cast<std::size_t>(size);
   install.at(length <= longest_fixed ? length : 0)(*x->ops);
+  if (length > longest_fixed) {
+    x->ops->nvinv = Weights::inverse;
+    x->ops->nvprod = Weights::product;
+    x->ops->nvwl2norm = Weights::norm;
+  }
   return x;
+}
+
+VectorHandle make_weights(N_Vector vector) {
+  if (N_VGetLength(vector) <= static_cast<long>(longest_fixed))
+    return VectorHandle(require(N_VClone(vector), "N_VClone"));
+  VectorHandle w(require(N_VNewEmpty(vector->sunctx), "N_VNewEmpty"));
+  w->content = new Weights;  // NOLINT(cppcoreguidelines-owning-memory): nvdestroy deletes it
+  w->ops->nvdestroy = [](N_Vector v) {
+    delete static_cast<Weights *>(v->content);  // NOLINT(cppcoreguidelines-owning-memory)
+    N_VFreeEmpty(v);
+  };
+  w->ops->nvmin = Weights::minimum;
+  return w;
+}
+
+void set_weights(N_Vector weights, std::span<const Run> runs) {
+  if (Weights::are(weights)) {
+    Weights::of(weights).count = runs.size();
+    std::ranges::copy(runs, Weights::of(weights).runs.begin());
+    return;
+  }
+  double *to = data_of(weights);
+  for (const Run &run : runs) to = std::fill_n(to, run.length, run.value);
 }
 
 }  // namespace diracstep::detail
