@@ -194,9 +194,13 @@ class GaussLobattoStep final : public StepProblem {
     if (sums_) {
       sums_->end(step_size(), q0_, p0_, velocities(x), lq_, impulses_, q1, p1);
     } else {
-      q1 = points_.lobatto.col(s_);
+      q1.resize(n_);
       p1.resize(n_);
+      if (m_ > 0) q1 = points_.lobatto.col(s_);
       for_each_piece(n_, [&](int first, int rows) {
+        if (m_ == 0)  // nothing else looks there
+          combine_piece(first, rows, n_, s_, &weights.lobatto(0, s_), x.data(), points_.lobatto.data(),
+                        q1.data());
         add_forces_and_impulses(first, rows, weights.end_force.data(), weights.table.lobatto_b.data(),
                                 p0_.data(), p1.data());
       });
@@ -240,7 +244,7 @@ class GaussLobattoStep final : public StepProblem {
 
   /// q0 + h Σ_k a_ik V_k at the Gauss nodes, and so at those Lobatto nodes that are looked at; x is kept.
   void move_points(ConstVectorRef x) {
-    const int first_lobatto = m_ > 0 ? 1 : s_;
+    const int first_lobatto = m_ > 0 ? 1 : s_ + 1;
     if (sums_) {
       last_x_ = x;
       const ExtendedGaussLobattoTableau& table = sums_->table;
