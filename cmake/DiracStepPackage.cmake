@@ -45,11 +45,15 @@ if(DIRACSTEP_WITH_KLU)
 endif()
 pkg_config_file(diracstep "${PROJECT_DESCRIPTION}" REQUIRES eigen3
   LIBS diracstep_solvers diracstep_constraints diracstep_core PRIVATE_LIBS ${solver_libraries} pthread)
-pkg_config_file(diracstep-plugins "DiracStep: plugins, written and loaded" REQUIRES diracstep
-  LIBS diracstep_plugins PRIVATE_LIBS ${CMAKE_DL_LIBS})
+if(DIRACSTEP_BUILD_PLUGINS)
+  pkg_config_file(diracstep-plugins "DiracStep: plugins, written and loaded" REQUIRES diracstep
+    LIBS diracstep_plugins PRIVATE_LIBS ${CMAKE_DL_LIBS})
+endif()
 if(DIRACSTEP_BUILD_VALIDATION)
   sundials_libraries(validation_libraries ${DIRACSTEP_VALIDATION_SUNDIALS})
   pkg_config_file(diracstep-validation "DiracStep: scenes, references and studies" REQUIRES diracstep-plugins
     LIBS diracstep_validation PRIVATE_LIBS ${validation_libraries} PRIVATE_REQUIRES fmt tomlplusplus)
 endif()
-pkg_config_file(libdiracstep "DiracStep for C and languages that can call C" LIBS diracstep)
+if(DIRACSTEP_BUILD_C_INTERFACE)
+  pkg_config_file(libdiracstep "DiracStep for C and languages that can call C" LIBS diracstep)
+endif()

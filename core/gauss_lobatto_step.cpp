@@ -37,7 +37,10 @@ class GaussLobattoStep final : public StepProblem {
     for (Columns* stages : {&lq_, &lv_, &impulses_}) stages->setZero(n_, s_);
     const int nonzeros = lagrangian_->pattern().nonzeros();
     for (Columns* blocks : {&lqq_, &lqv_, &lvv_}) blocks->setZero(nonzeros, s_);
-    block_.setZero(nonzeros);
+    if (lagrangian_->structure().separable)
+      mirror_ = {};  // ∂²L/∂q∂v is zero
+    else
+      block_.setZero(nonzeros);
     if (force_) {
       f_.setZero(n_);
       fq_.setZero(force_->pattern().nonzeros(), s_);
@@ -194,9 +197,13 @@ class GaussLobattoStep final : public StepProblem {
     if (sums_) {
       sums_->end(step_size(), q0_, p0_, velocities(x), lq_, impulses_, q1, p1);
     } else {
-      q1 = points_.lobatto.col(s_);
+      q1.resize(n_);
       p1.resize(n_);
+      if (m_ > 0) q1 = points_.lobatto.col(s_);
       for_each_piece(n_, [&](int first, int rows) {
+        if (m_ == 0)  // nothing else looks there
+          combine_piece(first, rows, n_, s_, &weights.lobatto(0, s_), x.data(), points_.lobatto.data(),
+                        q1.data());
         add_forces_and_impulses(first, rows, weights.end_force.data(), weights.table.lobatto_b.data(),
                                 p0_.data(), p1.data());
       });
@@ -240,7 +247,7 @@ class GaussLobattoStep final : public StepProblem {
 
   /// q0 + h Σ_k a_ik V_k at the Gauss nodes, and so at those Lobatto nodes that are looked at; x is kept.
   void move_points(ConstVectorRef x) {
-    const int first_lobatto = m_ > 0 ? 1 : s_;
+    const int first_lobatto = m_ > 0 ? 1 : s_ + 1;
     if (sums_) {
       last_x_ = x;
       const ExtendedGaussLobattoTableau& table = sums_->table;
@@ -326,14 +333,17 @@ class GaussLobattoStep final : public StepProblem {
   /// −h² Σ_j â_ij a_jk ∂²L/∂q²_j − h â_ik ∂²L/∂q∂v_k + h a_ik ∂²L/∂v∂q_i + δ_ik ∂²L/∂v²_i.
   void add_momentum_block(int i, int k, VectorRef& values) {
     const StageWeights& weights = points_.weights;
-    const auto size = static_cast<int>(block_.size());
-    combine(size, s_, &weights.stiffness(0, i * s_ + k), lqq_.data(), nullptr, block_.data());
-    if (!lagrangian_->structure().separable)
+    const auto size = static_cast<int>(lvv_.rows());
+    const bool separable = lagrangian_->structure().separable;
+    double* const block = separable ? lqv_.data() : block_.data();  // nobody looks at a ∂²L/∂q∂v of zero
+    combine(size, s_, &weights.stiffness(0, i * s_ + k), lqq_.data(), nullptr, block);
+    if (!separable)
       for (int e = 0; e < size; ++e)
-        block_[e] += weights.force(k, i) * lqv_(e, k) +
-                     weights.position(k, i) * lqv_(mirror_[static_cast<std::size_t>(e)], i);
-    if (i == k) block_ += lvv_.col(i);
-    layout_.add_to(values.data(), i * s_ + k, 1.0, block_.data());
+        block[e] += weights.force(k, i) * lqv_(e, k) +
+                    weights.position(k, i) * lqv_(mirror_[static_cast<std::size_t>(e)], i);
+    if (i == k)
+      for (int e = 0; e < size; ++e) block[e] += lvv_(e, i);
+    layout_.add_to(values.data(), i * s_ + k, 1.0, block);
   }
 
   void add_force_block(int i, int k, VectorRef& values) {

@@ -377,6 +377,7 @@ SolveReport Integrator::project_velocity(double t, const Vector& q, const Vector
   velocity_unknowns_.head(n) = v_;
   velocity_unknowns_.tail(velocity_unknowns_.size() - n).setZero();
   const SolveReport report = velocity_solver_->solve(velocity_unknowns_);
+  velocity_solver_->reset();  // factors of a large scene take much memory
   if (report.ok()) v = velocity_unknowns_.head(n);
   return report;
 }

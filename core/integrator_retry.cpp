@@ -92,7 +92,7 @@ Integrator::Turn Integrator::turn(const Vector& q, double h) const {
   for (Eigen::Index i = 0; i < v_.size(); ++i) {
     const double v = (q_next_[i] - q[i]) / h;
     turn.size = std::max(turn.size, std::abs(v - v_[i]));
-    turn.speed = std::max({turn.speed, std::abs(v), std::abs(v_[i])});
+    turn.speed = std::max(turn.speed, std::max(std::abs(v), std::abs(v_[i])));
   }
   return turn;
 }

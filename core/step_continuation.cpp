@@ -29,7 +29,7 @@ constexpr double rounded_positions = 16.0 * std::numeric_limits<double>::epsilon
 
 StepContinuation::StepContinuation(StepProblem& problem, NonlinearSolver& solver)
     : problem_(problem), solver_(solver) {
-  for (Point* point : {&last_, &before_, &next_}) point->x.setZero(problem.size());
+  before_.x.setZero(problem.size());
 }
 
 double StepContinuation::change(double h, const Vector& q0, const Vector& v0, ConstVectorRef x) {
@@ -56,6 +56,7 @@ bool StepContinuation::solve(double h, const Vector& q0, const Vector& v0, Point
 /// Two points, one half as far as the other, from which on w tends to v0.
 bool StepContinuation::start(Interval step, const Vector& q0, const Vector& p0, const Vector& v0,
                              Result& work) {
+  for (Point* point : {&last_, &next_}) point->x.resize(problem_.size());  // few scenes ever come here
   bool found = false;
   double part = first_part;
   for (int k = 0; k <= most_halvings; ++k, part /= 2.0) {

