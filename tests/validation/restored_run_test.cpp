@@ -73,9 +73,9 @@ struct Way {
     way.options.dense_limit = one_of({40, 0}, random);
     way.options.substeps = one_of({1, 4}, random);
     way.options.compensated_sums = one_of({false, false, true}, random);
-    way.solver.jacobian = one_of({JacobianPolicy::automatic, JacobianPolicy::fresh,
-                                    JacobianPolicy::per_step, JacobianPolicy::kept},
-                                   random);
+    way.solver.jacobian = one_of(
+        {JacobianPolicy::automatic, JacobianPolicy::fresh, JacobianPolicy::per_step, JacobianPolicy::kept},
+        random);
     way.solver.iteration =
         one_of({Iteration::newton, Iteration::newton, Iteration::fixed_point, Iteration::automatic}, random);
     way.solver.anderson = one_of({0, 0, 2}, random);
