@@ -88,7 +88,10 @@ class GaussLobattoStep final : public StepProblem {
   }
 
   void keep() override {
-    if (!kept_.known && curvature_ == 0.0) second_derivatives(last_x_);  // solved without a Jacobian
+    if (!kept_.known && curvature_ == 0.0) {  // solved without a Jacobian
+      second_derivatives(last_x_);
+      curvature_ = largest_entry(lqq_.data(), lqq_.size());
+    }
     kept_.known = true;
     kept_.force = largest_entry(lq_.data(), lq_.size());
     kept_.curvature = curvature_;

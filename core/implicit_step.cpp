@@ -43,22 +43,25 @@ class ImplicitStep final : public StepProblem {
   int leading_unknowns() const override { return n_; }
   void keep() override {
     if (hessian_known_) measure_terms();
+    hessian_known_ = false;
     terms_known_ = true;
     multipliers_ = last_x_.segment(n_, m_);
   }
   void reset() override {
-    terms_known_ = false;
+    terms_known_ = hessian_known_ = false;
     multipliers_.setZero();
   }
   void save(Snapshot& to) const override {
-    to.put(terms_known_ ? 1.0 : 0.0);
+    for (const bool known : {terms_known_, hessian_known_}) to.put(known ? 1.0 : 0.0);
     to.put(terms_);
     to.put(multipliers_);
+    if (hessian_known_) to.put(hessian_.reshaped());  // solved and not kept yet: keep() measures it
   }
   void restore(Snapshot& from) override {
-    terms_known_ = from.whole_number(1) == 1;
+    for (bool* known : {&terms_known_, &hessian_known_}) *known = from.whole_number(1) == 1;
     from.read(terms_);
     from.read(multipliers_);
+    if (hessian_known_) from.read(hessian_.reshaped());
   }
   const SparsityPattern& pattern() const override { return pattern_; }
   std::span<const ResidualBlock> blocks() const override { return blocks_; }

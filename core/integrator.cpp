@@ -339,7 +339,7 @@ StepReport Integrator::take_in_pieces(double whole, int pieces, Guess guess) {
     }
     problem.finish(stage.solution, q_next_, p_next_, impulse_);
     if (scene_->rows() > 0 && guess == Guess::predicted && stage.predictor.ready())
-      keep_straight_on(stage, *q, h, total);
+      keep_straight_on(stage, {t, h}, *q, *p, total);
     if (!(all_finite(q_next_.data(), q_next_.size()) && all_finite(p_next_.data(), p_next_.size()))) {
       total.status = SolveStatus::not_finite;
       if (k > 0) v_ = before_.v;

@@ -210,7 +210,7 @@ class Integrator {
     double size, speed;
   };
   Turn turn(const Vector& q, double h) const;
-  void keep_straight_on(Stage& stage, const Vector& q, double h, SolveReport& total);
+  void keep_straight_on(Stage& stage, Interval step, const Vector& q, const Vector& p, SolveReport& total);
   void count(const SolveReport& report, long solves = 1);
   void forget();
   void compensate();

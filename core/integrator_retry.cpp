@@ -98,20 +98,23 @@ Integrator::Turn Integrator::turn(const Vector& q, double h) const {
 }
 
 /// A solved stage that turns sharply, far from where it was predicted, is solved again from the guess along
-/// the last velocity; that solution is taken where it is another one that turns less.
-void Integrator::keep_straight_on(Stage& stage, const Vector& q, double h, SolveReport& total) {
+/// the last velocity; that solution is taken where it is another one that turns less.  The problem begins
+/// anew for it, since the first solve may have been done by another integrator, before a snapshot.
+void Integrator::keep_straight_on(Stage& stage, Interval step, const Vector& q, const Vector& p,
+                                  SolveReport& total) {
   Part& part = parts_[stage.part];
-  const Turn found = turn(q, h);
+  const Turn found = turn(q, step.size);
   if (!part.solver || !(found.size > sharp_turn * found.speed)) return;
   if (!std::isnan(part.problem->constant_jacobian_parameter())) return;  // affine: one solution
   if (part.continuation->distance(q, stage.solution, guess_) <= far_from_guess) return;  // expected
   ++work_.retries.plain_guesses;
+  part.problem->begin(step, q, p);
   part.problem->guess(v_, guess_);
   const bool solved = solve(part, guess_, total).ok();
   total.status = SolveStatus::ok;
   if (solved && part.continuation->distance(q, stage.solution, guess_) > another_solution) {
     part.problem->finish(guess_, q_next_, p_next_, impulse_);
-    if (turn(q, h).size < found.size) {
+    if (turn(q, step.size).size < found.size) {
       ++work_.retries.other_branches;
       stage.solution = guess_;
       return;

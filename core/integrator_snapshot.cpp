@@ -43,6 +43,7 @@ Snapshot Integrator::save() const {
     part.problem->save(to);
     if (part.solver) part.solver->save(to);
   }
+  if (first_stage_solved_ && parts_[stages_.front().part].solver) to.put(guess_);
   return to;
 }
 
@@ -78,6 +79,9 @@ void Integrator::read(Snapshot& from) {
     part.problem->restore(from);
     if (part.solver) part.solver->restore(from);
   }
+  if (!first_stage_solved_ || !parts_[first.part].solver) return;
+  guess_.resize(first.solution.size());
+  from.read(guess_);
 }
 
 }  // namespace diracstep

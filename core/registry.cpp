@@ -9,13 +9,16 @@
 #include <diracstep/core/generating_functions/quadrature.hpp>
 #include <diracstep/core/phase_space_step.hpp>
 #include <diracstep/core/registry.hpp>
-#include <regex>
 
 namespace diracstep {
 
 namespace {
 
 std::string prefix_of(GeneratingType type) { return "type" + std::to_string(static_cast<int>(type)) + "/"; }
+
+constexpr std::string_view letters = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_:.-";
+/// A name may hold names, which are read by recursion.
+constexpr std::size_t longest_name = 1000;
 
 void add_quadrature(Registry& registry, StepRule rule, int order, std::string summary,
                     std::string adjoint = {}) {
@@ -37,21 +40,37 @@ struct Transform {
   std::string inner;
 };
 
-bool parse_transform(const std::string& name, Transform& transform) {
-  std::smatch match;
-  if (!std::regex_match(name, match, std::regex(R"(type([1-4])/(legendre|adjoint)\((.+)\))"))) return false;
-  transform = {static_cast<GeneratingType>(std::stoi(match[1])), match[2], match[3]};
+/// N of "typeN/…", which is taken off; none where the name does not begin so with N from 1 to `most`.
+std::optional<int> take_type(std::string_view& name, int most) {
+  const int type = name.starts_with("type") && name.size() > 5 && name[5] == '/' ? name[4] - '0' : 0;
+  if (type < 1 || type > most) return std::nullopt;
+  name.remove_prefix(6);
+  return type;
+}
+
+bool parse_transform(std::string_view name, Transform& transform) {
+  const auto type = take_type(name, 4);
+  if (!type || !name.ends_with(')')) return false;
+  const auto bracket = name.find('(');
+  const std::string_view word = name.substr(0, bracket);
+  if (bracket + 2 >= name.size() || (word != "legendre" && word != "adjoint")) return false;
+  const std::string_view inner = name.substr(bracket + 1, name.size() - bracket - 2);
+  transform = {static_cast<GeneratingType>(*type), std::string(word), std::string(inner)};
   return true;
 }
 
 /// "typeN/gl:S", N = 1, 2, 3.
 std::optional<Method> gauss_lobatto_method(const std::string& name) {
-  std::smatch match;
-  if (!std::regex_match(name, match, std::regex("type([1-3])/gl:([0-9]{1,4})"))) return std::nullopt;
-  const int s = std::stoi(match[2]);
+  std::string_view stages = name;
+  const auto type = take_type(stages, 3);
+  if (!type || !stages.starts_with("gl:")) return std::nullopt;
+  stages.remove_prefix(3);
+  if (stages.empty() || stages.size() > 4 || stages.find_first_not_of("0123456789") != stages.npos)
+    return std::nullopt;
+  const int s = std::stoi(std::string(stages));
   gauss_lobatto_tableau(s);  // throws for a number of stages that is not allowed
   const MethodInfo info{name,
-                        static_cast<GeneratingType>(std::stoi(match[1])),
+                        static_cast<GeneratingType>(*type),
                         2 * s,
                         true,
                         StepRule::midpoint,
@@ -98,14 +117,17 @@ Registry Registry::with_built_ins() {
 void Registry::add(MethodInfo info, GeneratingFunctionFactory make, StepFactory make_step, int stages) {
   const std::string name = info.name;
   const std::string prefix = prefix_of(info.type);
-  const bool well_formed = std::regex_match(name, std::regex("type[1-4]/[A-Za-z0-9_:.-]+"));
-  if (!well_formed || !name.starts_with(prefix))
-    throw Misuse("method name '" + name + "' is not of the form " + prefix + "construction");
+  const bool well_formed = name.starts_with(prefix) && name.size() > prefix.size() &&
+                           name.find_first_not_of(letters, prefix.size()) == name.npos;
+  if (!well_formed) throw Misuse("method name '" + name + "' is not of the form " + prefix + "construction");
   if (!methods_.emplace(name, Method{std::move(info), std::move(make), std::move(make_step), stages}).second)
     throw Misuse("method '" + name + "' is already registered");
 }
 
 Method Registry::method(const std::string& name) const {
+  if (name.size() > longest_name)
+    throw Misuse("a method's name of " + std::to_string(name.size()) + " characters; up to " +
+                 std::to_string(longest_name) + " are read");
   const auto found = methods_.find(name);
   if (found != methods_.end()) return found->second;
   if (const auto gauss_lobatto = gauss_lobatto_method(name)) return *gauss_lobatto;

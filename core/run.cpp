@@ -5,11 +5,12 @@
 
 namespace diracstep {
 
-RunReport run(Integrator& integrator, long steps, Momentum momentum, long every, const Observer& observer) {
+RunReport run(Integrator& integrator, long steps, Momentum momentum, long every, const Observer& observer,
+              RunDoubt* doubt) {
   Sample sample;
   RunReport report;
   const auto observed = [&](long k) {
-    if (!observer || (k % every != 0 && k != steps)) return true;
+    if ((!observer && doubt == nullptr) || (k % every != 0 && k != steps)) return true;
     report.last.solve = integrator.sample(momentum, sample);
     if (!report.last.ok()) {
       std::ostringstream message;
@@ -18,13 +19,17 @@ RunReport run(Integrator& integrator, long steps, Momentum momentum, long every,
       report.last.failure = message.str();
       return false;
     }
-    return observer(sample);
+    if (doubt != nullptr) doubt->see(sample);
+    return !observer || observer(sample);
   };
   if (every < 1) throw Misuse("every = " + std::to_string(every) + "; 1 or more is needed");
   if (!observed(0)) return report;
   for (long k = 1; k <= steps; ++k) {
+    if (doubt != nullptr) doubt->before_step(integrator);
     report.last = integrator.step();
-    if (!report.last.ok() || !observed(k)) break;
+    if (!report.last.ok()) break;
+    if (doubt != nullptr) doubt->after_step(integrator);
+    if (!observed(k)) break;
   }
   return report;
 }

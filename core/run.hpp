@@ -1,6 +1,7 @@
 #pragma once
 
 #include <diracstep/core/integrator.hpp>
+#include <diracstep/core/run_doubt.hpp>
 #include <functional>
 
 namespace diracstep {
@@ -14,8 +15,11 @@ struct [[nodiscard]] RunReport {
   bool ok() const { return last.ok(); }
 };
 
-/// Takes `steps` steps and shows the start, every `every`-th point and the last one to the observer.
-RunReport run(Integrator& integrator, long steps, Momentum momentum, long every, const Observer& observer);
+/// Takes `steps` steps and shows the start, every `every`-th point and the last one to the observer, where
+/// there is one.  A `doubt`, made for as many steps, sees the same points and every step; its text() then
+/// says why the result is not to be believed, or nothing.
+RunReport run(Integrator& integrator, long steps, Momentum momentum, long every, const Observer& observer,
+              RunDoubt* doubt = nullptr);
 
 /// A number of steps of one size.
 struct StepGrid {

@@ -241,7 +241,10 @@ std::string Kernel::source(const std::string& name, int instance_width, int posi
     body += fmt::format("    out{}[{}[{}]] += r{};\n", store.column, in_slots ? "slots" : "positions",
                         store.entry, store.value);
   }
-  std::string text = fmt::format("static void {}(const diracstep_call* call) {{\n", name);
+  std::string text = fmt::format(
+      "static void {}(const void* data) {{\n  const diracstep_call* const call = (const "
+      "diracstep_call*)data;\n",
+      name);
   for (const auto& pointer : pointers) text += "  " + pointer + '\n';
   text += "  for (long i = 0; i < call->count; ++i) {\n";
   for (const auto& table : tables) text += "    " + table + '\n';
@@ -272,7 +275,7 @@ typedef struct {
   double* out[3];
   double t, s;
 } diracstep_call;
-typedef void (*diracstep_kernel)(const diracstep_call*);
+typedef void (*diracstep_kernel)(const void*);
 static inline double diracstep_sign(double x) { return x > 0.0 ? 1.0 : x < 0.0 ? -1.0 : 0.0; }
 )";
   return text;

@@ -21,7 +21,8 @@ struct KernelCall {
   double* out[3];
   double t, s;
 };
-using CompiledKernel = void (*)(const KernelCall*);
+/// Takes a KernelCall; to the generated source, which may be C, that is a struct of its own.
+using CompiledKernel = void (*)(const void* call);
 
 /// Subexpressions that are computed before any kernel runs.
 class Constants {

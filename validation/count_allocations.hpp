@@ -8,10 +8,13 @@
 /// Counts every heap allocation of the program, those of libraries, plugins and operator new included, by
 /// taking the place of glibc's malloc.  To be included in one source of a program.  With another C library,
 /// and under a sanitizer, which needs malloc for itself, nothing is counted.
-#if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-#define DIRACSTEP_COUNTS_ALLOCATIONS 1
-#else
+#if !defined(__GLIBC__) || defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 #define DIRACSTEP_COUNTS_ALLOCATIONS 0
+#elif defined(__has_feature)  // Clang tells of sanitizers so
+#define DIRACSTEP_COUNTS_ALLOCATIONS \
+  !(__has_feature(address_sanitizer) || __has_feature(thread_sanitizer) || __has_feature(memory_sanitizer))
+#else
+#define DIRACSTEP_COUNTS_ALLOCATIONS 1
 #endif
 
 namespace diracstep {

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <diracstep/validation/energy_doubt.hpp>
+#include <diracstep/core/energy_doubt.hpp>
 #include <diracstep/validation/scaled_rows.hpp>
 #include <diracstep/validation/stability_cases.hpp>
 #include <memory>

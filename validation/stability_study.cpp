@@ -7,8 +7,8 @@
 #include <diracstep/core/consistent_start.hpp>
 #include <diracstep/core/errors.hpp>
 #include <diracstep/core/run.hpp>
+#include <diracstep/core/run_doubt.hpp>
 #include <diracstep/validation/ida_reference.hpp>
-#include <diracstep/validation/run_doubt.hpp>
 #include <diracstep/validation/stability_study.hpp>
 #include <diracstep/validation/study_run.hpp>
 #include <diracstep/validation/work_precision.hpp>

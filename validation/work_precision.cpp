@@ -75,8 +75,8 @@ std::optional<OrderFit> measure_order(std::vector<WorkPoint> points) {
   for (WorkPoint& point : points) point.step = std::abs(point.step);
   std::erase_if(points, [](const WorkPoint& point) { return !usable(point) || !(point.step > 0.0); });
   std::ranges::sort(points, std::ranges::greater{}, &WorkPoint::step);
-  const auto repeated = std::ranges::unique(points, {}, &WorkPoint::step);
-  points.erase(repeated.begin(), repeated.end());
+  const auto same_step = [](const WorkPoint& a, const WorkPoint& b) { return a.step == b.step; };
+  points.erase(std::unique(points.begin(), points.end(), same_step), points.end());
   const std::vector<WorkPoint> kept = asymptotic(points);
   if (kept.size() < fewest_points) return std::nullopt;
   return OrderFit{least_squares_slope(kept), static_cast<int>(kept.size())};

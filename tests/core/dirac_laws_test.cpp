@@ -23,9 +23,21 @@ constexpr long steps = 20;
 class DiracLaws : public ::testing::TestWithParam<std::string> {
  protected:
   Method method() const { return Registry::with_built_ins().method(GetParam()); }
-  bool is_legendre() const { return GetParam().find("legendre") != std::string::npos; }
   IntegratorOptions options() const { return {.method = GetParam(), .step = h}; }
 };
+
+/// Laws of some of the methods.
+class LawsOfTransforms : public DiracLaws {};
+class LawsOfTypesOneToThree : public DiracLaws {};  ///< no structure, principle or force is stated for type 4
+class LawsOfOrderOne : public DiracLaws {};
+
+template <class Condition>
+std::vector<std::string> methods_where(Condition holds) {
+  std::vector<std::string> names = testing::every_method();
+  const Registry registry = Registry::with_built_ins();
+  std::erase_if(names, [&](const std::string& name) { return !holds(registry.method(name).info); });
+  return names;
+}
 
 Vector momentum_at(const Scene& scene, const Vector& q, const Vector& v) {
   Vector lq(q.size()), p(q.size());
@@ -53,8 +65,7 @@ TEST_P(DiracLaws, UnconstrainedStepIsSymplectic) {
   EXPECT_LT(symplecticity_defect(method(), *testing::unconstrained()), 1e-8);
 }
 
-TEST_P(DiracLaws, LegendreTransformsGiveTheTrajectoryOfTheirDiscreteLagrangian) {
-  if (!is_legendre()) GTEST_SKIP() << "not a transform";
+TEST_P(LawsOfTransforms, GiveTheTrajectoryOfTheirDiscreteLagrangian) {
   const std::string original = GetParam().substr(15, GetParam().size() - 16);
   for (const auto& scene : testing::every_constraint_class()) {
     const auto transformed = samples_of(scene, options(), steps);
@@ -120,9 +131,8 @@ Covector differential(GeneratingFunction& s, const Trajectory& t, std::size_t k,
   return plus ? gamma_plus(d) : gamma_minus(d);
 }
 
-TEST_P(DiracLaws, EveryStepIsAMemberOfTheDiscreteDiracStructure) {
+TEST_P(LawsOfTypesOneToThree, EveryStepIsAMemberOfTheDiscreteDiracStructure) {
   const auto type = method().info.type;
-  if (type == GeneratingType::four) GTEST_SKIP() << "no structure is stated for type 4";
   for (const auto& scene : testing::every_constraint_class()) {
     const auto s = method().make(*scene);
     const Trajectory t = trajectory_of(scene, options());
@@ -144,9 +154,8 @@ TEST_P(DiracLaws, EveryStepIsAMemberOfTheDiscreteDiracStructure) {
   }
 }
 
-TEST_P(DiracLaws, TrajectoriesAreStationaryForTheirPrinciple) {
+TEST_P(LawsOfTypesOneToThree, TrajectoriesAreStationaryForTheirPrinciple) {
   const auto type = method().info.type;
-  if (type == GeneratingType::four) GTEST_SKIP() << "no principle is stated for type 4";
   for (const auto& scene : testing::every_constraint_class()) {
     const auto s = method().make(*scene);
     Trajectory t = trajectory_of(scene, options());
@@ -192,16 +201,14 @@ TEST_P(DiracLaws, MeasuredOrderIsTheStatedOne) {
   }
 }
 
-TEST_P(DiracLaws, ForcesKeepTheStatedOrder) {
-  if (method().info.type == GeneratingType::four) GTEST_SKIP() << "type 4 takes no forces";
+TEST_P(LawsOfTypesOneToThree, ForcesKeepTheStatedOrder) {
   for (const auto& scene : testing::every_constraint_class()) {
     const double order = measured_order(testing::forced(scene), options(), 1.0 / 160.0);
     EXPECT_NEAR(order, method().info.order, 0.1) << scene->name;
   }
 }
 
-TEST_P(DiracLaws, SymmetrisedWithItsAdjointTheOrderIsTwo) {
-  if (method().info.order != 1) GTEST_SKIP() << "self-adjoint already";
+TEST_P(LawsOfOrderOne, SymmetrisedWithItsAdjointTheOrderIsTwo) {
   for (const auto& scene : testing::every_constraint_class()) {
     IntegratorOptions symmetric = options();
     symmetric.order = 2;
@@ -231,8 +238,21 @@ TEST_P(DiracLaws, HolonomicRowsDoNotDrift) {
   EXPECT_LT(std::abs(phi[0]), 1e-14);
 }
 
-INSTANTIATE_TEST_SUITE_P(EveryMethod, DiracLaws, ::testing::ValuesIn(testing::every_method()),
-                         [](const auto& test) { return testing::test_name(test.param); });
+const auto by_name = [](const auto& test) { return testing::test_name(test.param); };
+INSTANTIATE_TEST_SUITE_P(EveryMethod, DiracLaws, ::testing::ValuesIn(testing::every_method()), by_name);
+INSTANTIATE_TEST_SUITE_P(EveryTransform, LawsOfTransforms,
+                         ::testing::ValuesIn(methods_where([](const auto& m) {
+                           return m.name.find("legendre") != std::string::npos;
+                         })),
+                         by_name);
+INSTANTIATE_TEST_SUITE_P(EveryMethod, LawsOfTypesOneToThree,
+                         ::testing::ValuesIn(methods_where([](const auto& m) {
+                           return m.type != GeneratingType::four;
+                         })),
+                         by_name);
+INSTANTIATE_TEST_SUITE_P(EveryMethod, LawsOfOrderOne,
+                         ::testing::ValuesIn(methods_where([](const auto& m) { return m.order == 1; })),
+                         by_name);
 
 TEST(DiracStructure, MomentumFunctionsAreThePotentialsOfTheSumOfTheOneForms) {
   std::srand(3);

@@ -34,6 +34,17 @@ TEST(Registry, UnknownInnerMethodIsNamed) {
   expect_unknown("type3/adjoint(type2/adjoint(type3/nonsense))", {"'type3/nonsense'", "type1/midpoint"});
 }
 
+TEST(Registry, NamesAreReadHoweverLongAndDeep) {
+  std::string nested = "type1/left";
+  for (int k = 0; k < 20; ++k) nested = "type1/adjoint(" + nested + ")";
+  EXPECT_EQ(built_ins().method(nested).info.name, nested);
+  std::string deep;
+  for (int k = 0; k < 100'000; ++k) deep += "type1/adjoint(";
+  for (const std::string& name : {deep, deep + "type1/left" + std::string(100'000, ')'),
+                                  "type2/legendre(" + std::string(1'000'000, 'a') + ")"})
+    expect_unknown(name, {"a method's name of " + std::to_string(name.size()) + " characters", "1000"});
+}
+
 TEST(Registry, EveryListedNameIsKnownAndSaysItsOwnName) {
   for (const std::string& name : built_ins().names()) {
     const MethodInfo info = built_ins().method(name).info;

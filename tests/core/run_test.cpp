@@ -96,5 +96,54 @@ TEST(Run, KeepingLessThanEveryPointIsRefusedBeforeAnythingIsDone) {
   EXPECT_EQ(integrator.work().steps, 0);
 }
 
+/// The doubts of 40 steps of one coordinate, whose bits they leave alone.
+template <class Formula>
+std::string doubts_of(Formula formula, const char* method, double step) {
+  Scene scene;
+  scene.name = "one coordinate";
+  scene.coordinates = {"q"};
+  scene.lagrangian = lagrangian<1>(formula);
+  scene.start = {0.0, Vector{{1.0}}, Vector{{6.0}}};
+  const auto shared = std::make_shared<const Scene>(scene);
+  const IntegratorOptions options{.method = method, .step = step};
+  Integrator watched = integrator_for(shared, options), alone = integrator_for(shared, options);
+  RunDoubt doubt(watched, 40);
+  EXPECT_TRUE(run(watched, 40, Momentum::projected, 10, nullptr, &doubt).ok());
+  EXPECT_TRUE(run(alone, 40, Momentum::projected, 10, nullptr).ok());
+  EXPECT_EQ(watched.position(), alone.position());
+  EXPECT_EQ(watched.work().solves, alone.work().solves);
+  return doubt.text();
+}
+
+TEST(Run, SaysWhyItsResultIsNotToBeBelieved) {
+  const auto pendulum = [](const auto& q, const auto& v) {
+    using std::cos;
+    return 0.5 * v[0] * v[0] + 10.0 * cos(q[0]);
+  };
+  EXPECT_EQ(doubts_of(pendulum, "type1/trapezoidal", 0.003), "");
+  EXPECT_NE(doubts_of(pendulum, "type1/trapezoidal", 1.5).find("this scene keeps, went from 12.597 to"),
+            std::string::npos);
+  const auto driven = [](const auto& q, const auto& v, const auto& t) {
+    using std::cos;
+    return 0.5 * (v[0] * v[0] - q[0] * q[0]) + 200.0 * q[0] * cos(20.0 * t);
+  };
+  EXPECT_EQ(doubts_of(driven, "type1/midpoint", 0.003), "");
+  EXPECT_TRUE(doubts_of(driven, "type1/midpoint", 0.25).starts_with("two half steps from t ="));
+}
+
+/// The same integrator for a second run, from another start: the doubt is of that run alone.
+TEST(Run, DoubtsBeginWhereTheRunDoes) {
+  Integrator integrator = integrator_for(testing::unconstrained(), {.method = "type1/gl:2", .step = 0.05});
+  EXPECT_TRUE(run(integrator, 20, Momentum::projected, 1, nullptr).ok());
+  Start start = integrator.scene().start;
+  start.v *= 10.0;
+  integrator.reset(start);
+  for (int k = 0; k < 2; ++k) {
+    RunDoubt doubt(integrator, 20);
+    EXPECT_TRUE(run(integrator, 20, Momentum::projected, 1, nullptr, &doubt).ok());
+    EXPECT_EQ(doubt.text(), "");
+  }
+}
+
 }  // namespace
 }  // namespace diracstep

@@ -70,10 +70,9 @@ TEST(Loader, RefusesWhatIsNoPlugin) {
 TEST(Loader, RefusesAnObjectThatWasCutOff) {
   std::ifstream file(built("harmonic"), std::ios::binary);
   const std::string whole = (std::ostringstream() << file.rdbuf()).str();
-  ASSERT_GT(whole.size(), 4000u);
+  ASSERT_GT(whole.size(), 8000u);
   const fs::path cut = fs::temp_directory_path() / ("diracstep_cut_" + std::to_string(getpid()) + ".so");
-  for (const std::size_t size : {std::size_t{0}, std::size_t{10}, std::size_t{64}, std::size_t{500},
-                                 whole.size() / 4, whole.size() / 2}) {
+  for (const std::size_t size : {0, 10, 64, 500, 3000, 6000}) {  // behind it is what a debugger reads
     std::ofstream(cut, std::ios::binary) << whole.substr(0, size);
     expect_misuse([&] { load_plugin(cut); }, {cut.string(), "cannot be loaded"});
   }

@@ -2,8 +2,8 @@
 
 #include <cmath>
 #include <diracstep/core/run.hpp>
+#include <diracstep/core/run_doubt.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
-#include <diracstep/validation/run_doubt.hpp>
 #include <diracstep/validation/scene_catalogue.hpp>
 
 /// What tells when a run is not to be believed although every step was solved: it speaks where steps are too

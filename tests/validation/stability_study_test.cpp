@@ -1,9 +1,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <diracstep/core/energy_doubt.hpp>
 #include <diracstep/core/errors.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
-#include <diracstep/validation/energy_doubt.hpp>
 #include <diracstep/validation/scaled_rows.hpp>
 #include <diracstep/validation/stability_cases.hpp>
 #include <diracstep/validation/stability_report.hpp>
@@ -195,13 +195,16 @@ TEST(EnergyDoubt, NamesTheWorstPoint) {
   const auto entry = make_scene("kepler_e06");
   const Scene& scene = *entry.scene;
   EnergyDoubt doubt(scene);
-  Sample point{.time = 1.0,
+  Sample point{.time = 0.0,
                .q = scene.start.q,
                .v = scene.start.v,
                .p = {},
                .lambda = {},
                .impulse = {},
-               .energy = -0.49};
+               .energy = -0.5};
+  doubt.see(point);
+  point.time = 1.0;
+  point.energy = -0.49;
   doubt.see(point);
   EXPECT_EQ(doubt.text(), "");
   point.energy = std::nan("");

@@ -34,8 +34,8 @@ int tell(const CLI::App& app, const CLI::ParseError& error) {
   return misused;
 }
 
-/// --plugin before or after every verb; the plugins are there when the verb runs.
-void take_plugins(CLI::App& app, Session& session) {
+/// --plugin before or after every verb; the plugins are there when the verb runs, if it does.
+void take_plugins(CLI::App& app, Session& session, bool run_verbs) {
   const auto add = [](CLI::App& to, std::vector<std::string>& files) {
     const char* const text =
         "Load a plugin; may be repeated. Also taken: every *.so in the\ndirectories of DIRACSTEP_PLUGIN_PATH";
@@ -45,10 +45,11 @@ void take_plugins(CLI::App& app, Session& session) {
   for (CLI::App* verb : app.get_subcommands({})) {
     add(*verb, session.plugin_files);
     // Here the files after the verb are in the session, and those before it only in their option.
-    verb->parse_complete_callback([&session, before] {
+    verb->parse_complete_callback([&session, before, run_verbs] {
       const std::vector<std::string> files = before->results();
       session.plugin_files.insert(session.plugin_files.begin(), files.begin(), files.end());
       load_plugins(session);
+      if (!run_verbs) throw CLI::Success();
     });
   }
 }
@@ -90,9 +91,7 @@ int execute(int count, char** arguments, bool run_verbs) {
   add_run(app, session);
   add_stability(app, session);
   add_study(app, session);
-  take_plugins(app, session);
-  if (!run_verbs)
-    for (CLI::App* verb : app.get_subcommands({})) verb->callback({});
+  take_plugins(app, session, run_verbs);
   return read_and_run(app, session, count, arguments);
 }
 

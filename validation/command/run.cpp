@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <diracstep/core/adaptive_integrator.hpp>
+#include <diracstep/core/energy_doubt.hpp>
 #include <diracstep/core/error_control.hpp>
 #include <diracstep/core/errors.hpp>
 #include <diracstep/core/run.hpp>
@@ -11,7 +12,6 @@
 #include <diracstep/validation/command/interrupt.hpp>
 #include <diracstep/validation/command/run_control.hpp>
 #include <diracstep/validation/command/verbs.hpp>
-#include <diracstep/validation/energy_doubt.hpp>
 #include <diracstep/validation/progress.hpp>
 #include <memory>
 #include <optional>

@@ -4,11 +4,11 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <diracstep/core/run_doubt.hpp>
 #include <diracstep/validation/command/interrupt.hpp>
 #include <diracstep/validation/command/run_control.hpp>
 #include <diracstep/validation/convergence_study.hpp>
 #include <diracstep/validation/progress.hpp>
-#include <diracstep/validation/run_doubt.hpp>
 
 namespace diracstep::command {
 
@@ -20,6 +20,16 @@ constexpr long steps_between_looks = 256;
 constexpr long points_looked_at = 400;  ///< for the energy
 constexpr auto between_checkpoints = std::chrono::seconds(10);
 
+/// What the energy doubt reads of the point where a resumed run once began.
+Sample start_of(const Scene& scene) {
+  Sample start;
+  start.time = scene.start.time;
+  start.q = scene.start.q;
+  start.v = scene.start.v;
+  start.energy = scene.energy(start.time, start.q, start.v);
+  return start;
+}
+
 class Run {
  public:
   Run(long steps, Integrator& integrator, const Keeping& keeping, RunResult& result)
@@ -27,10 +37,12 @@ class Run {
         integrator_(integrator),
         keeping_(keeping),
         result_(result),
-        doubt_(integrator, steps),
+        doubt_(integrator, steps - integrator.work().steps),
         every_look_(std::max(1L, steps / points_looked_at)),
         next_checkpoint_(Clock::now() + between_checkpoints),
-        progress_(static_cast<double>(integrator.work().steps) / static_cast<double>(steps)) {}
+        progress_(static_cast<double>(integrator.work().steps) / static_cast<double>(steps)) {
+    if (integrator.work().steps > 0) doubt_.see(start_of(integrator.scene()));
+  }
 
   void go() {
     long k = integrator_.work().steps;

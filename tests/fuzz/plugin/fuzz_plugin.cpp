@@ -66,9 +66,14 @@ struct Answer {
   int dimension = 2;
 };
 
+/// After so many calls every answer is an error: retries of a step that has no solution take most of the
+/// time.
+constexpr int most_calls = 400;
+
 int answer(const void* data, std::initializer_list<double*> columns, int size) {
   Answer& how = *static_cast<Answer*>(const_cast<void*>(data));
   if (how.calls++ < how.first) return 0;
+  if (how.calls > most_calls) return 42;
   switch (how.kind) {
     case 1:
     case 4:
@@ -137,7 +142,7 @@ int method_value(void* self, const diracstep_system* system, diracstep_interval 
 /// A description with all that it points to.
 struct Description {
   explicit Description(Choices c) {
-    takes_steps = c.next() % 4 == 0;
+    takes_steps = c.next() % 32 == 0;
     for (Answer& a : answers) {
       a.kind = c.next() % 12;
       a.first = c.next() % 64;

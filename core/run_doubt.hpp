@@ -1,17 +1,19 @@
 #pragma once
 
-#include <diracstep/validation/branch_doubt.hpp>
-#include <diracstep/validation/energy_doubt.hpp>
-#include <diracstep/validation/step_doubt.hpp>
+#include <diracstep/core/branch_doubt.hpp>
+#include <diracstep/core/energy_doubt.hpp>
+#include <diracstep/core/step_doubt.hpp>
 
 namespace diracstep {
 
-/// All that tells when a run of fixed steps is not to be believed although every step was solved.
+/// All that tells when a run of fixed steps is not to be believed although every step was solved.  run()
+/// takes one along; a loop of one's own calls it around each step and shows it points on the way, the start
+/// first.
 class RunDoubt {
  public:
-  /// For a run to step number `steps`.  The integrator's scene must outlive this.
+  /// For the next so many steps.  The integrator's scene must outlive this.
   RunDoubt(const Integrator& integrator, long steps)
-      : energy_(integrator.scene()), step_(steps), branch_(integrator) {}
+      : energy_(integrator.scene()), step_(integrator, steps), branch_(integrator) {}
 
   void before_step(Integrator& integrator) { step_.before(integrator); }
   void after_step(const Integrator& integrator) {

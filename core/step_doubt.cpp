@@ -1,9 +1,8 @@
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <diracstep/core/scales.hpp>
-#include <diracstep/validation/step_doubt.hpp>
+#include <diracstep/core/step_doubt.hpp>
+#include <sstream>
 
 namespace diracstep {
 
@@ -14,9 +13,9 @@ constexpr double doubted = 0.25;
 
 }  // namespace
 
-StepDoubt::StepDoubt(long steps)
+StepDoubt::StepDoubt(const Integrator& integrator, long steps)
     : between_looks_(std::clamp(steps / fewest_looks, 1L, steps_for_a_look)),
-      next_look_(std::min(1L, steps - 1)) {}  // the first step may be one from rest
+      next_look_(integrator.work().steps + std::min(1L, steps - 1)) {}  // the first step may be one from rest
 
 void StepDoubt::halve(Integrator& integrator) {
   next_look_ += between_looks_;
@@ -39,10 +38,10 @@ void StepDoubt::compare(const Integrator& integrator) {
   if (!(difference > 0.0) || difference <= worst_) return;
   worst_ = difference;
   if (worst_ <= doubted) return;
-  text_ = fmt::format(
-      "two half steps from t = {:g} end {:.0f} % of the way of a step beside the whole one: the step is too "
-      "large to believe the result",
-      start_time_, 100.0 * worst_);
+  std::ostringstream text;
+  text << "two half steps from t = " << start_time_ << " end " << std::round(100.0 * worst_)
+       << " % of the way of a step beside the whole one: the step is too large to believe the result";
+  text_ = text.str();
 }
 
 }  // namespace diracstep

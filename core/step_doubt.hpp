@@ -18,8 +18,8 @@ namespace diracstep {
 /// between the looks is not seen.
 class StepDoubt {
  public:
-  /// For a run to step number `steps`.
-  explicit StepDoubt(long steps);
+  /// For the next so many steps.
+  StepDoubt(const Integrator& integrator, long steps);
 
   /// Around each step of the run; for most of them a comparison of numbers.
   void before(Integrator& integrator) {

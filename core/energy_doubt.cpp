@@ -1,8 +1,7 @@
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
-#include <diracstep/validation/energy_doubt.hpp>
+#include <diracstep/core/energy_doubt.hpp>
+#include <sstream>
 
 namespace diracstep {
 
@@ -31,9 +30,7 @@ EnergyDoubt::EnergyDoubt(const Scene& scene)
     : scene_(scene),
       keeps_energy_(keeps_energy(scene)),
       force_(Vector::Zero(scene.dimension())),
-      momentum_(force_),
-      start_energy_(scene.energy(scene.start.time, scene.start.q, scene.start.v)),
-      start_sizes_(sizes(scene.start.time, scene.start.q, scene.start.v)) {}
+      momentum_(force_) {}
 
 EnergyDoubt::Sizes EnergyDoubt::sizes(double t, ConstVectorRef q, ConstVectorRef v) {
   scene_.lagrangian->gradient(t, q, v, force_, momentum_);
@@ -43,6 +40,11 @@ EnergyDoubt::Sizes EnergyDoubt::sizes(double t, ConstVectorRef q, ConstVectorRef
 void EnergyDoubt::see(const Sample& point) {
   if (!keeps_energy_) return;
   const Sizes now = sizes(point.time, point.q, point.v);
+  if (!begun_) {
+    begun_ = true;
+    start_energy_ = point.energy;
+    start_sizes_ = now;
+  }
   // The smaller of two: a run that blows up is not measured by its own size.
   double size = std::max({std::abs(start_energy_), std::min(start_sizes_.kinetic, now.kinetic),
                           std::min(start_sizes_.work, now.work)});
@@ -50,10 +52,10 @@ void EnergyDoubt::see(const Sample& point) {
   const double change = std::abs(point.energy - start_energy_);
   if (change <= worst_ * size) return;  // false where one is not a number
   worst_ = change / size;
-  text_ = fmt::format(
-      "the energy, which this scene keeps, went from {:g} to {:g} at t = {:g}: the step is too large to "
-      "believe the result",
-      start_energy_, point.energy, point.time);
+  std::ostringstream text;
+  text << "the energy, which this scene keeps, went from " << start_energy_ << " to " << point.energy
+       << " at t = " << point.time << ": the step is too large to believe the result";
+  text_ = text.str();
 }
 
 }  // namespace diracstep

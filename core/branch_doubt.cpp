@@ -1,12 +1,11 @@
-#include <fmt/format.h>
-
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <complex>
+#include <diracstep/core/branch_doubt.hpp>
 #include <diracstep/core/scales.hpp>
-#include <diracstep/validation/branch_doubt.hpp>
+#include <sstream>
 
 namespace diracstep {
 
@@ -33,11 +32,11 @@ void BranchDoubt::look(const Integrator& integrator) {
   velocity_ = now;
   if (!(turn > sharp_turn * largest_speed_) || !rows_depend_on_the_way(integrator)) return;
   watched_ = false;
-  text_ = fmt::format(
-      "within a step before t = {:g} the velocity turned by {:.0f} % of the largest so far, at a pose where "
-      "the "
-      "rows may depend on each other: the motion may have left its branch there; compare with a smaller step",
-      integrator.time(), 100.0 * turn / largest_speed_);
+  std::ostringstream text;
+  text << "within a step before t = " << integrator.time() << " the velocity turned by "
+       << std::round(100.0 * turn / largest_speed_) << " % of the largest so far, at a pose where the rows "
+       << "may depend on each other: the motion may have left its branch there; compare with a smaller step";
+  text_ = text.str();
 }
 
 /// Whether (1 − s) A(q0) + s A(q1), multiplied by A(q0)ᵀ, is singular for some s in [0, 1]: then s/(s − 1) is
