@@ -7,6 +7,8 @@ namespace diracstep {
 
 namespace {
 
+constexpr double at_rest = 1e-12;  // of the coordinates
+
 bool depends_on_time(const Scene& scene) {
   const auto& [t, q, v, p] = scene.start;
   return scene.lagrangian->value(t, q, v) != scene.lagrangian->value(t + 1.0, q, v);
@@ -44,7 +46,11 @@ void EnergyDoubt::see(const Sample& point) {
     begun_ = true;
     start_energy_ = point.energy;
     start_sizes_ = now;
+    start_position_ = point.q;
   }
+  // At rest what moves is round-off, and so are the energies at play.
+  const double way = (point.q - start_position_).lpNorm<Eigen::Infinity>();
+  if (std::isfinite(point.energy) && way <= at_rest * start_position_.lpNorm<Eigen::Infinity>()) return;
   // The smaller of two: a run that blows up is not measured by its own size.
   double size = std::max({std::abs(start_energy_), std::min(start_sizes_.kinetic, now.kinetic),
                           std::min(start_sizes_.work, now.work)});

@@ -14,7 +14,7 @@ bool keeps_energy(const Scene& scene);
 ///
 ///   max(|E(start)|, min |p·v|/2, min |q|∞ |∂L/∂q|∞),   the smaller value at the start and at the point,
 ///
-/// where the start is the first point seen.
+/// where the start is the first point seen.  Points that have not moved from there are not looked at.
 /// No method here changes the energy so much at a step that resolves the motion.  Silence proves nothing: an
 /// energy can be kept on a wrong path.
 class EnergyDoubt {
@@ -36,7 +36,7 @@ class EnergyDoubt {
 
   const Scene& scene_;
   bool keeps_energy_;
-  Vector force_, momentum_;
+  Vector force_, momentum_, start_position_;
   bool begun_ = false;
   double start_energy_ = 0.0;
   Sizes start_sizes_{0.0, 0.0};

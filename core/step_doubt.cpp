@@ -10,6 +10,8 @@ namespace {
 
 constexpr long steps_for_a_look = 600, fewest_looks = 3;
 constexpr double doubted = 0.25;
+/// A scene at rest moves by the round-off of its coordinates: ways of this part of them count as none.
+constexpr double at_rest = 1e-12;
 
 }  // namespace
 
@@ -34,7 +36,8 @@ void StepDoubt::compare(const Integrator& integrator) {
   halved_ = false;
   const Vector& end = integrator.position();
   longest_way_ = std::max({longest_way_, max_norm(end - start_), max_norm(end_of_halves_ - start_)});
-  const double difference = max_norm(end - end_of_halves_) / longest_way_;
+  const double difference =
+      max_norm(end - end_of_halves_) / std::max(longest_way_, at_rest * max_norm(start_));
   if (!(difference > 0.0) || difference <= worst_) return;
   worst_ = difference;
   if (worst_ <= doubted) return;

@@ -12,10 +12,10 @@ namespace diracstep {
 ///
 ///   d = |q1(h) − q1(h/2, h/2)|∞ / max h |v|∞,
 ///
-/// and doubted above a quarter: methods of order 1 stay below at h times the pace of the motion of 1, the
-/// others at more.  Needs no energy, so that it also sees forced and driven scenes.  The halves are taken
-/// between Integrator::save and restore: the run keeps its bits.  Silence proves nothing: a short event
-/// between the looks is not seen.
+/// (of a scene at rest by 1e-12 |q|∞), and doubted above a quarter: methods of order 1 stay below at h times
+/// the pace of the motion of 1, the others at more.  Needs no energy, so that it also sees forced and driven
+/// scenes.  The halves are taken between Integrator::save and restore: the run keeps its bits.  Silence
+/// proves nothing: a short event between the looks is not seen.
 class StepDoubt {
  public:
   /// For the next so many steps.

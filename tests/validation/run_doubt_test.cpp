@@ -44,6 +44,25 @@ TEST(RunDoubt, IsSilentOnEverySceneAtItsNaturalStep) {
   }
 }
 
+TEST(RunDoubt, IsSilentWhereNothingMovesButRoundOff) {
+  const std::vector<std::pair<std::string, Parameters>> at_rest{{"hanging_chain", {{"N", 8}, {"g", 0.0}}},
+                                                                {"andrews_squeezer", {{"mom", 0.0}}}};
+  for (const auto& [name, parameters] : at_rest) {
+    const CatalogueScene entry = make_scene(name, parameters);
+    Integrator integrator = integrator_for(entry, automatic_method, 1.0);
+    RunDoubt doubt(integrator, 300);
+    Sample point;
+    for (int k = 0; k < 300; ++k) {
+      ASSERT_TRUE(integrator.sample(Momentum::projected, point).ok());
+      doubt.see(point);
+      doubt.before_step(integrator);
+      ASSERT_TRUE(integrator.step().ok());
+      doubt.after_step(integrator);
+    }
+    EXPECT_EQ(doubt.text(), "") << name;
+  }
+}
+
 TEST(StepDoubt, SeesLargeStepsOfDampedScenes) {
   const CatalogueScene governor = make_scene("flyball_governor");
   Integrator trapezoidal = integrator_for(governor, "type1/trapezoidal", 4.0);
