@@ -75,6 +75,11 @@ class CallbackLagrangian final : public Lagrangian {
     rate_by_differences([&](double s, VectorRef fy) { gradient(s, x, y, fx, fy); }, t, fyt);
   }
 
+  void position_gradient_rate(double t, ConstVectorRef x, ConstVectorRef y, VectorRef fxt) const override {
+    Vector fy(dimension());
+    rate_by_differences([&](double s, VectorRef fx) { gradient(s, x, y, fx, fy); }, t, fxt);
+  }
+
  private:
   diracstep_function f_;
   Origin origin_;
