@@ -42,8 +42,7 @@ JacobianFactors::JacobianFactors(NonlinearProblem& problem, JacobianPolicy polic
 }
 
 JacobianFactors::Factors& JacobianFactors::add() {
-  factors_.push_back(
-      {none, make_linear_solver(problem_.pattern()), Vector::Zero(problem_.pattern().nonzeros()), false});
+  factors_.push_back({none, make_linear_solver(problem_.pattern()), {}});
   return factors_.back();
 }
 
@@ -85,6 +84,7 @@ void JacobianFactors::restore(Snapshot& from) {
     kept.factored = from.whole_number(1) == 1;
     kept.usable = from.whole_number(1) == 1;
     if (!kept.factored) continue;
+    kept.values.resize(problem_.pattern().nonzeros());
     from.read(kept.values);
     if (constant_) kept.parameter = from.number();
     if (!kept.solver->holds(kept.values.data())) (void)kept.solver->factor(kept.values.data());
@@ -136,6 +136,7 @@ JacobianFactors::Outcome JacobianFactors::prepare(ConstVectorRef x, double norm)
   if (!wanted_now) return Outcome::ready;
   ++evaluations_;
   current_->factored = current_->usable = false;
+  if (current_->values.size() == 0) current_->values.setZero(problem_.pattern().nonzeros());
   problem_.jacobian(x, current_->values);
   if (!all_finite(current_->values.data(), current_->values.size())) return Outcome::not_finite;
   current_->factored = true;

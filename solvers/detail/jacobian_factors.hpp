@@ -41,7 +41,7 @@ class JacobianFactors {
   struct Factors {
     double parameter;  ///< of a constant Jacobian; NaN for none
     std::unique_ptr<LinearSolver> solver;
-    Vector values;          ///< of the Jacobian factored last
+    Vector values;          ///< of the Jacobian factored last; empty before the first
     bool factored = false;  ///< since reset()
     bool usable = false;    ///< and not singular
   };

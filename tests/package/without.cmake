@@ -1,5 +1,6 @@
 # Configures PROJECT with the options OFF (separated by |) switched off, builds all there is in BUILD, which goes
 # afterwards, and runs the quick tests of the library.
+cmake_policy(VERSION 3.22)
 string(REPLACE "|" ";" OFF "${OFF}")
 list(TRANSFORM OFF PREPEND -D OUTPUT_VARIABLE options)
 list(TRANSFORM options APPEND =OFF)
