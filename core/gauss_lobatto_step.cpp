@@ -5,6 +5,7 @@
 #include <diracstep/core/compensated_sums.hpp>
 #include <diracstep/core/gauss_lobatto_step.hpp>
 #include <diracstep/core/scales.hpp>
+#include <diracstep/core/stage_momentum.hpp>
 #include <diracstep/core/stage_points.hpp>
 #include <diracstep/core/stage_rows.hpp>
 #include <diracstep/core/stage_splitting.hpp>
@@ -23,39 +24,24 @@ constexpr int largest_split = 40;
 class GaussLobattoStep final : public StepProblem {
  public:
   GaussLobattoStep(int s, const Scene& scene, bool dense)
-      : lagrangian_(scene.lagrangian),
-        force_(scene.force),
+      : structure_(scene.lagrangian->structure()),
         s_(s),
         n_(scene.dimension()),
         m_(scene.rows()),
         points_(s, n_),
-        mirror_(lagrangian_->pattern().transposed_positions()) {
+        momentum_(scene.lagrangian, scene.force, s, dense) {
     const GaussLobattoTableau& table = points_.weights.table;
     const Vector lobatto_c = table.lobatto_c.head(s);
     next_velocities_ = lagrange_basis(table.c, table.c.array() + 1.0).transpose();
     next_impulses_ = lagrange_basis(lobatto_c, lobatto_c.array() + 1.0).transpose();
-    for (Columns* stages : {&lq_, &lv_, &impulses_}) stages->setZero(n_, s_);
-    const int nonzeros = lagrangian_->pattern().nonzeros();
-    for (Columns* blocks : {&lqq_, &lqv_, &lvv_}) blocks->setZero(nonzeros, s_);
-    if (lagrangian_->structure().separable)
-      mirror_ = {};  // ∂²L/∂q∂v is zero
-    else
-      block_.setZero(nonzeros);
-    if (force_) {
-      f_.setZero(n_);
-      fq_.setZero(force_->pattern().nonzeros(), s_);
-      fv_ = fq_;
-      force_block_.setZero(fq_.rows());
-    }
+    impulses_.setZero(n_, s_);
     int row = n_ * s_;
     for (const auto& block : scene.constraints) {
       rows_.emplace_back(block, s_, row, m_);
       row += block->rows();
     }
-    const bool quadratic = lagrangian_->structure().quadratic && !force_;
     const auto constant = [](const auto& block) { return block->constant(); };
-    affine_ = quadratic && std::ranges::all_of(scene.constraints, constant);
-    same_momentum_blocks_ = quadratic && dense;
+    affine_ = structure_.quadratic && !scene.force && std::ranges::all_of(scene.constraints, constant);
     last_x_.setZero(size());
     kept_.multipliers.setZero(m_ * s_);
     p0_.setZero(n_);
@@ -63,7 +49,7 @@ class GaussLobattoStep final : public StepProblem {
     const auto kinds = std::ranges::count_if(scene.constraints, holonomic);
     if (n_ + m_ <= largest_split && (kinds == 0 || kinds == std::ssize(scene.constraints)))
       splitting_.emplace(table, n_, m_, kinds > 0);
-    plan_blocks(dense);
+    plan_jacobian(dense);
     blocks_.push_back({"momentum", n_ * s_});
     if (m_ > 0) blocks_.push_back({"constraint", m_ * s_});
   }
@@ -89,11 +75,11 @@ class GaussLobattoStep final : public StepProblem {
 
   void keep() override {
     if (!kept_.known && curvature_ == 0.0) {  // solved without a Jacobian
-      second_derivatives(last_x_);
-      curvature_ = largest_entry(lqq_.data(), lqq_.size());
+      (void)momentum_.second_derivatives(points_, last_x_);
+      measure_curvature();
     }
     kept_.known = true;
-    kept_.force = largest_entry(lq_.data(), lq_.size());
+    kept_.force = largest_entry(momentum_.forces().data(), momentum_.forces().size());
     kept_.curvature = curvature_;
     kept_.row_curvature = row_curvature_;
     kept_.multipliers = last_x_.tail(m_ * s_);
@@ -102,8 +88,8 @@ class GaussLobattoStep final : public StepProblem {
   void reset() override {
     if (sums_) sums_->forget();
     kept_ = {.multipliers = Vector::Zero(m_ * s_)};
-    hessians_known_ = mass_known_ = false;
-    momentum_blocks_step_ = 0.0;
+    mass_known_ = false;
+    momentum_.reset();
   }
   void save(Snapshot& to) const override {
     to.put(kept_.known ? 1.0 : 0.0);
@@ -168,14 +154,16 @@ class GaussLobattoStep final : public StepProblem {
 
   void residual(ConstVectorRef x, VectorRef f) override {
     evaluate(x);
+    const Columns& lv = momentum_.momenta();
     for (int i = 0; i < s_; ++i) {
       double* const momentum = f.data() + n_ * i;
       if (sums_) {
-        sums_->momentum_row(i, step_size(), lv_.col(i), p0_, lq_, impulses_, f.segment(n_ * i, n_));
+        sums_->momentum_row(i, step_size(), momentum_.momenta().col(i), p0_, momentum_.forces(), impulses_,
+                            f.segment(n_ * i, n_));
         continue;
       }
       for_each_piece(n_, [&](int first, int rows) {
-        for (int k = first; k < first + rows; ++k) momentum[k] = lv_(k, i) - p0_[k];
+        for (int k = first; k < first + rows; ++k) momentum[k] = lv(k, i) - p0_[k];
         add_forces_and_impulses(first, rows, &points_.weights.force(0, i), &points_.weights.impulse(0, i),
                                 momentum, momentum);
       });
@@ -185,8 +173,8 @@ class GaussLobattoStep final : public StepProblem {
 
   void jacobian(ConstVectorRef x, VectorRef values) override {
     evaluate(x);
-    second_derivatives(x);
-    add_momentum_blocks(values);
+    if (momentum_.second_derivatives(points_, x)) measure_curvature();
+    momentum_.set_jacobian(points_, layout_, values);
     row_curvature_ = 0.0;
     for (StageRows& rows : rows_) {
       rows.add_to_jacobian(points_, layout_, x, values);
@@ -198,7 +186,7 @@ class GaussLobattoStep final : public StepProblem {
     evaluate(x);
     const StageWeights& weights = points_.weights;
     if (sums_) {
-      sums_->end(step_size(), q0_, p0_, velocities(x), lq_, impulses_, q1, p1);
+      sums_->end(step_size(), q0_, p0_, velocities(x), momentum_.forces(), impulses_, q1, p1);
     } else {
       q1.resize(n_);
       p1.resize(n_);
@@ -228,13 +216,7 @@ class GaussLobattoStep final : public StepProblem {
       return;
     evaluated_ = true;
     move_points(x);
-    for (int i = 0; i < s_; ++i) {
-      const auto v = x.segment(n_ * i, n_);
-      lagrangian_->gradient(points_.gauss_time(i), points_.gauss.col(i), v, lq_.col(i), lv_.col(i));
-      if (!force_) continue;
-      force_->value(points_.gauss_time(i), points_.gauss.col(i), v, f_);
-      lq_.col(i) += f_;
-    }
+    momentum_.evaluate(points_, x);
     if (m_ == 0) return;
     impulses_.setZero();
     for (StageRows& rows : rows_) rows.add_impulses(points_, x, impulses_);
@@ -244,7 +226,7 @@ class GaussLobattoStep final : public StepProblem {
   /// to = base + Σ_j force_j ∂L/∂q_j + Σ_j impulse_j Aᵀλ_j in these rows.
   void add_forces_and_impulses(int first, int rows, const double* force, const double* impulse,
                                const double* base, double* to) const {
-    combine_piece(first, rows, n_, s_, force, lq_.data(), base, to);
+    combine_piece(first, rows, n_, s_, force, momentum_.forces().data(), base, to);
     if (m_ > 0) combine_piece(first, rows, n_, s_, impulse, impulses_.data(), to, to);
   }
 
@@ -273,29 +255,17 @@ class GaussLobattoStep final : public StepProblem {
     last_x_.tail(m_ * s_) = x.tail(m_ * s_);
   }
 
-  /// Those of L and of the force at the Gauss nodes; of a quadratic L they are taken once.
-  void second_derivatives(ConstVectorRef x) {
-    if (hessians_known_ && !force_) return;
-    for (int i = 0; i < s_; ++i) {
-      const double t = points_.gauss_time(i);
-      const auto q = points_.gauss.col(i);
-      const auto v = x.segment(n_ * i, n_);
-      if (!hessians_known_) lagrangian_->hessian(t, q, v, lqq_.col(i), lqv_.col(i), lvv_.col(i));
-      if (force_) force_->derivatives(t, q, v, fq_.col(i), fv_.col(i));
-    }
-    if (!hessians_known_) curvature_ = largest_entry(lqq_.data(), lqq_.size());
-    hessians_known_ = lagrangian_->structure().quadratic;
+  void measure_curvature() {
+    curvature_ = largest_entry(momentum_.curvatures().data(), momentum_.curvatures().size());
   }
 
   /// The splitting is taken in the middle of the step, at the stages that were evaluated last.
   void move_splitting() {
     const int middle = s_ / 2;
     if (!mass_known_) {
-      lagrangian_->hessian(points_.gauss_time(middle), points_.gauss.col(middle),
-                           last_x_.segment(n_ * middle, n_), lqq_.col(middle), lqv_.col(middle),
-                           lvv_.col(middle));
-      splitting_->set_mass(lagrangian_->pattern(), lvv_.col(middle));
-      mass_known_ = lagrangian_->structure().y_hessian_constant;
+      momentum_.second_derivatives(points_, last_x_, middle);
+      splitting_->set_mass(momentum_.pattern(), momentum_.mass(middle));
+      mass_known_ = structure_.y_hessian_constant;
     }
     for (const StageRows& rows : rows_)
       splitting_->set_rows(rows.first(), rows.rows().pattern(), rows.lobatto(middle));
@@ -303,58 +273,12 @@ class GaussLobattoStep final : public StepProblem {
     splitting_known_ = true;
   }
 
-  void plan_blocks(bool dense) {
+  void plan_jacobian(bool dense) {
     BlockPattern layout(size(), size());
-    for (int i = 0; i < s_; ++i)
-      for (int k = 0; k < s_; ++k) layout.add(lagrangian_->pattern(), n_ * i, n_ * k);
-    if (force_)
-      for (int i = 0; i < s_; ++i)
-        for (int k = 0; k < s_; ++k) layout.add(force_->pattern(), n_ * i, n_ * k);
+    momentum_.plan(layout);
     for (StageRows& rows : rows_) rows.plan(layout);
     pattern_ = layout.assemble(dense);
     layout_ = std::move(layout);
-  }
-
-  /// values = ∂(momentum rows)/∂V without the curvature of the constraint rows.  Of a quadratic L they are
-  /// those of the last Jacobian with this step size.
-  void add_momentum_blocks(VectorRef& values) {
-    if (same_momentum_blocks_ && momentum_blocks_step_ == step_size()) {
-      values = momentum_blocks_;
-      return;
-    }
-    values.setZero();
-    for (int i = 0; i < s_; ++i)
-      for (int k = 0; k < s_; ++k) {
-        add_momentum_block(i, k, values);
-        if (force_) add_force_block(i, k, values);
-      }
-    if (!same_momentum_blocks_) return;
-    momentum_blocks_ = values;
-    momentum_blocks_step_ = step_size();
-  }
-
-  /// −h² Σ_j â_ij a_jk ∂²L/∂q²_j − h â_ik ∂²L/∂q∂v_k + h a_ik ∂²L/∂v∂q_i + δ_ik ∂²L/∂v²_i.
-  void add_momentum_block(int i, int k, VectorRef& values) {
-    const StageWeights& weights = points_.weights;
-    const auto size = static_cast<int>(lvv_.rows());
-    const bool separable = lagrangian_->structure().separable;
-    double* const block = separable ? lqv_.data() : block_.data();  // nobody looks at a ∂²L/∂q∂v of zero
-    combine(size, s_, &weights.stiffness(0, i * s_ + k), lqq_.data(), nullptr, block);
-    if (!separable)
-      for (int e = 0; e < size; ++e)
-        block[e] += weights.force(k, i) * lqv_(e, k) +
-                    weights.position(k, i) * lqv_(mirror_[static_cast<std::size_t>(e)], i);
-    if (i == k)
-      for (int e = 0; e < size; ++e) block[e] += lvv_(e, i);
-    layout_.add_to(values.data(), i * s_ + k, 1.0, block);
-  }
-
-  void add_force_block(int i, int k, VectorRef& values) {
-    const StageWeights& weights = points_.weights;
-    combine(static_cast<int>(force_block_.size()), s_, &weights.stiffness(0, i * s_ + k), fq_.data(), nullptr,
-            force_block_.data());
-    force_block_ += weights.force(k, i) * fv_.col(k);
-    layout_.add_to(values.data(), s_ * s_ + i * s_ + k, 1.0, force_block_.data());
   }
 
   /// Size of the impulses of such multipliers, and of what they lose to the round-off of positions.
@@ -366,13 +290,10 @@ class GaussLobattoStep final : public StepProblem {
 
   /// Before the first solve: the derivatives at the start, for the round-off scales.
   void sample_start(const Vector& v0) {
-    const double t = points_.step.start;
-    const auto q0 = points_.lobatto.col(0);
-    lagrangian_->gradient(t, q0, v0, lq_.col(0), lv_.col(0));
-    lagrangian_->hessian(t, q0, v0, lqq_.col(0), lqv_.col(0), lvv_.col(0));
+    momentum_.evaluate_start(points_, v0);
     const double before = blocks_[0].scale;  // of impulses nothing is known yet
-    force_size_ = largest_entry(lq_.data(), n_);
-    curvature_ = largest_entry(lqq_.data(), lqq_.rows());
+    force_size_ = largest_entry(momentum_.forces().data(), n_);
+    curvature_ = largest_entry(momentum_.curvatures().data(), momentum_.curvatures().rows());
     evaluated_ = false;
     update_scales();
     blocks_[0].scale = std::max(blocks_[0].scale, before);
@@ -394,12 +315,11 @@ class GaussLobattoStep final : public StepProblem {
       for (ResidualBlock& block : blocks_) block.scale *= last_bit;
   }
 
-  std::shared_ptr<const Lagrangian> lagrangian_;
-  std::shared_ptr<const Force> force_;
+  PhaseStructure structure_;
   int s_, n_, m_;
   StagePoints points_;
+  StageMomentum momentum_;
   Columns next_velocities_, next_impulses_;  ///< stages of the next step from those of this one, by columns
-  std::vector<int> mirror_;
   std::vector<StageRows> rows_;
   SparsityPattern pattern_;
   BlockPattern layout_{0, 0};
@@ -408,14 +328,8 @@ class GaussLobattoStep final : public StepProblem {
   std::optional<CompensatedSums> sums_;
 
   Vector q0_, p0_;  ///< q0_ for compensated sums alone; it is the first Lobatto point
-  Vector last_x_, f_;
-  Columns lq_, lv_;   ///< ∂L/∂q + f and ∂L/∂v at the Gauss nodes
+  Vector last_x_;
   Columns impulses_;  ///< A(Q~_j)ᵀ λ_j
-  Columns lqq_, lqv_, lvv_, fq_, fv_;
-  Vector block_, force_block_;
-  Vector momentum_blocks_;  ///< values of the whole Jacobian, those of a quadratic L without force
-  double momentum_blocks_step_ = 0.0;
-  bool same_momentum_blocks_ = false;
   /// Sizes in the last step kept, by which the next one judges round-off.
   struct Kept {
     bool known = false;
@@ -427,8 +341,7 @@ class GaussLobattoStep final : public StepProblem {
   double force_size_ = 0.0, curvature_ = 0.0;         ///< of ∂L/∂q and ∂²L/∂q²
   std::optional<StageSplitting> splitting_;           ///< small scenes with rows of one kind
   bool splitting_known_ = false, mass_known_ = false;
-  bool affine_ = false;  ///< the residual is affine in the unknowns
-  bool hessians_known_ = false;
+  bool affine_ = false;     ///< the residual is affine in the unknowns
   bool evaluated_ = false;  ///< at last_x_
 };
 
