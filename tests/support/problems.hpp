@@ -38,4 +38,22 @@ class FunctionProblem final : public NonlinearProblem {
   Fill residual_, jacobian_;
 };
 
+/// M x = b on the pattern of M's entries, or in full; a block for each row.
+inline FunctionProblem linear(const Eigen::MatrixXd& m, const Vector& b, const std::vector<double>& scales,
+                              bool dense = true) {
+  const int n = static_cast<int>(b.size());
+  std::vector<ResidualBlock> blocks;
+  for (const double scale : scales) blocks.push_back({"row", 1, scale});
+  std::vector<std::pair<int, int>> entries;
+  for (int j = 0; j < n; ++j)
+    for (int i = 0; i < n; ++i)
+      if (dense || m(i, j) != 0.0) entries.emplace_back(i, j);
+  const SparsityPattern pattern(n, n, entries);
+  return {pattern, blocks, [m, b](ConstVectorRef x, VectorRef f) { f = m * x - b; },
+          [m, entries](ConstVectorRef, VectorRef values) {
+            Eigen::Index k = 0;
+            for (const auto& [i, j] : entries) values[k++] = m(i, j);
+          }};
+}
+
 }  // namespace diracstep::testing
