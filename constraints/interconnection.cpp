@@ -68,7 +68,7 @@ SparsityPattern moved(const SparsityPattern& pattern, int rows, int row, int col
     i += row;
     j += column;
   }
-  return {rows, columns, std::move(entries)};
+  return {rows, columns, entries};
 }
 
 class PartForce final : public Force {

@@ -13,9 +13,9 @@ namespace {
 using Kind = Branch::Kind;
 
 SparsityPattern diagonal(int n) {
-  std::vector<std::pair<int, int>> entries;
-  for (int i = 0; i < n; ++i) entries.emplace_back(i, i);
-  return {n, n, std::move(entries)};
+  std::vector<std::pair<int, int>> entries(static_cast<std::size_t>(n));
+  for (int i = 0; i < n; ++i) entries[static_cast<std::size_t>(i)] = {i, i};
+  return {n, n, entries};
 }
 
 PhaseStructure structure_of(const std::vector<Branch>& branches) {
@@ -116,6 +116,7 @@ ConstraintBlocks rows_of(const std::vector<Branch>& branches) {
   std::vector<Waveform> offsets;
   const auto zero = [](double) { return 0.0; };
   std::vector<std::pair<std::string, std::string>> ends;
+  ends.reserve(branches.size());
   for (const Branch& branch : branches) ends.emplace_back(branch.from, branch.to);
   for (const std::string& node : nodes_with_rows(ends)) {
     Vector row = Vector::Zero(n);

@@ -11,7 +11,7 @@ SparsityPattern pattern_of(const Columns& a) {
   for (int j = 0; j < a.cols(); ++j)
     for (int r = 0; r < a.rows(); ++r)
       if (a(r, j) != 0.0) entries.emplace_back(r, j);
-  return {static_cast<int>(a.rows()), static_cast<int>(a.cols()), std::move(entries)};
+  return {static_cast<int>(a.rows()), static_cast<int>(a.cols()), entries};
 }
 
 class LinearRows final : public ConstraintRows {

@@ -72,9 +72,9 @@ PaceMeter make_meter(const Scene& scene, const SolverFactory& solvers, const Ada
 
 }  // namespace
 
-AdaptiveIntegrator::AdaptiveIntegrator(std::shared_ptr<const Scene> scene, const Registry& registry,
+AdaptiveIntegrator::AdaptiveIntegrator(const std::shared_ptr<const Scene>& scene, const Registry& registry,
                                        const SolverFactory& solvers, IntegratorOptions options,
-                                       AdaptiveOptions adaptive)
+                                       const AdaptiveOptions& adaptive)
     : adaptive_(checked(adaptive)),
       options_(with_method(std::move(options), *completed(scene))),
       main_(scene, registry, solvers, inner_options(options_, registry, adaptive.control)),

@@ -56,8 +56,9 @@ class AdaptiveIntegrator {
   /// The sign of options.step is the direction; its size matters only for the survey without an end.  Throws
   /// Misuse as Integrator does, for a method that is not self-adjoint (composed ones are), for eps that is
   /// not positive, for a monitor that is not positive or not even in v, and for a Lagrangian linear in v.
-  AdaptiveIntegrator(std::shared_ptr<const Scene> scene, const Registry& registry,
-                     const SolverFactory& solvers, IntegratorOptions options, AdaptiveOptions adaptive);
+  AdaptiveIntegrator(const std::shared_ptr<const Scene>& scene, const Registry& registry,
+                     const SolverFactory& solvers, IntegratorOptions options,
+                     const AdaptiveOptions& adaptive);
 
   /// Goes back to the scene's start.
   void reset();

@@ -58,8 +58,8 @@ Integrator::Preparation Integrator::prepare(std::shared_ptr<const Scene> given,
   return result;
 }
 
-Integrator::Integrator(std::shared_ptr<const Scene> scene, const Registry& registry, SolverFactory solvers,
-                       IntegratorOptions options)
+Integrator::Integrator(std::shared_ptr<const Scene> scene, const Registry& registry,
+                       const SolverFactory& solvers, const IntegratorOptions& options)
     : Integrator(prepare(std::move(scene), options, solvers), registry, solvers, options) {}
 
 Integrator::Integrator(Preparation preparation, const Registry& registry, const SolverFactory& solvers,

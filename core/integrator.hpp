@@ -115,8 +115,8 @@ class Integrator {
   /// Throws Misuse for a bad scene, start, method, order or step; for an inconsistent start, and for rows
   /// that depend on others there, unless the options say otherwise.  What was moved or dropped stands in
   /// plan().
-  Integrator(std::shared_ptr<const Scene> scene, const Registry& registry, SolverFactory solvers,
-             IntegratorOptions options);
+  Integrator(std::shared_ptr<const Scene> scene, const Registry& registry, const SolverFactory& solvers,
+             const IntegratorOptions& options);
 
   /// Goes back to the scene's start, or to another consistent one.
   void reset();

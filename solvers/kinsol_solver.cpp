@@ -102,7 +102,7 @@ class KinsolSolver final : public NonlinearSolver {
 
   std::string description() const override { return std::string("KINSOL, ") + factors_.name(); }
   std::string strategy() const override {
-    const std::string newton = "Newton's method, " + factors_.policy();
+    std::string newton = "Newton's method, " + factors_.policy();
     if (!fixed_point_) return newton;
     const bool measured = options_.iteration == Iteration::automatic;
     return (measured ? "fixed-point iteration while it is quick; otherwise "
