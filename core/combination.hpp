@@ -1,6 +1,5 @@
 #pragma once
 
-#include <algorithm>
 #include <array>
 
 namespace diracstep {
@@ -63,14 +62,6 @@ inline void combine(int n, int terms, const double* weights, const double* colum
     default:
       return detail::combine_any(n, n, terms, weights, columns, base, to);
   }
-}
-
-/// Calls visit(first row, rows) piece by piece: work on a long column that takes several sums goes through
-/// the processor's cache once.
-template <class Visit>
-void for_each_piece(int n, Visit visit) {
-  constexpr int piece = 1024;
-  for (int first = 0; first < n; first += piece) visit(first, std::min(piece, n - first));
 }
 
 /// combine() of a piece.

@@ -1,13 +1,12 @@
 #include <algorithm>
 #include <cmath>
 #include <diracstep/core/energy_doubt.hpp>
+#include <diracstep/core/scales.hpp>
 #include <sstream>
 
 namespace diracstep {
 
 namespace {
-
-constexpr double at_rest = 1e-12;  // of the coordinates
 
 bool depends_on_time(const Scene& scene) {
   const auto& [t, q, v, p] = scene.start;
@@ -36,21 +35,20 @@ EnergyDoubt::EnergyDoubt(const Scene& scene)
 
 EnergyDoubt::Sizes EnergyDoubt::sizes(double t, ConstVectorRef q, ConstVectorRef v) {
   scene_.lagrangian->gradient(t, q, v, force_, momentum_);
-  return {0.5 * std::abs(momentum_.dot(v)), q.lpNorm<Eigen::Infinity>() * force_.lpNorm<Eigen::Infinity>()};
+  return {0.5 * std::abs(momentum_.dot(v)), max_norm(q) * max_norm(force_)};
 }
 
 void EnergyDoubt::see(const Sample& point) {
   if (!keeps_energy_) return;
-  const Sizes now = sizes(point.time, point.q, point.v);
-  if (!begun_) {
-    begun_ = true;
+  if (start_position_.size() == 0) {
     start_energy_ = point.energy;
-    start_sizes_ = now;
+    start_sizes_ = sizes(point.time, point.q, point.v);
     start_position_ = point.q;
   }
   // At rest what moves is round-off, and so are the energies at play.
-  const double way = (point.q - start_position_).lpNorm<Eigen::Infinity>();
-  if (std::isfinite(point.energy) && way <= at_rest * start_position_.lpNorm<Eigen::Infinity>()) return;
+  const double way = max_norm(point.q - start_position_);
+  if (std::isfinite(point.energy) && way <= at_rest * max_norm(start_position_)) return;
+  const Sizes now = sizes(point.time, point.q, point.v);
   // The smaller of two: a run that blows up is not measured by its own size.
   double size = std::max({std::abs(start_energy_), std::min(start_sizes_.kinetic, now.kinetic),
                           std::min(start_sizes_.work, now.work)});

@@ -36,8 +36,8 @@ class EnergyDoubt {
 
   const Scene& scene_;
   bool keeps_energy_;
-  Vector force_, momentum_, start_position_;
-  bool begun_ = false;
+  Vector force_, momentum_;
+  Vector start_position_;  ///< empty before the first point
   double start_energy_ = 0.0;
   Sizes start_sizes_{0.0, 0.0};
   double worst_ = 0.1;  ///< change over size at the worst point; up to a tenth is no doubt

@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <diracstep/core/combination.hpp>
 #include <diracstep/core/scales.hpp>
@@ -7,23 +6,6 @@
 #include <utility>
 
 namespace diracstep {
-
-namespace {
-
-/// max |a_k λ_{places[k]}|, in strands: in a single one each entry waits for the last.
-double largest_product(const double* a, std::span<const int> places, const double* lambda) {
-  constexpr std::size_t strands = 4;
-  std::array<double, strands> largest{};
-  const std::size_t whole = places.size() - places.size() % strands;
-  for (std::size_t k = 0; k < whole; k += strands)
-    for (std::size_t s = 0; s < strands; ++s)
-      largest[s] = std::max(largest[s], std::abs(a[k + s] * lambda[places[k + s]]));
-  for (std::size_t k = whole; k < places.size(); ++k)
-    largest[0] = std::max(largest[0], std::abs(a[k] * lambda[places[k]]));
-  return *std::max_element(largest.begin(), largest.end());
-}
-
-}  // namespace
 
 StageRows::StageRows(std::shared_ptr<const ConstraintRows> rows, int stages, int first, int stride)
     : rows_(std::move(rows)), s_(stages), n_(rows_->dimension()), first_(first), stride_(stride) {

@@ -29,12 +29,8 @@ struct StepData {
 
   /// Size of the terms of A(q0)ᵀλ.
   double impulse_scale(ConstVectorRef lambda) const {
-    const auto places = start_rows.pattern().row_indices();
-    const double* const a = start_rows.coefficients().data();
-    double largest = 0.0;
-    for (std::size_t k = 0; k < places.size(); ++k)
-      largest = std::max(largest, std::abs(a[k] * lambda[places[k]]));
-    return largest;
+    return largest_product(start_rows.coefficients().data(), start_rows.pattern().row_indices(),
+                           lambda.data());
   }
 
   /// Size of the terms that cancel in c(q0,q1).

@@ -10,8 +10,6 @@ namespace {
 
 constexpr long steps_for_a_look = 600, fewest_looks = 3;
 constexpr double doubted = 0.25;
-/// A scene at rest moves by the round-off of its coordinates: ways of this part of them count as none.
-constexpr double at_rest = 1e-12;
 
 }  // namespace
 

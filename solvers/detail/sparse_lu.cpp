@@ -1,6 +1,6 @@
 #include <algorithm>
-#include <array>
 #include <cmath>
+#include <diracstep/core/scales.hpp>
 #include <diracstep/solvers/detail/linear_solver.hpp>
 #include <limits>
 #include <stdexcept>
@@ -87,17 +87,15 @@ class Klu final : public LinearSolver {
 
   /// The least pivot beside the largest, as klu_rcond() has it, in a third of its time.
   bool pivots_exist() {
-    constexpr std::size_t strands = 4;
     const auto* const pivots = static_cast<const double*>(numeric_->Udiag);
-    std::array<double, strands> least, largest{}, zero{};
+    Strands least, largest{}, zero{};
     least.fill(HUGE_VAL);
-    for (int k = 0; k < pattern_.rows(); ++k) {
-      const std::size_t s = static_cast<std::size_t>(k) % strands;
+    for_each_in_strands(pattern_.rows(), [&](std::size_t s, Eigen::Index k) {
       const double pivot = std::abs(pivots[k]);
       least[s] = std::min(least[s], pivot);
       largest[s] = std::max(largest[s], pivot);
       zero[s] += 0.0 * pivot;
-    }
+    });
     common_.rcond = *std::ranges::min_element(least) / *std::ranges::max_element(largest);
     return common_.rcond > 0.0 && std::ranges::all_of(zero, [](double of) { return of == 0.0; });
   }

@@ -18,7 +18,7 @@ SparsityPattern symmetric_pattern(int n, std::vector<std::pair<int, int>> entrie
 }
 
 /// Member by member: a struct set to zero as a whole costs more than the kernel of a small scene.
-KernelCall call_at(double t, const double* x, const double* y) {
+KernelCall call_at(double t, const double* x, const double* y = nullptr) {
   return {0, nullptr, nullptr, nullptr, nullptr, {x, y, nullptr}, nullptr, {nullptr, nullptr, nullptr},
           t, 0.0};
 }
@@ -48,7 +48,7 @@ class FilePhaseFunction final : public Base {
 
   double value(double t, ConstVectorRef x, ConstVectorRef y) const override {
     double sum = 0.0;
-    KernelCall call = at(t, x, y);
+    KernelCall call = call_at(t, x.data(), y.data());
     call.out[0] = &sum;
     function_.run(0, call);
     return sum;
@@ -57,7 +57,7 @@ class FilePhaseFunction final : public Base {
   void gradient(double t, ConstVectorRef x, ConstVectorRef y, VectorRef fx, VectorRef fy) const override {
     clear(fx);
     clear(fy);
-    KernelCall call = at(t, x, y);
+    KernelCall call = call_at(t, x.data(), y.data());
     call.out[0] = fx.data();
     call.out[1] = fy.data();
     function_.run(1, call);
@@ -68,7 +68,7 @@ class FilePhaseFunction final : public Base {
     clear(fxx);
     clear(fxy);
     clear(fyy);
-    KernelCall call = at(t, x, y);
+    KernelCall call = call_at(t, x.data(), y.data());
     call.out[0] = fxx.data();
     call.out[1] = fxy.data();
     call.out[2] = fyy.data();
@@ -77,14 +77,14 @@ class FilePhaseFunction final : public Base {
 
   void gradient_rate(double t, ConstVectorRef x, ConstVectorRef y, VectorRef fyt) const override {
     clear(fyt);
-    KernelCall call = at(t, x, y);
+    KernelCall call = call_at(t, x.data(), y.data());
     call.out[0] = fyt.data();
     function_.run(3, call);
   }
 
   void position_gradient_rate(double t, ConstVectorRef x, ConstVectorRef y, VectorRef fxt) const override {
     clear(fxt);
-    KernelCall call = at(t, x, y);
+    KernelCall call = call_at(t, x.data(), y.data());
     call.out[0] = fxt.data();
     function_.run(4, call);
   }
@@ -92,9 +92,6 @@ class FilePhaseFunction final : public Base {
  private:
   static PhaseStructure structure_of(const SceneFunction& f) {
     return {f.separable, f.y_hessian_constant, f.y_hessian_diagonal, f.quadratic, f.y_hessian_zero};
-  }
-  static KernelCall at(double t, ConstVectorRef x, ConstVectorRef y) {
-    return call_at(t, x.data(), y.data());
   }
 
   LoadedFunction function_;
@@ -122,7 +119,7 @@ class FileRows final : public ConstraintRows {
   void position(double t, ConstVectorRef q, VectorRef phi) const override {
     if (!holonomic()) return ConstraintRows::position(t, q, phi);
     clear(phi);
-    KernelCall call = at(t, q);
+    KernelCall call = call_at(t, q.data());
     call.out[0] = phi.data();
     function_.run(0, call);
   }
@@ -130,7 +127,7 @@ class FileRows final : public ConstraintRows {
   void coefficients(double t, ConstVectorRef q, VectorRef a, VectorRef b) const override {
     clear(a);
     clear(b);
-    KernelCall call = at(t, q);
+    KernelCall call = call_at(t, q.data());
     call.out[0] = a.data();
     call.out[1] = b.data();
     function_.run(1, call);
@@ -138,7 +135,7 @@ class FileRows final : public ConstraintRows {
 
   void derivative(double t, ConstVectorRef q, ConstVectorRef w, double s, VectorRef d) const override {
     clear(d);
-    KernelCall call = at(t, q);
+    KernelCall call = call_at(t, q.data());
     call.in[2] = w.data();
     call.s = s;
     call.out[0] = d.data();
@@ -147,7 +144,7 @@ class FileRows final : public ConstraintRows {
 
   void time_derivative(double t, ConstVectorRef q, ConstVectorRef v, VectorRef d) const override {
     clear(d);
-    KernelCall call = at(t, q);
+    KernelCall call = call_at(t, q.data());
     call.in[2] = v.data();
     call.out[0] = d.data();
     function_.run(3, call);
@@ -155,15 +152,13 @@ class FileRows final : public ConstraintRows {
 
   void annihilator_derivative(double t, ConstVectorRef q, ConstVectorRef lambda, VectorRef d) const override {
     clear(d);
-    KernelCall call = at(t, q);
+    KernelCall call = call_at(t, q.data());
     call.multipliers = lambda.data();
     call.out[0] = d.data();
     function_.run(annihilator_kernel, call);
   }
 
  private:
-  static KernelCall at(double t, ConstVectorRef q) { return call_at(t, q.data(), nullptr); }
-
   LoadedFunction function_;
 };
 
@@ -177,7 +172,7 @@ class FileForce final : public Force {
 
   void value(double t, ConstVectorRef q, ConstVectorRef v, VectorRef f) const override {
     clear(f);
-    KernelCall call = at(t, q, v);
+    KernelCall call = call_at(t, q.data(), v.data());
     call.out[0] = f.data();
     function_.run(0, call);
   }
@@ -185,17 +180,13 @@ class FileForce final : public Force {
   void derivatives(double t, ConstVectorRef q, ConstVectorRef v, VectorRef fq, VectorRef fv) const override {
     clear(fq);
     clear(fv);
-    KernelCall call = at(t, q, v);
+    KernelCall call = call_at(t, q.data(), v.data());
     call.out[0] = fq.data();
     call.out[1] = fv.data();
     function_.run(1, call);
   }
 
  private:
-  static KernelCall at(double t, ConstVectorRef q, ConstVectorRef v) {
-    return call_at(t, q.data(), v.data());
-  }
-
   LoadedFunction function_;
 };
 
