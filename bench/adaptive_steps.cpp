@@ -8,11 +8,11 @@
 #include <cmath>
 #include <cstdio>
 #include <cstring>
-#include <diracstep/core/adaptive_integrator.hpp>
-#include <diracstep/core/run.hpp>
+#include <diracstep/core/adaptive/adaptive_integrator.hpp>
+#include <diracstep/core/runs/run.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
-#include <diracstep/validation/study_run.hpp>
-#include <diracstep/validation/work_precision.hpp>
+#include <diracstep/validation/studies/study_run.hpp>
+#include <diracstep/validation/studies/work_precision.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -53,7 +53,7 @@ IntegratorOptions options_of(const Method& method, double step) {
 
 /// The fewest seconds of three runs of `once`, which returns the end or nothing.
 template <class Once>
-Point measure(const Truth& truth, Once once) {
+Point measure(const ReferenceEnd& reference, Once once) {
   Point point;
   point.seconds = HUGE_VAL;
   for (int repeat = 0; repeat < 3; ++repeat) {
@@ -62,16 +62,16 @@ Point measure(const Truth& truth, Once once) {
     if (!once(end, point.solves)) return {};
     const double seconds = processor_seconds() - start;
     point.seconds = std::min(point.seconds, seconds);
-    point.error = truth.distance(end);
+    point.error = reference.distance(end);
     if (seconds > 0.3) break;
   }
   return point;
 }
 
-Point fixed_run(const CatalogueScene& scene, const Method& method, double step, const Truth& truth) {
+Point fixed_run(const CatalogueScene& scene, const Method& method, double step, const ReferenceEnd& reference) {
   const StepGrid grid = fit_steps(scene.scene->start.time, scene.t_end, step);
   Integrator integrator(scene.scene, Registry::with_built_ins(), kinsol(), options_of(method, grid.step));
-  return measure(truth, [&](Sample& end, double& solves) {
+  return measure(reference, [&](Sample& end, double& solves) {
     integrator.reset();
     const RunReport report =
         run(integrator, grid.steps, Momentum::projected, grid.steps, [&](const Sample& sample) {
@@ -84,11 +84,11 @@ Point fixed_run(const CatalogueScene& scene, const Method& method, double step, 
 }
 
 Point variable_run(const CatalogueScene& scene, const Method& method, double eps, StepControl control,
-                   const Monitor& monitor, const Truth& truth) {
+                   const Monitor& monitor, const ReferenceEnd& reference) {
   AdaptiveIntegrator integrator(scene.scene, Registry::with_built_ins(), kinsol(),
                                 options_of(method, scene.natural_step),
                                 {.eps = eps, .control = control, .monitor = monitor, .end = scene.t_end});
-  return measure(truth, [&](Sample& end, double& solves) {
+  return measure(reference, [&](Sample& end, double& solves) {
     integrator.reset();
     const RunReport report =
         run(integrator, scene.t_end, Momentum::projected, 1'000'000'000, [&](const Sample& sample) {
@@ -143,9 +143,9 @@ std::string at_errors(const std::vector<Point>& points, bool with_solves) {
 
 void compare(const std::string& name) {
   const CatalogueScene scene = make_scene(name);
-  const Truth truth = true_end(scene, scene.t_end);
-  std::printf("\n%s, t = %g, reference: %s, known to %.0e\n\n", name.c_str(), scene.t_end, truth.kind.c_str(),
-              truth.self_error);
+  const ReferenceEnd reference = reference_end(scene, scene.t_end);
+  std::printf("\n%s, t = %g, reference: %s, known to %.0e\n\n", name.c_str(), scene.t_end, reference.kind.c_str(),
+              reference.self_error);
   std::printf("| method | steps | 1e-6: solves / ms | 1e-8 | 1e-10 |\n|---|---|---|---|---|\n");
   const auto row = [](const char* label, const char* steps, const std::vector<Point>& points) {
     std::printf("| %s | %s |%s\n", label, steps, at_errors(points, true).c_str());
@@ -153,10 +153,10 @@ void compare(const std::string& name) {
   };
   for (const Method& method : methods) {
     row(method.label, "fixed",
-        ladder(8.0 * scene.natural_step, [&](double h) { return fixed_run(scene, method, h, truth); }));
+        ladder(8.0 * scene.natural_step, [&](double h) { return fixed_run(scene, method, h, reference); }));
     const auto variable = [&](StepControl control, const Monitor& monitor) {
       return ladder(1.0,
-                    [&](double eps) { return variable_run(scene, method, eps, control, monitor, truth); });
+                    [&](double eps) { return variable_run(scene, method, eps, control, monitor, reference); });
     };
     row(method.label, "controller", variable(StepControl::integrating, {}));
     row(method.label, "in-step", variable(StepControl::in_step, {}));
@@ -167,7 +167,7 @@ void compare(const std::string& name) {
   for (double rtol = 1e-4; rtol > 0.9e-14; rtol /= 10.0) {
     Sample end;
     const StudyRow result =
-        run_yardstick(ida_method, *completed(scene.scene), scene.t_end, {.rtol = rtol}, 3, truth, end);
+        run_baseline(ida_method, *completed(scene.scene), scene.t_end, {.rtol = rtol}, 3, reference, end);
     if (result.ok()) ida.push_back({result.error(), 0.0, result.cpu_seconds.min});
   }
   std::printf("| IDA | |%s\n", at_errors(ida, false).c_str());

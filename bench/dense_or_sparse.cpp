@@ -5,11 +5,11 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <diracstep/core/integrator.hpp>
-#include <diracstep/core/matrix_form.hpp>
+#include <diracstep/core/integrator/integrator.hpp>
+#include <diracstep/core/steps/matrix_form.hpp>
+#include <diracstep/scene_format/scene_catalogue.hpp>
 #include <diracstep/solvers/detail/linear_solver.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
-#include <diracstep/validation/scene_catalogue.hpp>
 #include <map>
 #include <random>
 

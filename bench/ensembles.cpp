@@ -4,9 +4,9 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
-#include <diracstep/core/ensemble.hpp>
+#include <diracstep/core/runs/ensemble.hpp>
+#include <diracstep/scene_format/scene_catalogue.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
-#include <diracstep/validation/scene_catalogue.hpp>
 #include <thread>
 
 #include "timing.hpp"

@@ -4,9 +4,9 @@
 ///   error_control [SCENE…]      all scenes of up to 15 coordinates and rows without any
 #include <cmath>
 #include <cstdio>
-#include <diracstep/core/error_control.hpp>
+#include <diracstep/core/adaptive/error_control.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
-#include <diracstep/validation/study_run.hpp>
+#include <diracstep/validation/studies/study_run.hpp>
 #include <string>
 #include <vector>
 
@@ -21,8 +21,8 @@ struct Tally {
 };
 
 /// The scene's reference, or a run of GL(8) refined until round-off stops it.
-Truth truth_of(const CatalogueScene& scene, const Registry& registry) {
-  if (scene.reference.at && scene.reference.at(scene.t_end)) return true_end(scene, scene.t_end);
+ReferenceEnd reference_of(const CatalogueScene& scene, const Registry& registry) {
+  if (scene.reference.at && scene.reference.at(scene.t_end)) return reference_end(scene, scene.t_end);
   const ErrorControlReport fine = solve_to_error(
       scene.scene, registry, kinsol(), scene.t_end,
       {.error = 1e-16, .method = "type1/gl:8", .adaptive = false, .first_step = scene.natural_step});
@@ -37,16 +37,16 @@ Truth truth_of(const CatalogueScene& scene, const Registry& registry) {
 void examine(const std::string& name, Tally& tally) {
   const Registry registry = Registry::with_built_ins();
   const CatalogueScene scene = make_scene(name);
-  const Truth truth = truth_of(scene, registry);
-  std::printf("\n%s, t = %g; reference %s, known to %.0e\n", name.c_str(), scene.t_end, truth.kind.c_str(),
-              truth.self_error);
+  const ReferenceEnd reference = reference_of(scene, registry);
+  std::printf("\n%s, t = %g; reference %s, known to %.0e\n", name.c_str(), scene.t_end, reference.kind.c_str(),
+              reference.self_error);
   for (int k = 3; k <= 11; ++k) {
     const double error = std::pow(10.0, -k);
-    if (error < truth.self_error) continue;  // nothing could be judged
+    if (error < reference.self_error) continue;  // nothing could be judged
     const double start = processor_seconds();
     const ErrorControlReport report =
         solve_to_error(scene.scene, registry, kinsol(), scene.t_end, {.error = error});
-    const double seconds = processor_seconds() - start, found = truth.distance(report.end);
+    const double seconds = processor_seconds() - start, found = reference.distance(report.end);
     const auto last = report.runs.back().solves;
     ++tally.runs;
     if (!report.ok())

@@ -1,9 +1,9 @@
 /// A new Jacobian in each iteration against one kept for as long as it converges, from which
 /// JacobianPolicy::automatic was chosen: nanoseconds of a step, and iterations.
 #include <cstdio>
-#include <diracstep/core/integrator.hpp>
+#include <diracstep/core/integrator/integrator.hpp>
+#include <diracstep/scene_format/scene_catalogue.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
-#include <diracstep/validation/scene_catalogue.hpp>
 #include <map>
 #include <memory>
 #include <string>

@@ -20,9 +20,9 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
-#include <diracstep/core/integrator.hpp>
+#include <diracstep/core/integrator/integrator.hpp>
+#include <diracstep/scene_format/scene_catalogue.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
-#include <diracstep/validation/scene_catalogue.hpp>
 #include <fstream>
 #include <memory>
 #include <string>
@@ -64,7 +64,7 @@ struct BareStep {
   BareStep(const Integrator& at, const char* method)
       : problem(Registry::with_built_ins().method(method).step(at.scene(), false)), x(problem->size()) {
     problem->begin({at.time(), at.options().step}, at.position(), at.momentum());
-    problem->guess(at.rough_velocity(), x);
+    problem->guess(at.velocity_estimate(), x);
     other = x * (1.0 + 1e-9);
     f.setZero(x.size());
     values.setZero(problem->pattern().nonzeros());

@@ -1,10 +1,10 @@
 /// Which method a large sparse scene should take: processor time of GL(s) through KLU and of compositions of
 /// the midpoint step at equal error, on chains of links (rows) and Toda lattices (no rows) of growing size.
-/// The truth is GL(6) with a step 8 times finer than the scene's own.
+/// The reference is GL(6) with a step 8 times finer than the scene's own.
 #include <cstdio>
-#include <diracstep/core/run.hpp>
+#include <diracstep/core/runs/run.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
-#include <diracstep/validation/convergence_study.hpp>
+#include <diracstep/validation/studies/convergence_study.hpp>
 
 #include "timing.hpp"
 

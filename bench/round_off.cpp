@@ -6,9 +6,9 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
-#include <diracstep/core/integrator.hpp>
+#include <diracstep/core/integrator/integrator.hpp>
+#include <diracstep/scene_format/scene_catalogue.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
-#include <diracstep/validation/scene_catalogue.hpp>
 
 #include "timing.hpp"
 

@@ -10,9 +10,9 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
-#include <diracstep/core/integrator.hpp>
+#include <diracstep/core/integrator/integrator.hpp>
+#include <diracstep/scene_format/scene_catalogue.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
-#include <diracstep/validation/scene_catalogue.hpp>
 #include <vector>
 
 #include "timing.hpp"
@@ -46,7 +46,7 @@ struct Matrix {
     const auto step = Registry::with_built_ins().method(method).step(integrator.scene(), false);
     step->begin({integrator.time(), h}, integrator.position(), integrator.momentum());
     Vector x(step->size()), f(step->size());
-    step->guess(integrator.rough_velocity(), x);
+    step->guess(integrator.velocity_estimate(), x);
     values.setZero(step->pattern().nonzeros());
     step->residual(x, f);
     step->jacobian(x, values);
@@ -69,10 +69,10 @@ struct Matrix {
 };
 
 /// Above this size the factors of the last ordering take minutes.
-constexpr int most_as_they_come = 3000;
+constexpr int max_as_they_come = 3000;
 
 void measure(Matrix& a, const Setting& setting) {
-  if (setting.ordering == 2 && a.size() > most_as_they_come) return;
+  if (setting.ordering == 2 && a.size() > max_as_they_come) return;
   klu_common common;
   klu_defaults(&common);
   common.ordering = setting.ordering;

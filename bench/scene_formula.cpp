@@ -5,9 +5,9 @@
 #include <cstdio>
 #include <diracstep/constraints/holonomic.hpp>
 #include <diracstep/constraints/pfaffian.hpp>
-#include <diracstep/core/integrator.hpp>
+#include <diracstep/core/integrator/integrator.hpp>
+#include <diracstep/scene_format/scene_catalogue.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
-#include <diracstep/validation/scene_catalogue.hpp>
 #include <functional>
 #include <vector>
 

@@ -2,8 +2,8 @@
 /// Eigen's AutoDiffScalar nested in itself, and as a formula without derivatives.
 #include <cmath>
 #include <cstdio>
-#include <diracstep/core/jet.hpp>
-#include <diracstep/core/types.hpp>
+#include <diracstep/core/numerics/jet.hpp>
+#include <diracstep/core/numerics/types.hpp>
 #include <unsupported/Eigen/AutoDiff>
 
 #include "timing.hpp"

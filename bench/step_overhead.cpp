@@ -9,8 +9,8 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <diracstep/core/integrator.hpp>
-#include <diracstep/core/jet.hpp>
+#include <diracstep/core/integrator/integrator.hpp>
+#include <diracstep/core/numerics/jet.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
 
 #include "step_overhead_scenes.hpp"

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <diracstep/constraints/holonomic.hpp>
 #include <diracstep/constraints/pfaffian.hpp>
-#include <diracstep/core/scene.hpp>
+#include <diracstep/core/system/scene.hpp>
 
 namespace diracstep {
 

@@ -1,8 +1,8 @@
 #include <diracstep/c_interface/diracstep.h>
 #include <diracstep/version.h>
 
-#include <diracstep/core/errors.hpp>
-#include <diracstep/core/integrator.hpp>
+#include <diracstep/core/integrator/integrator.hpp>
+#include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/plugins/callback_scene.hpp>
 #include <diracstep/plugins/loaded_plugin.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>

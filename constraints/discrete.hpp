@@ -1,9 +1,9 @@
 #pragma once
 
 #include <array>
-#include <diracstep/core/discrete_rows.hpp>
-#include <diracstep/core/jet.hpp>
-#include <diracstep/core/phase_function.hpp>
+#include <diracstep/core/dirac/discrete_rows.hpp>
+#include <diracstep/core/numerics/jet.hpp>
+#include <diracstep/core/system/phase_function.hpp>
 
 namespace diracstep {
 

@@ -1,6 +1,6 @@
 #include <algorithm>
 #include <diracstep/constraints/interconnection.hpp>
-#include <diracstep/core/errors.hpp>
+#include <diracstep/core/numerics/errors.hpp>
 #include <sstream>
 
 namespace diracstep {

@@ -1,6 +1,6 @@
 #pragma once
 
-#include <diracstep/core/scene.hpp>
+#include <diracstep/core/system/scene.hpp>
 #include <string>
 
 namespace diracstep {

@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <diracstep/constraints/kirchhoff.hpp>
-#include <diracstep/core/errors.hpp>
+#include <diracstep/core/numerics/errors.hpp>
 #include <map>
 #include <set>
 #include <sstream>

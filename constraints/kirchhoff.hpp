@@ -1,7 +1,7 @@
 #pragma once
 
 #include <diracstep/constraints/linear.hpp>
-#include <diracstep/core/scene.hpp>
+#include <diracstep/core/system/scene.hpp>
 #include <string>
 #include <utility>
 #include <vector>

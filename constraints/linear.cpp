@@ -1,6 +1,6 @@
 #include <diracstep/constraints/linear.hpp>
 #include <diracstep/constraints/pfaffian.hpp>
-#include <diracstep/core/errors.hpp>
+#include <diracstep/core/numerics/errors.hpp>
 
 namespace diracstep {
 

@@ -1,7 +1,7 @@
 #pragma once
 
-#include <diracstep/core/constraint_rows.hpp>
-#include <diracstep/core/jet.hpp>
+#include <diracstep/core/numerics/jet.hpp>
+#include <diracstep/core/system/constraint_rows.hpp>
 #include <functional>
 #include <string>
 #include <vector>

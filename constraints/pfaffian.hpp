@@ -1,10 +1,10 @@
 #pragma once
 
 #include <array>
-#include <diracstep/core/constraint_rows.hpp>
-#include <diracstep/core/dependence.hpp>
-#include <diracstep/core/jet.hpp>
-#include <diracstep/core/phase_function.hpp>
+#include <diracstep/core/numerics/dependence.hpp>
+#include <diracstep/core/numerics/jet.hpp>
+#include <diracstep/core/system/constraint_rows.hpp>
+#include <diracstep/core/system/phase_function.hpp>
 
 namespace diracstep {
 

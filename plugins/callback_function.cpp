@@ -1,4 +1,4 @@
-#include <diracstep/core/errors.hpp>
+#include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/plugins/callback_error.hpp>
 #include <diracstep/plugins/callback_function.hpp>
 #include <diracstep/plugins/differences.hpp>

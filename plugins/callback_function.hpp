@@ -2,8 +2,8 @@
 
 #include <diracstep/plugins/diracstep_plugin.h>
 
-#include <diracstep/core/generating_function.hpp>
-#include <diracstep/core/scene.hpp>
+#include <diracstep/core/dirac/generating_function.hpp>
+#include <diracstep/core/system/scene.hpp>
 #include <memory>
 #include <string>
 

@@ -1,4 +1,4 @@
-#include <diracstep/core/errors.hpp>
+#include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/plugins/callback_error.hpp>
 #include <diracstep/plugins/callback_scene.hpp>
 #include <diracstep/plugins/differences.hpp>
@@ -7,7 +7,7 @@ namespace diracstep {
 
 namespace {
 
-constexpr int most_entries = 1 << 30;  ///< of a full matrix
+constexpr int max_entries = 1 << 30;  ///< of a full matrix
 
 /// What every object made of callbacks keeps.
 struct Origin {
@@ -199,7 +199,7 @@ std::vector<std::string> coordinate_names(const diracstep_scene& scene, const st
 SparsityPattern pattern_from(const diracstep_pattern& pattern, int rows, int columns,
                              const std::string& owner) {
   if (pattern.column_starts == nullptr)
-    require(rows <= most_entries / columns, owner,
+    require(rows <= max_entries / columns, owner,
             "a matrix of " + std::to_string(rows) + " by " + std::to_string(columns) +
                 " is too large to be full");
   if (pattern.column_starts == nullptr) return SparsityPattern::dense(rows, columns);

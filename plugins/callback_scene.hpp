@@ -2,7 +2,7 @@
 
 #include <diracstep/plugins/diracstep_scene.h>
 
-#include <diracstep/core/scene.hpp>
+#include <diracstep/core/system/scene.hpp>
 #include <memory>
 #include <string>
 

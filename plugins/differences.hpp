@@ -1,7 +1,7 @@
 #pragma once
 
-#include <diracstep/core/sparsity_pattern.hpp>
-#include <diracstep/core/types.hpp>
+#include <diracstep/core/numerics/sparsity_pattern.hpp>
+#include <diracstep/core/numerics/types.hpp>
 #include <functional>
 #include <vector>
 

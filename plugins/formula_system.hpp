@@ -4,7 +4,7 @@
 
 #include <cstddef>
 #include <deque>
-#include <diracstep/core/jet.hpp>
+#include <diracstep/core/numerics/jet.hpp>
 #include <span>
 #include <stdexcept>
 #include <type_traits>

@@ -1,7 +1,7 @@
 #include <dlfcn.h>
 
 #include <algorithm>
-#include <diracstep/core/errors.hpp>
+#include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/plugins/callback_error.hpp>
 #include <diracstep/plugins/callback_function.hpp>
 #include <diracstep/plugins/callback_scene.hpp>
@@ -14,7 +14,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int most_inner_columns = 1000;
+constexpr int max_inner_columns = 1000;
 
 std::string text_or(const char* text, const char* otherwise) { return text != nullptr ? text : otherwise; }
 
@@ -56,9 +56,9 @@ void require_usable(const diracstep_method& method, const std::string& owner) {
   require(method.order >= 1 && method.constrained_order >= 0, owner,
           "it claims order " + std::to_string(method.order) + " and constrained order " +
               std::to_string(method.constrained_order) + "; 1 or more, and 0 or more, are allowed");
-  require(method.inner_columns >= 0 && method.inner_columns <= most_inner_columns, owner,
+  require(method.inner_columns >= 0 && method.inner_columns <= max_inner_columns, owner,
           "it has " + std::to_string(method.inner_columns) + " inner columns; 0 to " +
-              std::to_string(most_inner_columns) + " are allowed");
+              std::to_string(max_inner_columns) + " are allowed");
   require(method.value != nullptr || method.gradient != nullptr, owner,
           "value and gradient are NULL; one of them is the least to give");
   require((method.create == nullptr) == (method.destroy == nullptr), owner,

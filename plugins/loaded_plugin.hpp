@@ -2,7 +2,7 @@
 
 #include <diracstep/plugins/diracstep_plugin.h>
 
-#include <diracstep/core/registry.hpp>
+#include <diracstep/core/methods/registry.hpp>
 #include <filesystem>
 #include <memory>
 #include <string>

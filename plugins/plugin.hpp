@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <deque>
-#include <diracstep/core/jet.hpp>
+#include <diracstep/core/numerics/jet.hpp>
 #include <diracstep/plugins/formula_system.hpp>
 #include <exception>
 #include <string>

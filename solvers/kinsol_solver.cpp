@@ -1,8 +1,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <diracstep/core/errors.hpp>
-#include <diracstep/core/scales.hpp>
+#include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/solvers/detail/jacobian_factors.hpp>
 #include <diracstep/solvers/detail/shells.hpp>
 #include <diracstep/solvers/detail/vector.hpp>

@@ -17,7 +17,7 @@ FOLDERS = {
 }
 INTRODUCTION = """\
 Every public header, by folder. Names are in the namespace ``diracstep``; include a header as
-``<diracstep/core/integrator.hpp>`` and link the library of its folder, ``DiracStep::core``. Misuse throws ``Misuse``; a
+``<diracstep/core/integrator/integrator.hpp>`` and link the library of its folder, ``DiracStep::core``. Misuse throws ``Misuse``; a
 numerical failure is a report. What is in a namespace ``detail`` is no interface and not here.
 
 Start with :ref:`Scene <scene_8hpp>`, :ref:`Integrator <integrator_8hpp>` and :ref:`kinsol() <kinsol__solver_8hpp>`.

@@ -6,9 +6,9 @@
 // whose motion is known: with ζ = x + iy,  ζ'' = −iB ζ' − k ζ,  so  ζ = a exp(iω₁t) + c exp(iω₂t).
 #include <complex>
 #include <cstdio>
+#include <diracstep/reports/report.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
-#include <diracstep/validation/convergence_study.hpp>
-#include <diracstep/validation/report.hpp>
+#include <diracstep/validation/studies/convergence_study.hpp>
 
 using namespace diracstep;
 using Complex = std::complex<double>;

@@ -2,7 +2,7 @@
 #include <cmath>
 #include <cstdio>
 #include <diracstep/constraints/pfaffian.hpp>
-#include <diracstep/core/run.hpp>
+#include <diracstep/core/runs/run.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
 
 using namespace diracstep;

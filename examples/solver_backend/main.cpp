@@ -3,7 +3,7 @@
 // Lagrangian and its bars, each with the pattern of its derivatives; steps of this size are solved with KLU.
 #include <cmath>
 #include <cstdio>
-#include <diracstep/core/run.hpp>
+#include <diracstep/core/runs/run.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
 
 using namespace diracstep;

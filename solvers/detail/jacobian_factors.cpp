@@ -1,6 +1,6 @@
 #include <cmath>
-#include <diracstep/core/errors.hpp>
-#include <diracstep/core/scales.hpp>
+#include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/solvers/detail/jacobian_factors.hpp>
 #include <iterator>
 #include <limits>
@@ -11,15 +11,15 @@ namespace {
 
 /// Up to so many entries, and so many for each unknown, a new Jacobian costs less than the iterations it
 /// saves: full matrices of up to 11 unknowns, bands and chains of up to some tens.
-constexpr int most_entries = 200, most_entries_of_unknown = 11;
-/// Where so many further iterations at the pace of the last one would not do, a new Jacobian is taken.
+constexpr int max_entries = 200, max_entries_of_unknown = 11;
+/// Where so many further iterations at the rate of the last one would not do, a new Jacobian is taken.
 constexpr int patience = 6;
 constexpr double done = 1e-14;
 /// Where an old Jacobian fails, so many solves do without one before it is tried again.
 constexpr int fresh_starts_after_failure = 16;
 /// So many different step sizes keep factors of their own: those of a symmetric composition of 31 stages, and
 /// of Suzuki's composition where factors take much memory.
-constexpr std::size_t most_parameters = 16, most_parameters_of_large = 2;
+constexpr std::size_t max_parameters = 16, max_parameters_of_large = 2;
 constexpr int large = 10000;
 
 constexpr double none = std::numeric_limits<double>::quiet_NaN();
@@ -27,7 +27,7 @@ constexpr double none = std::numeric_limits<double>::quiet_NaN();
 JacobianPolicy resolved(JacobianPolicy policy, const SparsityPattern& pattern) {
   if (policy != JacobianPolicy::automatic) return policy;
   const int entries = pattern.nonzeros();
-  const bool cheap = entries <= most_entries && entries <= most_entries_of_unknown * pattern.rows();
+  const bool cheap = entries <= max_entries && entries <= max_entries_of_unknown * pattern.rows();
   return cheap ? JacobianPolicy::fresh : JacobianPolicy::kept;
 }
 
@@ -37,7 +37,7 @@ JacobianFactors::JacobianFactors(NonlinearProblem& problem, JacobianPolicy polic
     : problem_(problem),
       policy_(resolved(policy, problem.pattern())),
       constant_(policy != JacobianPolicy::fresh && !std::isnan(problem.constant_jacobian_parameter())) {
-  factors_.reserve(most_parameters);
+  factors_.reserve(max_parameters);
   current_ = &add();
 }
 
@@ -73,7 +73,7 @@ void JacobianFactors::save(Snapshot& to) const {
 void JacobianFactors::restore(Snapshot& from) {
   reset();
   if (!keeps_factors()) return factors_.front().solver->restore(from);
-  const long most = most_parameters;
+  const long most = max_parameters;
   const long count = from.whole_number(most), current = from.whole_number(most);
   if (count < 1 || current >= count) throw Misuse("the snapshot has no factors of a Jacobian");
   fresh_starts_ = static_cast<int>(from.whole_number(fresh_starts_after_failure));
@@ -99,7 +99,7 @@ bool JacobianFactors::select(double parameter) {
       return true;
     }
   const bool first = std::isnan(factors_.front().parameter);
-  const std::size_t most = problem_.size() < large ? most_parameters : most_parameters_of_large;
+  const std::size_t most = problem_.size() < large ? max_parameters : max_parameters_of_large;
   if (!first && factors_.size() < most) add();
   factors_.back().parameter = parameter;
   current_ = &factors_.back();

@@ -1,6 +1,6 @@
 #pragma once
 
-#include <diracstep/core/nonlinear_solver.hpp>
+#include <diracstep/core/numerics/nonlinear_solver.hpp>
 #include <diracstep/solvers/detail/linear_solver.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
 #include <memory>

@@ -1,7 +1,7 @@
 #pragma once
 
-#include <diracstep/core/snapshot.hpp>
-#include <diracstep/core/sparsity_pattern.hpp>
+#include <diracstep/core/numerics/snapshot.hpp>
+#include <diracstep/core/numerics/sparsity_pattern.hpp>
 #include <memory>
 
 namespace diracstep::detail {

@@ -1,6 +1,6 @@
 #include <algorithm>
 #include <cmath>
-#include <diracstep/core/scales.hpp>
+#include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/solvers/detail/linear_solver.hpp>
 #include <limits>
 #include <stdexcept>

@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <diracstep/core/scales.hpp>
+#include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/solvers/detail/vector.hpp>
 #include <utility>
 

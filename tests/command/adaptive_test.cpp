@@ -21,7 +21,7 @@ TEST_F(AdaptiveCommand, RunsAnEccentricOrbitInFewSteps) {
     EXPECT_TRUE(json["step"].is_null());
     EXPECT_EQ(json["adaptive"]["control"], control);
     EXPECT_EQ(json["adaptive"]["resets"], 0);
-    EXPECT_GT(json["adaptive"]["pace_ratio"].get<double>(), 100.0);
+    EXPECT_GT(json["adaptive"]["rate_ratio"].get<double>(), 100.0);
     EXPECT_EQ(json["end"]["t"], 20.0);
   }
 }

@@ -59,7 +59,7 @@ TEST_F(SceneVerbs, CheckRunsEverySceneAgainstItsPublishedValues) {
   expect_misuse("check --scenes knife_edge", {"--scenes"});
 }
 
-TEST_F(SceneVerbs, CheckNamesDependentRows) {
+TEST_F(SceneVerbs, CheckNamesRedundantRows) {
   const std::string file = "'" + made() + "'";
   change("[start]", "[[rows]]\nname = \"twin\"\nequation = \"3*(x^2 + z^2) = 3*r^2\"\n\n[start]");
   const Outcome outcome = run("check " + file);

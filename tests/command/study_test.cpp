@@ -30,11 +30,11 @@ TEST_F(StudyCommand, JsonHasTheKeysOfTheContract) {
     for (const char* key : {"median", "min", "max"})
       EXPECT_GT(row["cpu_seconds"][key].get<double>(), 0.0) << key;
     EXPECT_EQ(row["cpu_seconds"]["repeats"], 2);
-    const bool yardstick = row["method"] == "ida" || row["method"] == "erk";
-    EXPECT_EQ(row.contains("rtol"), yardstick);
-    EXPECT_EQ(row.contains("self_error"), yardstick);
-    EXPECT_EQ(row.contains("posing"), row["method"] == "ida");
-    for (const char* key : {"order", "momentum", "step"}) EXPECT_EQ(row.contains(key), !yardstick) << key;
+    const bool baseline = row["method"] == "ida" || row["method"] == "erk";
+    EXPECT_EQ(row.contains("rtol"), baseline);
+    EXPECT_EQ(row.contains("self_error"), baseline);
+    EXPECT_EQ(row.contains("formulation"), row["method"] == "ida");
+    for (const char* key : {"order", "momentum", "step"}) EXPECT_EQ(row.contains(key), !baseline) << key;
   }
   ASSERT_EQ(study["measured_order"].size(), 2u);
   const Json build = Json::parse(outcome.out)["build"];
@@ -88,12 +88,12 @@ TEST_F(StudyCommand, PatternsAndClassesChooseScenes) {
   expect_misuse("study 'zz*'", {"zz*", "knife_edge"});
 }
 
-TEST_F(StudyCommand, IdaTakesThePosingAskedForAndNamesItInTheRow) {
+TEST_F(StudyCommand, IdaTakesTheFormulationAskedForAndNamesItInTheRow) {
   const std::string rest = " --orders 2 --steps 0.02 --without-erk --rtols 1e-6 --repeat 1 --end 1 --json";
-  for (const std::string posing : {"rates", "rates-loose", "index-2", "velocity"}) {
-    const Outcome outcome = run("study pendulum_cartesian --ida-posing " + posing + rest);
+  for (const std::string formulation : {"rates", "rates-loose", "index-2", "velocity"}) {
+    const Outcome outcome = run("study pendulum_cartesian --ida-formulation " + formulation + rest);
     ASSERT_EQ(outcome.status, 0) << outcome.err;
-    EXPECT_EQ(Json::parse(outcome.out)["studies"][0]["rows"].back()["posing"], posing);
+    EXPECT_EQ(Json::parse(outcome.out)["studies"][0]["rows"].back()["formulation"], formulation);
   }
 }
 
@@ -152,7 +152,7 @@ TEST_F(StudyCommand, MisuseNamesTheValueAndWhatIsAllowed) {
   expect_misuse("study knife_edge --repeat 0", {"0", "1 or more"});
   expect_misuse("study knife_edge --budget 0", {"0"});
   expect_misuse("study knife_edge --end 0", {"0"});
-  expect_misuse("study knife_edge --ida-posing index-3",
+  expect_misuse("study knife_edge --ida-formulation index-3",
                 {"index-3", "best, rates, rates-loose, index-2, velocity"});
   expect_misuse("study knife_edge --momentum x", {"plus", "minus", "projected"});
   expect_misuse("study knife_edge --set e=1", {"'e'", "J"});

@@ -1,10 +1,10 @@
-# SUNDIALS and KLU headers appear only in solvers/ (sources and detail/) and validation/*_reference.cpp;
+# SUNDIALS and KLU headers appear only in solvers/ (sources and detail/) and validation/references/*_reference.cpp;
 # no file of a library leaves its folder by a relative path.
-set(allowed "^(solvers/.*\\.cpp|solvers/detail/.*|validation/[^/]*_reference\\.cpp)$")
+set(allowed "^(solvers/.*\\.cpp|solvers/detail/.*|validation/references/[^/]*_reference\\.cpp)$")
 set(packages sundials|sunmatrix|sunlinsol|sunnonlinsol|nvector|kinsol|idas?|cvodes?|arkode|suitesparse)
 set(third_party "[<\"]((${packages})/|(klu|amd|btf|colamd)[.]h)")
 set(errors "")
-foreach(folder core constraints solvers plugins c_interface validation)
+foreach(folder core constraints solvers plugins c_interface files scene_format validation reports command)
   file(GLOB_RECURSE files RELATIVE ${ROOT} ${ROOT}/${folder}/*.hpp ${ROOT}/${folder}/*.cpp)
   foreach(file IN LISTS files)
     file(STRINGS ${ROOT}/${file} includes REGEX "^[ \t]*#[ \t]*include")

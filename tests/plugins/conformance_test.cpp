@@ -3,7 +3,7 @@
 #include <cstdlib>
 #include <diracstep/plugins/loaded_plugin.hpp>
 #include <diracstep/plugins/plugin.hpp>
-#include <diracstep/validation/conformance_suite.hpp>
+#include <diracstep/validation/laws/conformance_suite.hpp>
 #include <set>
 #include <vector>
 

@@ -1,6 +1,6 @@
 #include <unistd.h>
 
-#include <diracstep/core/integrator.hpp>
+#include <diracstep/core/integrator/integrator.hpp>
 #include <diracstep/plugins/callback_error.hpp>
 #include <diracstep/plugins/callback_scene.hpp>
 #include <diracstep/plugins/loaded_plugin.hpp>

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <diracstep/core/integrator.hpp>
+#include <diracstep/core/integrator/integrator.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
 #include <memory>
 #include <string>

@@ -1,7 +1,7 @@
 #pragma once
 
 #include <Eigen/Dense>
-#include <diracstep/core/nonlinear_solver.hpp>
+#include <diracstep/core/numerics/nonlinear_solver.hpp>
 
 namespace diracstep::testing {
 

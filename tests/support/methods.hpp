@@ -1,6 +1,6 @@
 #pragma once
 
-#include <diracstep/core/registry.hpp>
+#include <diracstep/core/methods/registry.hpp>
 #include <string>
 #include <vector>
 

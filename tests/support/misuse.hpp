@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include <diracstep/core/errors.hpp>
+#include <diracstep/core/numerics/errors.hpp>
 #include <initializer_list>
 #include <string>
 

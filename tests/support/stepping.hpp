@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include <diracstep/core/run.hpp>
+#include <diracstep/core/runs/run.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
 #include <string>
 #include <vector>

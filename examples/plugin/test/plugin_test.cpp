@@ -1,6 +1,6 @@
 // Tests every method of the plugins that are named on the command line.
 #include <diracstep/plugins/loaded_plugin.hpp>
-#include <diracstep/validation/conformance_suite.hpp>
+#include <diracstep/validation/laws/conformance_suite.hpp>
 
 int main(int count, char** arguments) {
   testing::InitGoogleTest(&count, arguments);

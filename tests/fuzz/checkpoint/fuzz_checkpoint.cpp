@@ -2,8 +2,8 @@
 #include <cstdint>
 #include <cstdlib>
 #include <cstring>
-#include <diracstep/core/errors.hpp>
-#include <diracstep/validation/checkpoint_file.hpp>
+#include <diracstep/command/files/checkpoint_file.hpp>
+#include <diracstep/core/numerics/errors.hpp>
 #include <string>
 
 /// libFuzzer's entry: any bytes, with their own check sum or a right one, are a checkpoint that encodes to

@@ -3,10 +3,10 @@
 #include <csignal>
 #include <cstdint>
 #include <cstdlib>
-#include <diracstep/core/errors.hpp>
-#include <diracstep/validation/command/arguments.hpp>
-#include <diracstep/validation/command/command_line.hpp>
-#include <diracstep/validation/command/interrupt.hpp>
+#include <diracstep/command/arguments.hpp>
+#include <diracstep/command/command_line.hpp>
+#include <diracstep/command/interrupt.hpp>
+#include <diracstep/core/numerics/errors.hpp>
 #include <string>
 #include <vector>
 
@@ -18,11 +18,11 @@ namespace {
 
 using namespace diracstep;
 
-constexpr std::size_t most_words = 40;
+constexpr std::size_t max_words = 40;
 
 std::vector<std::string> words(const std::uint8_t* data, std::size_t size) {
   std::vector<std::string> all{"diracstep", ""};
-  for (std::size_t i = 0; i < size && all.size() < most_words; ++i) {
+  for (std::size_t i = 0; i < size && all.size() < max_words; ++i) {
     if (data[i] == '\n')
       all.emplace_back();
     else if (data[i] != 0)  // ends a word for every program

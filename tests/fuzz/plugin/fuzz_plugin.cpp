@@ -6,8 +6,8 @@
 #include <cstdint>
 #include <cstdlib>
 #include <cstring>
-#include <diracstep/core/errors.hpp>
-#include <diracstep/core/integrator.hpp>
+#include <diracstep/core/integrator/integrator.hpp>
+#include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/plugins/callback_error.hpp>
 #include <diracstep/plugins/loaded_plugin.hpp>
 #include <diracstep/plugins/shared_object.hpp>
@@ -68,12 +68,12 @@ struct Answer {
 
 /// After so many calls every answer is an error: retries of a step that has no solution take most of the
 /// time.
-constexpr int most_calls = 400;
+constexpr int max_calls = 400;
 
 int answer(const void* data, std::initializer_list<double*> columns, int size) {
   Answer& how = *static_cast<Answer*>(const_cast<void*>(data));
   if (how.calls++ < how.first) return 0;
-  if (how.calls > most_calls) return 42;
+  if (how.calls > max_calls) return 42;
   switch (how.kind) {
     case 1:
     case 4:

@@ -1,8 +1,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
-#include <diracstep/core/errors.hpp>
-#include <diracstep/scene_compiler/scene_program.hpp>
+#include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/scene_format/compiler/scene_program.hpp>
 #include <string>
 
 /// libFuzzer's entry: any bytes as a scene file either compile to kernels or are refused with a message.

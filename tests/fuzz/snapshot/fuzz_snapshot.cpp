@@ -1,10 +1,10 @@
 #include <cstdint>
 #include <cstdlib>
 #include <cstring>
-#include <diracstep/core/errors.hpp>
-#include <diracstep/core/integrator.hpp>
+#include <diracstep/core/integrator/integrator.hpp>
+#include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/scene_format/scene_catalogue.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
-#include <diracstep/validation/scene_catalogue.hpp>
 #include <memory>
 
 /// libFuzzer's entry: any numbers are a snapshot from which steps can be tried, or are refused with a

@@ -1,7 +1,7 @@
 #include <cstdint>
 #include <cstdlib>
-#include <diracstep/core/errors.hpp>
-#include <diracstep/validation/study_comparison.hpp>
+#include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/reports/study_comparison.hpp>
 #include <string>
 
 /// libFuzzer's entry: any bytes as the study.json of --compare are compared with a study, or are refused with

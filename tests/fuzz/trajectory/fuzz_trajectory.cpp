@@ -3,9 +3,9 @@
 #include <cstdint>
 #include <cstdlib>
 #include <cstring>
-#include <diracstep/core/errors.hpp>
-#include <diracstep/validation/command/trajectory_file.hpp>
-#include <diracstep/validation/scene_catalogue.hpp>
+#include <diracstep/command/files/trajectory_file.hpp>
+#include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/scene_format/scene_catalogue.hpp>
 #include <filesystem>
 #include <fstream>
 #include <sstream>

@@ -1,0 +1,98 @@
+#include <diracstep/version.h>
+#include <fmt/format.h>
+
+#include <CLI/App.hpp>
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <diracstep/command/command_line.hpp>
+#include <diracstep/command/verbs/verbs.hpp>
+#include <diracstep/core/numerics/errors.hpp>
+
+namespace diracstep::command {
+
+namespace {
+
+/// "the options of run are --method …", or the verbs where none was given.
+std::string allowed(const CLI::App& app) {
+  const auto verbs = app.get_subcommands();
+  std::string list;
+  if (verbs.empty()) {
+    for (const auto* verb : app.get_subcommands({})) list += ' ' + verb->get_name();
+    return "the verbs are" + list + "; diracstep --help tells more";
+  }
+  const std::string& verb = verbs.front()->get_name();
+  for (const auto* option : verbs.front()->get_options()) list += ' ' + option->get_name();
+  return fmt::format("the arguments of {0} are{1}; diracstep {0} --help tells more", verb, list);
+}
+
+int tell(const CLI::App& app, const CLI::ParseError& error) {
+  if (error.get_exit_code() == static_cast<int>(CLI::ExitCodes::Success)) return app.exit(error);
+  const bool unknown_verb = app.get_subcommands().empty() && app.remaining_size() > 0;
+  const std::string what =
+      unknown_verb ? fmt::format("unknown verb '{}'", app.remaining().front()) : error.what();
+  say(fmt::format("{}; {}", what, allowed(app)));
+  return misused;
+}
+
+/// --plugin before or after every verb; the plugins are there when the verb runs, if it does.
+void take_plugins(CLI::App& app, Session& session, bool run_verbs) {
+  const auto add = [](CLI::App& to, std::vector<std::string>& files) {
+    const char* const text =
+        "Load a plugin; may be repeated. Also taken: every *.so in the\ndirectories of DIRACSTEP_PLUGIN_PATH";
+    return to.add_option("--plugin", files, text)->type_name("FILE.so")->allow_extra_args(false);
+  };
+  const CLI::Option* const before = add(app, session.plugin_files);
+  for (CLI::App* verb : app.get_subcommands({})) {
+    add(*verb, session.plugin_files);
+    // Here the files after the verb are in the session, and those before it only in their option.
+    verb->parse_complete_callback([&session, before, run_verbs] {
+      const std::vector<std::string> files = before->results();
+      session.plugin_files.insert(session.plugin_files.begin(), files.begin(), files.end());
+      load_plugins(session);
+      if (!run_verbs) throw CLI::Success();
+    });
+  }
+}
+
+int read_and_run(CLI::App& app, const Session& session, int count, char** arguments) {
+  try {
+    app.parse(count, arguments);
+    finish_output();
+    return session.exit_status;
+  } catch (const CLI::ParseError& error) {
+    return tell(app, error);
+  } catch (const Misuse& misuse) {
+    say(misuse.what());
+    return misused;
+  } catch (const std::exception& error) {
+    say(error.what());
+    return failed;
+  }
+}
+
+}  // namespace
+
+int execute(int count, char** arguments, bool run_verbs) {
+  CLI::App app("Discrete Dirac integrators for constrained Lagrangian and Hamiltonian systems", "diracstep");
+  app.set_version_flag("--version", "diracstep " DIRACSTEP_VERSION);
+  app.require_subcommand(1);
+  app.footer(
+      "Examples:\n"
+      "  diracstep list methods\n"
+      "  diracstep run knife_edge --step 0.05 --out knife_edge.csv\n"
+      "  diracstep study knife_edge --orders 2,4,8 --out results\n"
+      "Exit status: 0 done, 1 numerical failure or interrupt, 2 misuse.");
+  Session session;
+  add_check(app, session);
+  add_list(app, session);
+  add_new(app, session);
+  add_orders(app, session);
+  add_plan(app, session);
+  add_run(app, session);
+  add_stability(app, session);
+  add_study(app, session);
+  take_plugins(app, session, run_verbs);
+  return read_and_run(app, session, count, arguments);
+}
+
+}  // namespace diracstep::command

@@ -1,0 +1,118 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <diracstep/command/files/checkpoint_file.hpp>
+#include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/files/output_file.hpp>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+namespace diracstep {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr std::string_view magic = "diracstep checkpoint 1\n";
+constexpr std::size_t sum_size = sizeof(std::uint64_t);
+
+[[noreturn]] void refuse(const std::string& path, const std::string& why) {
+  throw Misuse(fmt::format("'{}' is no checkpoint that can be used: {}", path, why));
+}
+
+/// The bytes between the first line and the check sum.
+std::string_view checked_body(std::string_view bytes, const std::string& path) {
+  if (bytes.substr(0, magic.size()) != magic)
+    refuse(path, fmt::format("it does not begin with '{}'", magic.substr(0, magic.size() - 1)));
+  if (bytes.size() < magic.size() + sum_size) refuse(path, "it is cut off");
+  const std::string_view summed = bytes.substr(0, bytes.size() - sum_size);
+  std::uint64_t sum = 0;
+  std::memcpy(&sum, bytes.data() + summed.size(), sum_size);
+  if (sum != check_sum(summed)) refuse(path, "its check sum is wrong, so it is damaged or cut off");
+  return summed.substr(magic.size());
+}
+
+long count(const Json& json, const char* key) {
+  if (!json.at(key).is_number_integer()) throw std::out_of_range(fmt::format("{} is no whole number", key));
+  const auto value = json.at(key).get<std::int64_t>();
+  if (value < 0) throw std::out_of_range(fmt::format("{} = {}", key, value));
+  return value;
+}
+
+}  // namespace
+
+std::uint64_t check_sum(std::string_view bytes) {
+  std::uint64_t sum = 14695981039346656037U;
+  for (const char c : bytes) sum = (sum ^ static_cast<unsigned char>(c)) * 1099511628211U;
+  return sum;
+}
+
+std::string encoded(const Checkpoint& checkpoint) {
+  const std::vector<double>& numbers = checkpoint.state.numbers();
+  Json json{{"run", Json::object()}, {"points", checkpoint.points}, {"bytes", checkpoint.bytes}};
+  for (const auto& [key, value] : checkpoint.run) json["run"][key] = value;
+  json["numbers"] = numbers.size();
+  std::string text(magic);
+  text += json.dump(-1, ' ', false, Json::error_handler_t::replace) + '\n';
+  const std::size_t start = text.size();
+  text.resize(start + numbers.size() * sizeof(double));
+  if (!numbers.empty()) std::memcpy(text.data() + start, numbers.data(), numbers.size() * sizeof(double));
+  const std::uint64_t sum = check_sum(text);
+  return text.append(reinterpret_cast<const char*>(&sum), sum_size);
+}
+
+Checkpoint decoded(std::string_view bytes, const std::string& path) {
+  const std::string_view body = checked_body(bytes, path);
+  const std::size_t line = std::min(body.find('\n'), body.size());
+  const std::string_view rest = body.substr(std::min(line + 1, body.size()));
+  Checkpoint checkpoint;
+  try {
+    const Json json = Json::parse(body.substr(0, line));
+    for (const auto& [key, value] : json.at("run").items())
+      checkpoint.run.emplace_back(key, value.get<std::string>());
+    checkpoint.points = count(json, "points");
+    checkpoint.bytes = count(json, "bytes");
+    const auto numbers = static_cast<std::size_t>(count(json, "numbers"));
+    if (rest.size() % sizeof(double) != 0 || numbers != rest.size() / sizeof(double))
+      refuse(path, fmt::format("{} numbers are announced, {} bytes follow", numbers, rest.size()));
+    std::vector<double> state(numbers);
+    if (numbers > 0) std::memcpy(state.data(), rest.data(), rest.size());
+    checkpoint.state = Snapshot(std::move(state));
+  } catch (const Json::exception& error) {
+    refuse(path, error.what());
+  } catch (const std::out_of_range& error) {
+    refuse(path, error.what());
+  }
+  return checkpoint;
+}
+
+void write_checkpoint(const std::string& path, const Checkpoint& checkpoint) {
+  replace_file(path, encoded(checkpoint));
+}
+
+Checkpoint read_checkpoint(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  if (!file) throw Misuse(fmt::format("'{}' cannot be read: {}", path, std::strerror(errno)));
+  std::ostringstream bytes;
+  bytes << file.rdbuf();
+  return decoded(bytes.view(), path);
+}
+
+void require_same_run(const Checkpoint& saved, const std::vector<std::pair<std::string, std::string>>& run,
+                      const std::string& path) {
+  const auto value = [](const auto& list, const std::string& key) {
+    for (const auto& [name, text] : list)
+      if (name == key) return text;
+    return std::string("nothing");
+  };
+  for (const auto* list : {&run, &saved.run})
+    for (const auto& [key, text] : *list)
+      if (value(run, key) != value(saved.run, key))
+        throw Misuse(fmt::format("'{}' is of another run: its {} is {}, here it is {}", path, key,
+                                 value(saved.run, key), value(run, key)));
+}
+
+}  // namespace diracstep

@@ -1,0 +1,47 @@
+#pragma once
+
+#include <diracstep/core/integrator/integrator.hpp>
+#include <diracstep/files/output_file.hpp>
+#include <string>
+
+namespace diracstep::command {
+
+/// A trajectory as CSV: t, the coordinates, v_NAME, p_NAME, lambda_ROW, energy, with 17 significant digits.
+/// Lines are gathered and written many at a time, always whole ones.
+class TrajectoryFile {
+ public:
+  /// Where a file stood at some moment.
+  struct Mark {
+    long lines = 0;  ///< points
+    long bytes = 0;
+  };
+
+  /// Begins a file.  Throws Misuse where it cannot be opened.
+  TrajectoryFile(const std::string& path, const Scene& scene);
+  /// Goes on with a file from a mark; what was written after it is dropped.  Throws Misuse where it cannot be
+  /// opened, is shorter or has another header.
+  TrajectoryFile(const std::string& path, const Scene& scene, Mark mark);
+  TrajectoryFile(const TrajectoryFile&) = delete;
+  TrajectoryFile& operator=(const TrajectoryFile&) = delete;
+  /// Writes what is still gathered where an exception ends the run; close() tells whether that was possible.
+  ~TrajectoryFile();
+
+  /// All throw std::runtime_error where the system refuses to write.
+  void write(const Sample& sample);
+  void close();
+  /// Puts all lines so far on the disk.
+  Mark sync();
+
+  long lines() const { return mark_.lines; }
+
+ private:
+  void put(const std::string& line);
+  void flush();
+
+  Eigen::Index rows_;  ///< of the scene; an integrator may know more, which are left out
+  OutputFile file_;
+  std::string waiting_;
+  Mark mark_;
+};
+
+}  // namespace diracstep::command

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <diracstep/command/files/checkpoint_file.hpp>
+#include <diracstep/command/files/trajectory_file.hpp>
+#include <diracstep/command/run_report.hpp>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace diracstep::command {
+
+/// What a run keeps on its way.
+struct Keeping {
+  Momentum momentum = Momentum::projected;
+  long every = 1;                                                  ///< each so many points go to the file
+  TrajectoryFile* file = nullptr;                                  ///< none: only the end is read
+  std::string checkpoint = {};                                     ///< path, or empty
+  long checkpoint_every = 0;                                       ///< steps; 0: every ten seconds
+  std::vector<std::pair<std::string, std::string>> identity = {};  ///< of the run, for the checkpoint
+};
+
+/// Steps from where the integrator stands to step number `steps`, to a failure or to Ctrl-C, and keeps points
+/// and checkpoints on the way.  A checkpoint stands before the point of its step is kept, and what it says of
+/// the trajectory is on the disk before it is.
+void run_to(long steps, Integrator& integrator, const Keeping& keeping, RunResult& result);
+
+/// What makes a run the one it is: everything that its bits depend on.
+std::vector<std::pair<std::string, std::string>> identity(const CatalogueScene& entry,
+                                                          const Integrator& integrator,
+                                                          const Keeping& keeping, bool to_file);
+
+}  // namespace diracstep::command

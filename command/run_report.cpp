@@ -1,0 +1,193 @@
+#include <fmt/format.h>
+
+#include <cmath>
+#include <diracstep/command/run_report.hpp>
+#include <diracstep/reports/report.hpp>
+#include <diracstep/validation/studies/convergence_study.hpp>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+namespace diracstep::command {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+
+Json by_name(const std::vector<std::string>& names, const Vector& values) {
+  Json json = Json::object();
+  for (std::size_t i = 0; i < names.size(); ++i)
+    json[names[i]] = number(values[static_cast<Eigen::Index>(i)]);
+  return json;
+}
+
+Json end_json(const RunResult& result, const Scene& scene) {
+  if (!result.has_end()) return nullptr;
+  return {{"t", number(result.end.time)},
+          {"q", by_name(scene.coordinates, result.end.q)},
+          {"v", by_name(scene.coordinates, result.end.v)},
+          {"p", by_name(scene.coordinates, result.end.p)},
+          {"lambda", by_name(scene.row_names(), result.end.lambda)},
+          {"energy", number(result.end.energy)}};
+}
+
+/// Of a large scene the first few coordinates and rows are shown, and the last one.
+constexpr int max_shown = 24, first_shown = 8;
+
+/// Calls show(k) for those of `count` that are shown, in order, and leave_out(how many) for those between.
+template <class Show, class LeaveOut>
+void for_shown(int count, const Show& show, const LeaveOut& leave_out) {
+  const int first = count <= max_shown ? count : first_shown;
+  for (int k = 0; k < first; ++k) show(k);
+  if (first == count) return;
+  leave_out(count - first - 1);
+  show(count - 1);
+}
+
+std::string end_table(const Sample& end, const Scene& scene) {
+  std::vector<std::vector<std::string>> rows{{"", "q", "v", "p"}};
+  std::string left_out;
+  const auto coordinate = [&](int i) {
+    rows.push_back({scene.coordinates[static_cast<std::size_t>(i)], fmt::format("{:.15g}", end.q[i]),
+                    fmt::format("{:.15g}", end.v[i]), fmt::format("{:.15g}", end.p[i])});
+  };
+  for_shown(scene.dimension(), coordinate, [&](int count) {
+    rows.push_back({"…", "", "", ""});
+    left_out = fmt::format("{} of {} coordinates left out; --json and --out have them all\n", count,
+                           scene.dimension());
+  });
+  std::string text = aligned(rows) + left_out;
+  const auto names = scene.row_names();
+  for_shown(
+      scene.rows(),
+      [&](int r) {
+        text += fmt::format("force of row {}: {:.15g}\n", names[static_cast<std::size_t>(r)], end.lambda[r]);
+      },
+      [&](int count) { text += fmt::format("… {} of {} rows left out\n", count, scene.rows()); });
+  return text;
+}
+
+Json retries_json(const Retries& retries) {
+  return {{"line_searches", retries.line_searches},           {"plain_guesses", retries.plain_guesses},
+          {"previous_solutions", retries.previous_solutions}, {"continuations", retries.continuations},
+          {"other_branches", retries.other_branches},         {"divided_steps", retries.divided_steps}};
+}
+
+std::string retries_text(const Retries& retries) {
+  if (retries.total() == 0) return {};
+  std::string text = "retries:";
+  for (const auto& [count, what] : {std::pair{retries.line_searches, "line searches"},
+                                    {retries.plain_guesses, "plain guesses"},
+                                    {retries.previous_solutions, "previous solutions"},
+                                    {retries.continuations, "solutions followed from small steps"},
+                                    {retries.other_branches, "other solutions replaced"},
+                                    {retries.divided_steps, "divided steps"}})
+    if (count > 0) text += fmt::format("{} {} {}", text.back() == ':' ? "" : ",", count, what);
+  return text + '\n';
+}
+
+std::string search_text(const ErrorControlReport& search) {
+  std::string text = search_table(search);
+  if (search.ok())
+    text += fmt::format("estimated error {:.2e}, observed order {:.1f}, {} solves in all\n", search.estimate,
+                        search.observed_order, search.work.solves);
+  return text + (search.warning.empty() ? "" : "warning: " + search.warning + "\n") + "\n";
+}
+
+Json variable_json(const VariableSteps& steps) {
+  const ControlReport& report = steps.report;
+  return {{"eps", steps.eps},
+          {"control", name(steps.control)},
+          {"smallest_step", number(report.smallest_step)},
+          {"largest_step", report.largest_step},
+          {"rate_ratio", number(report.fastest / report.slowest)},
+          {"resets", report.resets},
+          {"side_steps", report.side_steps},
+          {"accelerations", report.accelerations}};
+}
+
+Json search_json(const ErrorControlReport& search) {
+  Json json{{"adaptive", search.adaptive},
+            {"reason", search.reason},
+            {"step", search.step},
+            {"estimate", number(search.estimate)},
+            {"observed_order", number(search.observed_order)},
+            {"warning", search.warning.empty() ? Json(nullptr) : Json(search.warning)},
+            {"refusal", search.refusal.empty() ? Json(nullptr) : Json(search.refusal)},
+            {"solves", search.work.solves},
+            {"runs", Json::array()}};
+  for (const ErrorControlRun& run : search.runs)
+    json["runs"].push_back({{"step", run.step},
+                            {"steps", run.steps},
+                            {"solves", run.solves},
+                            {"difference", number(run.difference)},
+                            {"estimate", number(run.estimate)},
+                            {"observed_order", number(run.observed_order)},
+                            {"status", run.failure.empty() ? "ok" : run.failure}});
+  return json;
+}
+
+}  // namespace
+
+void compare_with_reference(RunResult& result, const CatalogueScene& entry, const Scene& scene) {
+  if (!result.has_end()) return;
+  const bool known = entry.reference.at && entry.reference.at(result.end.time);
+  ReferenceEnd reference{.kind = {}, .how = {}, .missing = "no reference", .q = {}, .p = {}};
+  if (known) reference = reference_end(entry, result.end.time);
+  judge(result.check, scene, result.end, reference);
+}
+
+std::string run_text(const RunResult& result, const CatalogueScene& entry, const IntegratorOptions& options) {
+  const bool fixed = !result.variable && !(result.search && result.search->adaptive);
+  std::string text = result.search ? search_text(*result.search) : "";
+  text +=
+      fmt::format("{}: {}, order {}, {} {}, momentum {}\n", entry.scene->name, options.method, options.order,
+                  result.work.steps, fixed ? fmt::format("steps of {:g}", options.step) : "variable steps",
+                  name(result.momentum));
+  if (result.variable) text += summary(*result.variable);
+  if (result.has_end()) {
+    text += fmt::format("\nt = {:.15g}\n{}energy: {:.15g}, changed by {:.2e}\n", result.end.time,
+                        end_table(result.end, *entry.scene), result.end.energy, result.check.energy_error);
+    if (std::isfinite(result.check.error_q))
+      text += fmt::format("error against the {} reference: q {:.2e}, p {:.2e}\n", entry.reference.kind,
+                          result.check.error_q, result.check.error_p);
+    if (entry.scene->rows() > 0)
+      text += fmt::format("largest residual of the constraint rows: {:.2e}\n", result.check.constraint);
+  }
+  text +=
+      fmt::format("work: {} solves, {} Newton iterations, {} residuals, {} Jacobians\n", result.work.solves,
+                  result.work.iterations, result.work.residual_evaluations, result.work.jacobian_evaluations);
+  return text + retries_text(result.work.retries);
+}
+
+std::string run_json(const RunResult& result, const CatalogueScene& entry, const IntegratorOptions& options) {
+  const StudyRow& check = result.check;
+  Json json{{"scene", entry.scene->name},
+            {"parameters", Json::object()},
+            {"method", options.method},
+            {"order", options.order},
+            {"momentum", name(result.momentum)},
+            {"step", result.variable || (result.search && result.search->adaptive) ? Json(nullptr)
+                                                                                   : Json(options.step)},
+            {"status", result.failure.empty() ? "ok" : result.failure}};
+  for (const auto& [key, value] : entry.parameters) json["parameters"][key] = number(value);
+  json["doubt"] = result.doubt.empty() ? Json(nullptr) : Json(result.doubt);
+  json["end"] = end_json(result, *entry.scene);
+  json["error_q"] = number(check.error_q);
+  json["error_p"] = number(check.error_p);
+  json["constraint"] = number(check.constraint);
+  json["energy_error"] = number(check.energy_error);
+  json["steps"] = result.work.steps;
+  json["newton_iterations"] = result.work.iterations;
+  json["residual_evaluations"] = result.work.residual_evaluations;
+  json["jacobian_evaluations"] = result.work.jacobian_evaluations;
+  json["retries"] = retries_json(result.work.retries);
+  json["out"] = result.out.empty() ? Json(nullptr) : Json(result.out);
+  json["points"] = result.lines;
+  if (result.variable) json["adaptive"] = variable_json(*result.variable);
+  if (result.search) json["error_control"] = search_json(*result.search);
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + '\n';
+}
+
+}  // namespace diracstep::command

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <diracstep/command/variable_steps.hpp>
+#include <diracstep/validation/studies/study_run.hpp>
+#include <optional>
+#include <string>
+
+namespace diracstep::command {
+
+/// What one run came to.
+struct RunResult {
+  std::string failure;  ///< empty, or why it stopped early
+  Momentum momentum = Momentum::projected;
+  Sample end;  ///< the last point that could be read; empty columns where there is none
+  Work work;
+  std::optional<VariableSteps> variable;     ///< where the steps varied
+  std::optional<ErrorControlReport> search;  ///< where an error was asked for
+  StudyRow check;                            ///< errors against the reference at that time, rows and energy
+  std::string doubt;                         ///< empty, or why the points are not to be believed
+  std::string out;                           ///< the file written, if any
+  long lines = 0;                            ///< points in it
+
+  bool has_end() const { return end.q.size() > 0; }
+};
+
+/// Fills in `check`, the scene being the integrator's; its errors stay NaN where there is no reference at the
+/// end.
+void compare_with_reference(RunResult& result, const CatalogueScene& entry, const Scene& scene);
+
+std::string run_text(const RunResult& result, const CatalogueScene& entry, const IntegratorOptions& options);
+std::string run_json(const RunResult& result, const CatalogueScene& entry, const IntegratorOptions& options);
+
+}  // namespace diracstep::command

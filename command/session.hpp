@@ -1,0 +1,69 @@
+#pragma once
+
+#include <diracstep/core/integrator/integrator.hpp>
+#include <diracstep/core/methods/registry.hpp>
+#include <diracstep/plugins/loaded_plugin.hpp>
+#include <diracstep/scene_format/scene_catalogue.hpp>
+#include <diracstep/solvers/kinsol_solver.hpp>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace CLI {
+class App;
+}
+
+namespace diracstep::command {
+
+/// Exit statuses of the command.
+inline constexpr int done = 0;
+inline constexpr int failed = 1;  ///< a numerical failure, an interrupt, or output that could not be written
+inline constexpr int misused = 2;
+
+/// What the verbs share.
+struct Session {
+  Registry registry = Registry::with_built_ins();
+  KinsolOptions solver_options = {};
+  SolverFactory solvers = kinsol();
+  std::vector<std::string> plugin_files;  ///< as given by --plugin
+  std::vector<Plugin> plugins;            ///< those and the ones on DIRACSTEP_PLUGIN_PATH
+  int exit_status = done;
+};
+
+/// Loads the plugins on DIRACSTEP_PLUGIN_PATH, telling of those that cannot be loaded and going on, and then
+/// the files of the session; throws Misuse where one of these cannot be loaded.
+void load_plugins(Session& session);
+
+/// A scene of a plugin or of the catalogue, or a file; throws Misuse as diracstep::make_scene does.
+CatalogueScene make_scene(const Session& session, const std::string& name, const Parameters& changes = {});
+
+/// Names of the catalogue's scenes and of those of plugins.
+std::vector<std::string> scene_names(const Session& session);
+
+/// What --method, --order and --rule say.
+struct MethodChoice {
+  std::string name = automatic_method;
+  bool given = false;  ///< whether --method was
+  int order = 0;
+  std::optional<std::string> rule = {};  ///< for nonholonomic rows
+};
+void add_method_options(CLI::App& verb, MethodChoice& choice);
+
+/// The options of an integrator with this choice; the rule is looked up by name.
+IntegratorOptions integrator_options(const Session& session, const MethodChoice& choice);
+
+/// Adds --set NAME=VALUE, which may be repeated.
+void add_set_option(CLI::App& verb, std::vector<std::string>& assignments);
+
+/// Adds --solver and --jacobian, which change the session's solvers when the command line is read.
+void add_solver_options(CLI::App& verb, Session& session);
+
+/// A message for a person, on standard error.
+void say(std::string_view message);
+
+/// Text for standard output, and the end of it.  Both throw std::runtime_error where it cannot be written.
+void print(std::string_view text);
+void finish_output();
+
+}  // namespace diracstep::command

@@ -1,0 +1,285 @@
+#include <fmt/format.h>
+
+#include <CLI/App.hpp>
+#include <algorithm>
+#include <cmath>
+#include <diracstep/command/arguments.hpp>
+#include <diracstep/command/interrupt.hpp>
+#include <diracstep/command/progress.hpp>
+#include <diracstep/command/run_control.hpp>
+#include <diracstep/command/verbs/verbs.hpp>
+#include <diracstep/core/adaptive/adaptive_integrator.hpp>
+#include <diracstep/core/adaptive/error_control.hpp>
+#include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/runs/energy_check.hpp>
+#include <diracstep/core/runs/run.hpp>
+#include <memory>
+#include <optional>
+
+namespace diracstep::command {
+
+namespace {
+
+struct Options {
+  std::string scene;
+  MethodChoice method;
+  std::optional<double> step;
+  std::optional<double> end;
+  std::string momentum = "projected";
+  std::string out;
+  long every = 1;
+  int substeps = 1;
+  std::string checkpoint;
+  long checkpoint_every = 0;
+  std::string resume;
+  bool adaptive = false;
+  double eps = 0.2;
+  std::string control = "integrating";
+  std::string at;
+  std::optional<double> error;
+  std::vector<std::string> set;
+  bool json = false;
+};
+
+StepGrid fitted_steps(const CatalogueScene& entry, double end, const std::optional<double>& wanted) {
+  const double start = entry.scene->start.time;
+  const double step = wanted.value_or(std::copysign(entry.natural_step, end - start));
+  const StepGrid grid = fit_steps(start, end, step);
+  if (std::abs(grid.step - step) > 1e-9 * std::abs(step))
+    say(fmt::format("step {:g} adjusted to {:.17g}, so that {} steps end at t = {:g}", step, grid.step,
+                    grid.steps, end));
+  return grid;
+}
+
+void require_sense(const Options& options) {
+  const bool checkpoints = !options.checkpoint.empty() || !options.resume.empty();
+  if (options.every < 1) throw Misuse(fmt::format("--every = {}; 1 or more is needed", options.every));
+  if (!options.at.empty() && !options.adaptive) throw Misuse("--at needs --adaptive");
+  if (options.checkpoint_every < 0)
+    throw Misuse(
+        fmt::format("--checkpoint-every = {}; a number of steps is needed, or 0 for every ten seconds",
+                    options.checkpoint_every));
+  if (options.checkpoint_every > 0 && !checkpoints)
+    throw Misuse("--checkpoint-every without --checkpoint FILE");
+  if (!options.out.empty() && options.out == options.checkpoint)
+    throw Misuse(fmt::format("--out and --checkpoint are both '{}'", options.out));
+  if (checkpoints && options.adaptive)
+    throw Misuse("--checkpoint and --resume do not go with --adaptive: checkpoints cover fixed steps only");
+  if (checkpoints && options.error)
+    throw Misuse("--checkpoint and --resume do not go with --error: name the method and the step instead");
+}
+
+/// Where the file goes on: from the checkpoint, or from its beginning.
+void open_trajectory(std::optional<TrajectoryFile>& file, const Options& options, const Scene& scene,
+                     const std::optional<Checkpoint>& saved) {
+  if (options.out.empty()) return;
+  if (saved)
+    file.emplace(options.out, scene, TrajectoryFile::Mark{saved->points, saved->bytes});
+  else
+    file.emplace(options.out, scene);
+}
+
+void go_on(const Checkpoint& saved, const Options& options, Integrator& integrator) {
+  try {
+    integrator.restore(saved.state);
+  } catch (const Misuse& misuse) {
+    throw Misuse(fmt::format("--resume: '{}': {}", options.resume, misuse.what()));
+  }
+  say(fmt::format("going on from step {}, t = {:g}", integrator.work().steps, integrator.time()));
+}
+
+/// Steps of one size to the end, from the start or from a checkpoint.
+void run_fixed(const Options& options, const CatalogueScene& entry, const Session& session,
+               Integrator& integrator, long steps, std::optional<TrajectoryFile>& file, RunResult& result) {
+  Keeping keeping{.momentum = result.momentum, .every = options.every};
+  keeping.checkpoint = options.checkpoint.empty() ? options.resume : options.checkpoint;
+  keeping.checkpoint_every = options.checkpoint_every;
+  keeping.identity = identity(entry, integrator, keeping, !options.out.empty());
+  keeping.identity.emplace_back("rule", options.method.rule.value_or("the method's own"));
+  keeping.identity.emplace_back("solver", name(session.solver_options.iteration));
+  keeping.identity.emplace_back("Jacobian", name(session.solver_options.jacobian));
+  std::optional<Checkpoint> saved;
+  if (!options.resume.empty()) {
+    saved = read_checkpoint(options.resume);
+    require_same_run(*saved, keeping.identity, options.resume);
+    go_on(*saved, options, integrator);
+  }
+  open_trajectory(file, options, *entry.scene, saved);
+  if (file) keeping.file = &*file;
+  run_to(steps, integrator, keeping, result);
+}
+
+/// Variable steps to the end, or to the last of the times given.
+void run_variable(const Options& options, const CatalogueScene& entry, AdaptiveIntegrator& integrator,
+                  double end, TrajectoryFile* file, RunResult& result) {
+  Progress progress;
+  const double start = entry.scene->start.time;
+  const auto scene = completed(entry.scene);
+  EnergyCheck doubt(*scene);
+  const auto keep = [&](const Sample& sample) {
+    doubt.see(sample);
+    if (file != nullptr) file->write(sample);
+    result.end = sample;
+    progress.show((sample.time - start) / (end - start), fmt::format("t = {:g}", sample.time));
+    return !interrupted();
+  };
+  const std::vector<double> times = options.at.empty() ? std::vector<double>{} : numbers("--at", options.at);
+  const RunReport report = times.empty()
+                               ? diracstep::run(integrator, end, result.momentum, options.every, keep)
+                               : run_at(integrator, times, result.momentum, keep);
+  result.failure = report.last.failure;
+  if (result.failure.empty() && interrupted())
+    result.failure = fmt::format("interrupted at t = {:.17g}", integrator.time());
+  result.work = integrator.work();
+  result.doubt = doubt.text();
+  result.variable =
+      VariableSteps{integrator.adaptive().eps, integrator.adaptive().control, integrator.control()};
+  const std::string told = warning(*result.variable, result.work.steps);
+  if (!told.empty()) say(told);
+}
+
+/// One run with the chosen steps into `result`.
+IntegratorOptions run_once(const Options& options, const CatalogueScene& entry, const Session& session,
+                           IntegratorOptions chosen, double end, RunResult& result) {
+  std::optional<TrajectoryFile> file;
+  if (options.adaptive) {
+    chosen.step = std::copysign(chosen.step, end - entry.scene->start.time);
+    AdaptiveIntegrator integrator(entry.scene, session.registry, session.solvers, chosen,
+                                  {.eps = options.eps, .control = step_control(options.control), .end = end});
+    open_trajectory(file, options, *entry.scene, std::nullopt);
+    run_variable(options, entry, integrator, end, file ? &*file : nullptr, result);
+    chosen = integrator.options();
+  } else {
+    const StepGrid grid = fitted_steps(entry, end, chosen.step);
+    chosen.step = grid.step;
+    Integrator integrator(entry.scene, session.registry, session.solvers, chosen);
+    run_fixed(options, entry, session, integrator, grid.steps, file, result);
+    chosen = integrator.options();
+  }
+  if (file) {
+    file->close();
+    result.out = options.out;
+    result.lines = file->lines();
+    say(fmt::format("{} points written to {}", result.lines, result.out));
+  }
+  return chosen;
+}
+
+/// Finds the steps for --error; what was found is in the options afterwards.
+ErrorControlReport search(Options& options, const CatalogueScene& entry, const Session& session, double end,
+                          IntegratorOptions& chosen) {
+  ErrorControlOptions wanted{.error = *options.error};
+  if (options.method.given) wanted.method = options.method.name;
+  wanted.order = options.method.order;
+  if (options.adaptive) wanted.adaptive = true;
+  if (options.step)
+    wanted.first_step = std::abs(*options.step);
+  else if (entry.scene->lagrangian && entry.scene->lagrangian->structure().y_hessian_zero)
+    wanted.first_step = std::abs(entry.natural_step);
+  wanted.go_on = [] { return !interrupted(); };
+  ErrorControlReport found = solve_to_error(entry.scene, session.registry, session.solvers, end, wanted);
+  chosen.method = found.method;
+  chosen.order = options.method.order;
+  chosen.compensated_sums = found.compensated_sums;
+  options.adaptive = found.adaptive;
+  if (found.adaptive)
+    options.eps = found.step;
+  else
+    chosen.step = found.step;
+  return found;
+}
+
+void report(const RunResult& result, const Options& options, const CatalogueScene& entry,
+            const IntegratorOptions& used, Session& session) {
+  if (options.json)
+    print(run_json(result, entry, used));
+  else if (result.out.empty())
+    print(run_text(result, entry, used));
+  if (!result.doubt.empty()) say(result.doubt);
+  if (result.failure.empty()) return;
+  say(result.failure);
+  session.exit_status = failed;
+}
+
+void run(const Options& given, Session& session) {
+  Options options = given;
+  require_sense(options);
+  const CatalogueScene entry = make_scene(session, options.scene, parameters(options.set));
+  RunResult result;
+  result.momentum = momentum(options.momentum);
+  const double end =
+      options.at.empty() ? options.end.value_or(entry.t_end) : numbers("--at", options.at).back();
+  IntegratorOptions used = integrator_options(session, options.method);
+  used.step = options.step.value_or(std::copysign(entry.natural_step, end - entry.scene->start.time));
+  used.substeps = options.substeps;
+  if (options.error) {
+    result.search = search(options, entry, session, end, used);
+    if (!result.search->warning.empty()) say(result.search->warning);
+  }
+  const bool once_more = result.search && result.search->ok() &&
+                         (!options.out.empty() || result.momentum != Momentum::projected);
+  if (!result.search || once_more) {
+    used = run_once(options, entry, session, used, end, result);
+  } else {
+    result.failure = result.search->refusal;
+    result.end = result.search->end;
+    result.work = result.search->work;
+    result.work.steps = result.search->runs.back().steps;
+    used.order = result.search->order;
+  }
+  compare_with_reference(result, entry, *completed(entry.scene));
+  report(result, options, entry, used, session);
+}
+
+}  // namespace
+
+void add_run(CLI::App& app, Session& session) {
+  CLI::App* verb = app.add_subcommand("run", "One trajectory");
+  add_solver_options(*verb, session);
+  const auto options = std::make_shared<Options>();
+  verb->add_option("SCENE", options->scene, "A scene; see diracstep list scenes")->required();
+  add_method_options(*verb, options->method);
+  verb->add_option("--step", options->step, "Step size; the scene's own without it");
+  verb->add_option("--end", options->end, "End time; the scene's own without it");
+  verb->add_option("--momentum", options->momentum,
+                   "Representative of the momentum: plus, minus or projected")
+      ->capture_default_str();
+  verb->add_option("--out", options->out, "CSV file for the trajectory")->type_name("FILE");
+  verb->add_option("--every", options->every, "Keep each K-th point")->type_name("K")->capture_default_str();
+  verb->add_option("--substeps", options->substeps,
+                   "Take a step that cannot be solved in 2, 4, … up to N smaller ones")
+      ->type_name("N")
+      ->capture_default_str();
+  verb->add_option("--checkpoint", options->checkpoint, "Keep all that is needed to go on in this file")
+      ->type_name("FILE");
+  verb->add_option("--checkpoint-every", options->checkpoint_every,
+                   "Write it at each K-th step; without, every ten seconds and at the end")
+      ->type_name("K");
+  verb->add_option("--resume", options->resume,
+                   "Go on from a checkpoint, with the same bits as if never interrupted")
+      ->type_name("FILE");
+  verb->add_flag("--adaptive", options->adaptive, "Reversible steps of varying size");
+  verb->add_option("--eps", options->eps, "Radians of a step of varying size")->capture_default_str();
+  verb->add_option("--control", options->control,
+                   "How its size is found: integrating, in-step, or irreversible (for comparison)")
+      ->capture_default_str();
+  verb->add_option("--at", options->at, "Times T1,T2,… to show instead of the steps; needs --adaptive");
+  verb->add_option(
+          "--error", options->error,
+          "Relative error at the end; the library chooses method and step,\nand repeats the run until its "
+          "estimate is below")
+      ->type_name("E");
+  add_set_option(*verb, options->set);
+  verb->add_flag("--json", options->json, "One JSON document on standard output");
+  verb->footer(
+      "Examples:\n"
+      "  diracstep run knife_edge --step 0.05 --out knife_edge.csv\n"
+      "  diracstep run kepler_e099 --method type1/gl:4 --adaptive --out comet.csv\n"
+      "  diracstep run pendulum_cartesian --error 1e-8\n"
+      "  diracstep run kepler_e06 --order 8 --end 100 --set e=0.3 --every 10 --out orbit.csv\n"
+      "  diracstep run kepler_e06 --end 1e6 --every 1000 --out k.csv --checkpoint k.checkpoint\n"
+      "  diracstep run kepler_e06 --end 1e6 --every 1000 --out k.csv --resume k.checkpoint");
+  verb->callback([options, &session] { run(*options, session); });
+}
+
+}  // namespace diracstep::command

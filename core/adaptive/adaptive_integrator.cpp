@@ -1,0 +1,308 @@
+#include <algorithm>
+#include <cmath>
+#include <diracstep/core/adaptive/adaptive_integrator.hpp>
+#include <diracstep/core/methods/composition.hpp>
+#include <diracstep/core/numerics/errors.hpp>
+#include <sstream>
+#include <utility>
+
+namespace diracstep {
+
+namespace {
+
+constexpr double lowest_ratio = 0.8, highest_ratio = 1.25;  // of z to ω before the guard acts
+constexpr double size_tolerance = 1e-10;  // relative, of an equation in the step: below it is round-off
+constexpr int max_sizes = 30;            // tried for one step
+constexpr long survey_steps = 120;
+
+std::string text(double value) {
+  std::ostringstream stream;
+  stream << value;
+  return stream.str();
+}
+
+/// The options of the integrator under the control: a step that solves for its size is no composition itself.
+IntegratorOptions inner_options(IntegratorOptions options, const Registry& registry, StepControl control) {
+  const MethodInfo info = registry.method(options.method).info;
+  const bool composed = options.order != 0 && options.order != info.order;
+  if (!info.self_adjoint && !composed)
+    throw Misuse(
+        "method '" + info.name +
+        "' is not self-adjoint, so variable steps would not be reversible; compose it (order 2 or more) "
+        "or use a fixed step");
+  if (control == StepControl::in_step && composed) options.order = info.self_adjoint ? 0 : 2;
+  return options;
+}
+
+/// "auto" replaced by the method it stands for.
+IntegratorOptions with_method(IntegratorOptions options, const Scene& scene) {
+  if (options.method != automatic_method) return options;
+  const DefaultMethod choice =
+      default_method(scene, options.order, options.constraint_rule, large_from(options.dense_limit));
+  options.method = choice.method;
+  options.order = choice.order;
+  return options;
+}
+
+std::vector<double> eps_fractions(const IntegratorOptions& given, int inner_order, StepControl control) {
+  if (control != StepControl::in_step || given.order == 0 || given.order == inner_order) return {1.0};
+  const auto fractions = composition_fractions(given.order);
+  return {fractions.begin(), fractions.end()};
+}
+
+const AdaptiveOptions& checked(const AdaptiveOptions& adaptive) {
+  if (!(adaptive.eps > 0.0) || !std::isfinite(adaptive.eps))
+    throw Misuse("eps = " + text(adaptive.eps) + "; radians of a step, above 0, are needed");
+  return adaptive;
+}
+
+RateMeter make_meter(const Scene& scene, const SolverFactory& solvers, const AdaptiveOptions& adaptive,
+                     double step, long& accelerations) {
+  require_even(adaptive.monitor, scene.start);
+  MonitorScales scales = adaptive.scales;
+  if (!adaptive.monitor.rate && (scales.typical <= 0.0 || scales.lowest <= 0.0)) {
+    const RateSurvey survey =
+        survey_rate(scene, solvers, adaptive.end.value_or(scene.start.time + 100.0 * step), survey_steps);
+    if (scales.typical <= 0.0) scales.typical = survey.scales.typical;
+    if (scales.lowest <= 0.0) scales.lowest = survey.scales.lowest;
+    accelerations = survey.accelerations;
+  }
+  return {scene, solvers, adaptive.monitor, scales};
+}
+
+}  // namespace
+
+AdaptiveIntegrator::AdaptiveIntegrator(const std::shared_ptr<const Scene>& scene, const Registry& registry,
+                                       const SolverFactory& solvers, IntegratorOptions options,
+                                       const AdaptiveOptions& adaptive)
+    : adaptive_(checked(adaptive)),
+      options_(with_method(std::move(options), *completed(scene))),
+      main_(scene, registry, solvers, inner_options(options_, registry, adaptive.control)),
+      side_(std::make_shared<const Scene>(main_.scene()), registry, solvers, options_),
+      meter_(make_meter(main_.scene(), solvers, adaptive_, options_.step, report_.accelerations)),
+      sign_(options_.step > 0.0 ? 1.0 : -1.0) {
+  fractions_ = eps_fractions(options_, main_.options().order, adaptive_.control);
+  options_.order = side_.options().order;
+  reset();
+}
+
+void AdaptiveIntegrator::reset() {
+  const long survey = report_.accelerations;
+  main_.reset();
+  side_.reset();
+  v_ = main_.scene().start.v;
+  started_ = false;
+  report_ = {};
+  report_.accelerations = survey;
+  report_.smallest_step = HUGE_VAL;
+  report_.slowest = HUGE_VAL;
+  next_size_ = options_.step;
+  if (start_control()) return;
+  throw Misuse("scene '" + main_.scene().name + "': " + rate_.failure);
+}
+
+/// v, ω and, if asked for, d(ln ω)/dt at the current node.
+bool AdaptiveIntegrator::measure(bool growth) {
+  const double t = main_.time();
+  const SolveReport report = meter_.motion().velocity(t, main_.position(), main_.momentum(), v_);
+  if (!report.ok())
+    rate_ = {0.0, 0.0, std::string("no velocity for the monitor: ") + describe(report.status)};
+  else
+    rate_ = growth ? meter_.rate_and_growth(t, main_.position(), v_, next_size_)
+                   : meter_.rate(t, main_.position(), v_, next_size_);
+  if (!rate_.ok()) return false;
+  report_.slowest = std::min(report_.slowest, rate_.rate);
+  report_.fastest = std::max(report_.fastest, rate_.rate);
+  return true;
+}
+
+bool AdaptiveIntegrator::start_control() {
+  const bool growth = adaptive_.control == StepControl::integrating;
+  // The width of the differences follows the step, which is not known yet: measure twice.
+  if (!measure(false)) return false;
+  next_size_ = sign_ * adaptive_.eps / rate_.rate;
+  if (!measure(growth)) return false;
+  z_ = rate_.rate + 0.5 * sign_ * adaptive_.eps * rate_.growth;
+  next_size_ = sign_ * adaptive_.eps / (growth && z_ > 0.0 ? z_ : rate_.rate);
+  last_sizes_.clear();
+  for (const double fraction : fractions_)
+    last_sizes_.push_back({fraction * next_size_, fraction * next_size_});
+  return true;
+}
+
+StepReport AdaptiveIntegrator::failed(const std::string& what) const {
+  StepReport report;
+  report.solve.status = SolveStatus::no_convergence;
+  report.step = work().steps;
+  report.time = time();
+  report.failure = "step " + std::to_string(report.step) + " from t = " + text(report.time) + ": " + what;
+  return report;
+}
+
+void AdaptiveIntegrator::note(double size) {
+  report_.smallest_step = std::min(report_.smallest_step, std::abs(size));
+  report_.largest_step = std::max(report_.largest_step, std::abs(size));
+}
+
+StepReport AdaptiveIntegrator::step() {
+  const long before = meter_.motion().accelerations();
+  StepReport report;
+  if (adaptive_.control == StepControl::in_step) {
+    double whole = 0.0;
+    for (std::size_t part = 0; part < fractions_.size(); ++part) {
+      double size = 0.0;
+      Sizes& last = last_sizes_[part];
+      // Sizes change by about the same factor from step to step.
+      const double guess = last.newest * std::clamp(last.newest / last.older, 0.5, 2.0);
+      report = solve_size(sign_ * fractions_[part] * adaptive_.eps, guess, size);
+      if (!report.ok()) return report;
+      last = {size, last.newest};
+      whole += size;
+    }
+    next_size_ = whole;
+    note(whole);
+  } else {
+    report = control_step(next_size_);
+  }
+  report_.accelerations += meter_.motion().accelerations() - before;
+  return report;
+}
+
+StepReport AdaptiveIntegrator::control_step(double size) {
+  StepReport report = main_.step(size);
+  if (!report.ok()) return report;
+  note(size);
+  const bool integrating = adaptive_.control == StepControl::integrating;
+  if (!measure(integrating)) return failed(rate_.failure);
+  if (!integrating) {
+    next_size_ = sign_ * adaptive_.eps / rate_.rate;
+    return report;
+  }
+  const double change = sign_ * adaptive_.eps * rate_.growth;
+  const double ratio = (z_ + 0.5 * change) / rate_.rate;
+  report_.lowest_ratio = std::min(report_.lowest_ratio, ratio);
+  report_.highest_ratio = std::max(report_.highest_ratio, ratio);
+  z_ += change;
+  if (!(ratio >= lowest_ratio && ratio <= highest_ratio) || !(z_ > 0.25 * rate_.rate)) {
+    z_ = std::max(rate_.rate + 0.5 * change, 0.5 * rate_.rate);
+    ++report_.resets;
+  }
+  next_size_ = sign_ * adaptive_.eps / z_;
+  return report;
+}
+
+/// Solves F(h) = h (ω(y_0) + ω(y_1(h)))/2 − eps = 0, by secants after a first correction with the slope
+/// ω(y_1).
+StepReport AdaptiveIntegrator::solve_size(double eps, double guess, double& size) {
+  const double rate0 = rate_.rate;
+  double h = guess, last_h = 0.0, last_f = 0.0;
+  StepReport report;
+  for (int tried = 0; tried < max_sizes; ++tried) {
+    report = tried == 0 ? main_.step(h) : main_.retry(h);
+    if (!report.ok()) return report;
+    if (!measure(false)) return failed(rate_.failure);
+    const double f = 0.5 * h * (rate0 + rate_.rate) - eps;
+    size = h;
+    if (std::abs(f) <= size_tolerance * std::abs(eps)) return report;
+    const bool first = tried == 0 || h == last_h;
+    const double slope = first ? rate_.rate : (f - last_f) / (h - last_h);
+    const double change = slope > 0.0 ? -f / slope : 0.5 * (eps / rate0 - h);
+    last_h = h;
+    last_f = f;
+    h *= 1.0 + std::clamp(change / h, -0.5, 1.0);
+  }
+  return failed("no size of the step satisfies the equation for it; take a smaller eps");
+}
+
+StepReport AdaptiveIntegrator::sample_at(double t, Momentum momentum, Sample& sample) {
+  const double size = t - time();
+  if (!(std::abs(size) <= 2.0 * std::abs(next_size_)))
+    throw Misuse("t = " + text(t) + " is more than two steps from the last node, t = " + text(time()));
+  StepReport report;
+  if (size == 0.0) {
+    report.solve = main_.sample(momentum, sample);
+  } else {
+    side_.restart(time(), main_.position(), main_.momentum(), v_);
+    ++report_.side_steps;
+    report = side_.step(size);
+    if (!report.ok()) return report;
+    report.solve = side_.sample(momentum, sample);
+    sample.time = t;
+  }
+  if (!report.ok())
+    report.failure = "reading the state at t = " + text(t) + ": " + describe(report.solve.status);
+  return report;
+}
+
+std::vector<PlanLine> AdaptiveIntegrator::plan() const {
+  std::vector<PlanLine> lines = main_.plan();
+  const bool integrating = adaptive_.control == StepControl::integrating;
+  lines.push_back({"step size",
+                   integrating                                 ? "integrating controller"
+                   : adaptive_.control == StepControl::in_step ? "equation in the step"
+                                                               : "eps/ω at the node",
+                   "eps = " + text(adaptive_.eps) + " radians"});
+  lines.push_back({"monitor", meter_.generic() ? "generic" : "the user's own",
+                   meter_.generic()
+                       ? "ω0 = " + text(meter_.scales().typical) + ", ω_min = " + text(meter_.scales().lowest)
+                       : "even in v at the start"});
+  return lines;
+}
+
+namespace {
+
+/// Whether `size` leads from t to `end` or beyond, in its own direction; within round-off counts.
+bool reaches(double t, double size, double end) {
+  const double left = end - t;
+  return size > 0.0 ? size >= left * (1.0 - 1e-12) : size <= left * (1.0 - 1e-12);
+}
+
+void require_ahead(double from, double to, double direction) {
+  if (std::isfinite(to) && (to - from) * direction >= 0.0) return;
+  throw Misuse("t = " + text(to) + " does not lie ahead of t = " + text(from));
+}
+
+}  // namespace
+
+RunReport run_at(AdaptiveIntegrator& integrator, std::span<const double> times, Momentum momentum,
+                 const Observer& observer) {
+  double last = integrator.time();
+  for (const double t : times) {
+    require_ahead(last, t, integrator.next_size());
+    last = t;
+  }
+  RunReport report;
+  Sample sample;
+  for (const double t : times) {
+    while (!reaches(integrator.time(), integrator.next_size(), t)) {
+      report.last = integrator.step();
+      if (!report.last.ok()) return report;
+    }
+    report.last = integrator.sample_at(t, momentum, sample);
+    if (!report.last.ok() || (observer && !observer(sample))) return report;
+  }
+  return report;
+}
+
+RunReport run(AdaptiveIntegrator& integrator, double end, Momentum momentum, long every,
+              const Observer& observer) {
+  if (every < 1) throw Misuse("every = " + std::to_string(every) + "; 1 or more is needed");
+  require_ahead(integrator.time(), end, integrator.next_size());
+  RunReport report;
+  Sample sample;
+  for (long k = 0;; ++k) {
+    if (k % every == 0) {
+      report.last = integrator.sample_at(integrator.time(), momentum, sample);
+      if (!report.last.ok() || (observer && !observer(sample))) return report;
+    }
+    if (reaches(integrator.time(), integrator.next_size(), end)) break;
+    report.last = integrator.step();
+    if (!report.last.ok()) return report;
+  }
+  if (integrator.time() == end && integrator.work().steps % every == 0) return report;
+  report.last = integrator.sample_at(end, momentum, sample);
+  if (report.last.ok() && observer) observer(sample);
+  return report;
+}
+
+}  // namespace diracstep

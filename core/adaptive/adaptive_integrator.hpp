@@ -1,0 +1,123 @@
+#pragma once
+
+#include <diracstep/core/adaptive/rate_monitor.hpp>
+#include <diracstep/core/adaptive/rate_survey.hpp>
+#include <diracstep/core/integrator/integrator.hpp>
+#include <diracstep/core/runs/run.hpp>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace diracstep {
+
+/// How the size of the next step is found.
+enum class StepControl {
+  /// Integrating controller with a guard, explicit and reversible (Hairer and Söderlind, SIAM J. Sci. Comput.
+  /// 26,
+  /// 2005):  z ← ω(y_0) + eps/2 G(y_0), then in each step  h = eps/z,  z ← z + eps G(y),  G = d(ln ω)/dt.
+  /// Where (z − eps G/2)/ω(y) leaves [0.8, 1.25], z starts anew from y; that is counted.
+  integrating,
+  /// An equation in the step, h (ω(y_0) + ω(y_1))/2 = eps, solved for h with the step: reversible without any
+  /// state of a controller, so also at coarse eps.  In a composition each part solves its own, with its
+  /// fraction
+  /// of eps.  Takes about four solves where the controller takes one.
+  in_step,
+  /// h = eps/ω(y_0): not reversible, loses the long-run behaviour.  For comparison only.
+  irreversible
+};
+
+/// How the step size varies.
+struct AdaptiveOptions {
+  double eps = 0.2;  ///< radians of a step
+  StepControl control = StepControl::integrating;
+  Monitor monitor = {};            ///< empty: the generic one
+  MonitorScales scales = {};       ///< of the generic monitor; zeros are taken from a survey towards `end`
+  std::optional<double> end = {};  ///< where the motion will end, for the survey; 100 steps of the options'
+                                   ///< size without it
+};
+
+/// What the control did since the start.
+struct ControlReport {
+  long resets = 0;  ///< of the controller, by its guard: more than one in 1000 steps asks for a smaller eps
+  double smallest_step = 0.0, largest_step = 0.0;  ///< without sign
+  double slowest = 0.0, fastest = 0.0;             ///< ω at the nodes
+  double lowest_ratio = 1.0, highest_ratio = 1.0;  ///< (z − eps G/2)/ω before a reset
+  long side_steps = 0;                             ///< for output off the nodes
+  long accelerations = 0;                          ///< linear systems solved for the monitor, survey included
+};
+
+/// Steps of varying size that keep reversibility, and with it the long-run behaviour of a self-adjoint step.
+///
+/// Output at times of the user's choice comes from side steps: a second integrator steps from the last node
+/// to that time, with the full order of the method, and leaves the main sequence untouched bit by bit.
+class AdaptiveIntegrator {
+ public:
+  /// The sign of options.step is the direction; its size matters only for the survey without an end.  Throws
+  /// Misuse as Integrator does, for a method that is not self-adjoint (composed ones are), for eps that is
+  /// not positive, for a monitor that is not positive or not even in v, and for a Lagrangian linear in v.
+  AdaptiveIntegrator(const std::shared_ptr<const Scene>& scene, const Registry& registry,
+                     const SolverFactory& solvers, IntegratorOptions options,
+                     const AdaptiveOptions& adaptive);
+
+  /// Goes back to the scene's start.
+  void reset();
+
+  /// One step of the main sequence.
+  StepReport step();
+
+  /// The size of the next step; a prediction where it is solved for in the step.
+  double next_size() const { return next_size_; }
+  double time() const { return main_.time(); }
+  const Work& work() const { return main_.work(); }  ///< of the main sequence
+  const Work& side_work() const { return side_.work(); }
+  const ControlReport& control() const { return report_; }
+  const Integrator& integrator() const { return main_; }
+  const IntegratorOptions& options() const { return options_; }
+  const AdaptiveOptions& adaptive() const { return adaptive_; }
+
+  /// Reads the current node.
+  SolveReport sample(Momentum momentum, Sample& sample) { return main_.sample(momentum, sample); }
+
+  /// Reads the motion at another time by a side step from the current node.  Full order for times within
+  /// about a step from there; throws Misuse beyond two steps.
+  StepReport sample_at(double t, Momentum momentum, Sample& sample);
+
+  std::vector<PlanLine> plan() const;
+
+ private:
+  StepReport control_step(double size);
+  StepReport solve_size(double eps, double guess, double& size);
+  bool measure(bool growth);
+  bool start_control();
+  StepReport failed(const std::string& what) const;
+  void note(double size);
+
+  ControlReport report_;
+  AdaptiveOptions adaptive_;
+  IntegratorOptions options_;      ///< as given: a composition's order
+  std::vector<double> fractions_;  ///< of eps, where each part of a composition solves for its size
+  Integrator main_, side_;
+  RateMeter meter_;
+  double sign_;
+  Rate rate_;  ///< at the current node
+  Vector v_;   ///< there
+  bool started_ = false;
+  double z_ = 0.0;
+  double next_size_ = 0.0;
+  struct Sizes {
+    double newest, older;
+  };
+  std::vector<Sizes> last_sizes_;  ///< of each part
+};
+
+/// Steps to `end` and shows the start, every `every`-th node and the end itself, which a side step reaches.
+RunReport run(AdaptiveIntegrator& integrator, double end, Momentum momentum, long every,
+              const Observer& observer);
+
+/// Shows the motion at the given times, which must run from the start in the direction of the motion, by side
+/// steps.  Throws Misuse for times out of order.
+RunReport run_at(AdaptiveIntegrator& integrator, std::span<const double> times, Momentum momentum,
+                 const Observer& observer);
+
+}  // namespace diracstep

@@ -1,0 +1,178 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <diracstep/core/adaptive/rate_monitor.hpp>
+#include <diracstep/core/numerics/errors.hpp>
+#include <sstream>
+#include <utility>
+#include <vector>
+
+namespace diracstep {
+
+namespace {
+
+/// Half the width of a difference, in steps.
+constexpr double difference_width = 1e-3;
+
+Vector probing_velocity(const Vector& v) {
+  const double size = v.size() > 0 && v.lpNorm<Eigen::Infinity>() > 0.0 ? v.lpNorm<Eigen::Infinity>() : 1.0;
+  Vector probe = v;
+  for (Eigen::Index i = 0; i < v.size(); ++i)
+    probe[i] += size * (i % 2 == 0 ? 0.7 : -0.4) * (1.0 + 0.1 * static_cast<double>(i));
+  return probe;
+}
+
+}  // namespace
+
+void require_even(const Monitor& monitor, const Start& start) {
+  if (!monitor.rate) return;
+  const double at_start = monitor.rate(start.time, start.q, start.v);
+  std::ostringstream message;
+  message.precision(12);
+  if (!(at_start > 0.0) || !std::isfinite(at_start)) {
+    message << "the monitor is " << at_start << " at the start; it must be positive and finite";
+    throw Misuse(message.str());
+  }
+  for (const Vector& v : {start.v, probing_velocity(start.v)}) {
+    const double there = monitor.rate(start.time, start.q, v), back = monitor.rate(start.time, start.q, -v);
+    if (!std::isfinite(there) || std::abs(there - back) <= 1e-12 * std::abs(there)) continue;
+    message << "the monitor is not even in the velocity: it is " << there << " at v and " << back
+            << " at -v, for v = (" << v.transpose() << "); steps chosen by it are not reversible";
+    throw Misuse(message.str());
+  }
+}
+
+PointwiseMotion::PointwiseMotion(const Scene& scene, const SolverFactory& solvers, int dense_limit)
+    : dense_(scene.dimension() + scene.rows() <= dense_limit),
+      n_(scene.dimension()),
+      velocity_problem_(std::make_unique<VelocityProblem>(scene, dense_)),
+      acceleration_problem_(std::make_unique<AccelerationProblem>(scene, dense_)),
+      factors_(dense_ ? n_ + scene.rows() : 0) {
+  if (scene.lagrangian->structure().y_hessian_zero)
+    throw Misuse(
+        "scene '" + scene.name +
+        "': its Lagrangian is linear in v, so there are no accelerations to choose variable steps by; use a "
+        "fixed step");
+  velocity_solver_ = solvers(*velocity_problem_);
+  const int size = acceleration_problem_->size();
+  if (dense_)
+    matrix_.setZero(size, size);
+  else
+    acceleration_solver_ = solvers(*acceleration_problem_);
+  velocity_unknowns_.setZero(size);
+  unknowns_.setZero(size);
+  right_hand_side_.setZero(size);
+}
+
+SolveReport PointwiseMotion::velocity(double t, ConstVectorRef q, ConstVectorRef p, Vector& v) {
+  velocity_problem_->begin(t, q, p);
+  velocity_solver_->reset();
+  velocity_unknowns_.setZero();
+  velocity_unknowns_.head(n_) = v;
+  SolveReport report = velocity_solver_->solve(velocity_unknowns_);
+  v = velocity_unknowns_.head(n_);
+  return report;
+}
+
+SolveReport PointwiseMotion::acceleration(double t, ConstVectorRef q, ConstVectorRef v, VectorRef a) {
+  ++accelerations_;
+  acceleration_problem_->begin(t, q, v);
+  unknowns_.setZero();
+  SolveReport report;
+  if (dense_) {
+    acceleration_problem_->residual(unknowns_, right_hand_side_);
+    acceleration_problem_->jacobian(unknowns_, matrix_.reshaped());
+    factors_.compute(matrix_);
+    unknowns_ = factors_.solve(-right_hand_side_);
+    if (!unknowns_.allFinite()) report.status = SolveStatus::singular_jacobian;
+  } else {
+    acceleration_solver_->reset();
+    report = acceleration_solver_->solve(unknowns_);
+  }
+  a = unknowns_.head(n_);
+  return report;
+}
+
+RateMeter::RateMeter(const Scene& scene, const SolverFactory& solvers, Monitor monitor, MonitorScales scales)
+    : monitor_(std::move(monitor)), scales_(scales), a_(Columns::Zero(scene.dimension(), 5)) {
+  q_.setZero(scene.dimension());
+  v_ = q_;
+  motion_ = std::make_unique<PointwiseMotion>(scene, solvers);
+}
+
+bool RateMeter::accelerations(double t, ConstVectorRef q, ConstVectorRef v, double delta, int reach) {
+  last_ = motion_->acceleration(t, q, v, a_.col(2));
+  for (const int place : {1, 3, 0, 4}) {
+    if (std::abs(place - 2) > reach || !last_.ok()) continue;
+    const double tau = (place - 2) * delta;
+    q_ = q + tau * v + (0.5 * tau * tau) * a_.col(2);
+    v_ = v + tau * a_.col(2);
+    if (place == 0 || place == 4) {  // ȧ of the inner three: without it d(ln ω)/dt lacks what a owes to v
+      const double factor = tau * tau / (4.0 * delta);
+      v_ += factor * (a_.col(3) - a_.col(1));
+      q_ += (factor * tau / 3.0) * (a_.col(3) - a_.col(1));
+    }
+    last_ = motion_->acceleration(t + tau, q_, v_, a_.col(place));
+  }
+  return last_.ok();
+}
+
+double RateMeter::generic_rate(int place, ConstVectorRef v, double delta) const {
+  const double tau = (place - 2) * delta, typical = scales_.typical * scales_.typical;
+  const double v2 = (v + tau * a_.col(2)).squaredNorm(), a2 = a_.col(place).squaredNorm();
+  const double jerk2 = (a_.col(place + 1) - a_.col(place - 1)).squaredNorm() / (4.0 * delta * delta);
+  const double floor = scales_.lowest * scales_.lowest, below = typical * v2 + a2;
+  return std::sqrt((below > 0.0 ? (typical * a2 + jerk2) / below : 0.0) + floor);
+}
+
+double RateMeter::own_rate(double t, ConstVectorRef q, ConstVectorRef v, double delta, int place) {
+  const double tau = (place - 2) * delta;
+  q_ = q + tau * v;
+  v_ = v;
+  if (monitor_.depends_on_velocity) {
+    q_ += (0.5 * tau * tau) * a_.col(2);
+    v_ += tau * a_.col(2);
+  }
+  return monitor_.rate(t + tau, q_, v_);
+}
+
+Rate RateMeter::failed() const {
+  return {0.0, 0.0, std::string("no acceleration for the monitor: ") + describe(last_.status)};
+}
+
+Rate RateMeter::rate(double t, ConstVectorRef q, ConstVectorRef v, double step) {
+  const double delta = difference_width * std::abs(step);
+  if (generic() && !accelerations(t, q, v, delta, 1)) return failed();
+  Rate rate;
+  rate.rate = generic() ? generic_rate(2, v, delta) : monitor_.rate(t, q, v);
+  if (!(rate.rate > 0.0) || !std::isfinite(rate.rate))
+    rate.failure = "the monitor is " + std::to_string(rate.rate) + "; it must be positive and finite";
+  return rate;
+}
+
+Rate RateMeter::rate_and_growth(double t, ConstVectorRef q, ConstVectorRef v, double step) {
+  const double delta = difference_width * std::abs(step);
+  double before = 0.0, after = 0.0;
+  Rate rate;
+  if (generic()) {
+    if (!accelerations(t, q, v, delta, 2)) return failed();
+    before = generic_rate(1, v, delta);
+    rate.rate = generic_rate(2, v, delta);
+    after = generic_rate(3, v, delta);
+  } else {
+    if (monitor_.depends_on_velocity && !accelerations(t, q, v, delta, 0)) return failed();
+    before = own_rate(t, q, v, delta, 1);
+    rate.rate = monitor_.rate(t, q, v);
+    after = own_rate(t, q, v, delta, 3);
+  }
+  rate.growth = std::log(after / before) / (2.0 * delta);
+  if (!(rate.rate > 0.0) || !std::isfinite(rate.rate) || !std::isfinite(rate.growth)) {
+    std::ostringstream message;
+    message << "the monitor is " << rate.rate << " at t = " << t << ", around it " << before << " and "
+            << after << "; it must be positive and finite";
+    rate.failure = message.str();
+  }
+  return rate;
+}
+
+}  // namespace diracstep

@@ -1,0 +1,100 @@
+#pragma once
+
+#include <Eigen/LU>
+#include <diracstep/core/numerics/nonlinear_solver.hpp>
+#include <diracstep/core/system/saddle_point.hpp>
+#include <diracstep/core/system/scene.hpp>
+#include <functional>
+#include <memory>
+#include <string>
+
+namespace diracstep {
+
+/// How fast a motion changes at (t, q, v): ω > 0, in radians over the unit of time.  Steps are about eps/ω.
+/// It must be even in v, ω(t,q,−v) = ω(t,q,v): else variable steps are not reversible.
+struct Monitor {
+  std::function<double(double t, ConstVectorRef q, ConstVectorRef v)> rate;  ///< empty: the generic monitor
+  bool depends_on_velocity = true;  ///< false saves finding accelerations
+};
+
+/// Throws Misuse where the monitor is not positive and finite at the start, or not even in v there and at
+/// another velocity: names both values.
+void require_even(const Monitor& monitor, const Start& start);
+
+/// Velocities and accelerations of a scene at given points.  Owns what it needs; allocates nothing once made.
+class PointwiseMotion {
+ public:
+  /// Throws Misuse for a Lagrangian that is linear in v, which has no accelerations.
+  PointwiseMotion(const Scene& scene, const SolverFactory& solvers, int dense_limit = 40);
+
+  /// v ∈ Δ_Q(q) of the class of p, from a guess in v.
+  SolveReport velocity(double t, ConstVectorRef q, ConstVectorRef p, Vector& v);
+
+  /// The acceleration a of the continuous system at (q, v).  Linear; dense systems are solved directly.
+  SolveReport acceleration(double t, ConstVectorRef q, ConstVectorRef v, VectorRef a);
+
+  long accelerations() const { return accelerations_; }
+
+ private:
+  bool dense_;
+  Eigen::Index n_;
+  std::unique_ptr<VelocityProblem> velocity_problem_;
+  std::unique_ptr<AccelerationProblem> acceleration_problem_;
+  std::unique_ptr<NonlinearSolver> velocity_solver_, acceleration_solver_;
+  Eigen::PartialPivLU<Eigen::MatrixXd> factors_;
+  Columns matrix_;
+  Vector velocity_unknowns_, unknowns_, right_hand_side_;
+  long accelerations_ = 0;
+};
+
+/// ω and its change along the motion.
+struct Rate {
+  double rate = 0.0;         ///< ω
+  double growth = 0.0;       ///< d(ln ω)/dt
+  std::string failure = {};  ///< empty, or why there is none
+
+  bool ok() const { return failure.empty(); }
+};
+
+/// Scales of the generic monitor.
+struct MonitorScales {
+  double typical = 0.0;  ///< ω0, about |a|/|v|
+  double lowest = 0.0;   ///< ω_min, which bounds the steps where nothing changes
+};
+
+/// ω at points of a motion: a user's monitor, or the generic one
+///
+///   ω² = (ω0² |a|² + |ȧ|²) / (ω0² |v|² + |a|²) + ω_min²,
+///
+/// the relative rate of change of the field (v, a).  ȧ and d(ln ω)/dt are central differences over points of
+/// the Taylor polynomial q + τv + τ²a/2 + τ³ȧ/6, v + τa + τ²ȧ/2; an odd function of τ stays odd under v → −v
+/// whatever its truncation error, and that is all that reversibility needs.
+class RateMeter {
+ public:
+  RateMeter(const Scene& scene, const SolverFactory& solvers, Monitor monitor, MonitorScales scales);
+
+  /// ω alone; `step` sets the width of the differences.
+  Rate rate(double t, ConstVectorRef q, ConstVectorRef v, double step);
+  /// ω and d(ln ω)/dt.
+  Rate rate_and_growth(double t, ConstVectorRef q, ConstVectorRef v, double step);
+
+  PointwiseMotion& motion() { return *motion_; }
+  bool generic() const { return !monitor_.rate; }
+  const MonitorScales& scales() const { return scales_; }
+
+ private:
+  /// Accelerations at τ = −2δ … 2δ, all or the inner three.
+  bool accelerations(double t, ConstVectorRef q, ConstVectorRef v, double delta, int reach);
+  double generic_rate(int place, ConstVectorRef v, double delta) const;
+  double own_rate(double t, ConstVectorRef q, ConstVectorRef v, double delta, int place);
+  Rate failed() const;
+
+  Monitor monitor_;
+  MonitorScales scales_;
+  std::unique_ptr<PointwiseMotion> motion_;
+  SolveReport last_;
+  Columns a_;  ///< accelerations, one column a place
+  Vector q_, v_;
+};
+
+}  // namespace diracstep

@@ -1,0 +1,147 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <diracstep/core/adaptive/rate_survey.hpp>
+#include <diracstep/core/numerics/errors.hpp>
+#include <vector>
+
+namespace diracstep {
+
+namespace {
+
+/// The motion over one step of the survey: mean squares of v and a, and of ȧ from their difference.
+struct Stretch {
+  double duration, v2, a2, jerk2;
+
+  double rate(double typical) const {
+    const double w2 = typical * typical, below = w2 * v2 + a2;
+    return below > 0.0 ? std::sqrt((w2 * a2 + jerk2) / below) : 0.0;
+  }
+};
+
+/// The median over time of a quantity.
+template <class Quantity>
+double median(const std::vector<Stretch>& stretches, Quantity quantity) {
+  std::vector<std::pair<double, double>> values;
+  double all = 0.0, sum = 0.0;
+  for (const Stretch& stretch : stretches) {
+    values.emplace_back(quantity(stretch), stretch.duration);
+    all += stretch.duration;
+  }
+  std::ranges::sort(values);
+  for (const auto& [value, duration] : values)
+    if ((sum += duration) >= 0.5 * all) return value;
+  return 0.0;
+}
+
+double lowest_rate(const std::vector<Stretch>& stretches, double typical) {
+  return 0.3 * median(stretches, [typical](const Stretch& s) { return s.rate(typical); });
+}
+
+/// One pass of the survey, with the steps that ω at a given ω0 asks for.
+class SurveyRun {
+ public:
+  SurveyRun(PointwiseMotion& motion, const Scene& scene, double end, double typical)
+      : motion_(motion),
+        t_(scene.start.time),
+        end_(end),
+        typical_(typical),
+        q_(scene.start.q),
+        v_(scene.start.v) {
+    for (Vector& k : a_) k.setZero(q_.size());
+    next_ = a_[0];
+  }
+
+  /// Empty, or why it stopped.
+  std::string go(long max_steps) {
+    const double span = std::abs(end_ - t_), start = t_;
+    if (!motion_.acceleration(t_, q_, v_, a_[0]).ok()) return "no acceleration at the start";
+    double h = first_step(span);
+    for (long k = 0; k < max_steps && std::abs(end_ - t_) > 1e-12 * span; ++k) {
+      h = std::min(h, std::abs(end_ - t_));
+      if (!runge_kutta(std::copysign(h, end_ - t_))) return "the coarse run failed";
+      const Stretch stretch = stretch_to_next(h);
+      const double rate = stretch.rate(typical_);
+      if (h * rate > 0.9 && h > 1e-12 * span) {  // too coarse: once more, shorter
+        h *= std::max(0.1, 0.3 / (h * rate));
+        continue;
+      }
+      stretches.push_back(stretch);
+      advance(h);
+      covered = std::abs(t_ - start);
+      h *= rate > 0.0 ? std::clamp(0.3 / (h * rate), 0.2, 1.5) : 1.5;
+    }
+    return {};
+  }
+
+  std::vector<Stretch> stretches;
+  double covered = 0.0;
+
+ private:
+  double first_step(double span) const {
+    const double a = a_[0].norm(), v = v_.norm();
+    return std::min(1e-3 * span, v > 0.0 && a > 0.0 ? 0.1 * v / a : span);
+  }
+
+  Stretch stretch_to_next(double h) const {
+    return {h, 0.5 * (v_.squaredNorm() + next_v_.squaredNorm()),
+            0.5 * (a_[0].squaredNorm() + next_.squaredNorm()), (next_ - a_[0]).squaredNorm() / (h * h)};
+  }
+
+  void advance(double h) {
+    t_ += std::copysign(h, end_ - t_);
+    q_.swap(next_q_);
+    v_.swap(next_v_);
+    a_[0].swap(next_);
+  }
+
+  /// From (q, v, a) to (next_q, next_v, next).
+  bool runge_kutta(double h) {
+    const Vector v2 = v_ + 0.5 * h * a_[0];
+    if (!motion_.acceleration(t_ + 0.5 * h, q_ + 0.5 * h * v_, v2, a_[1]).ok()) return false;
+    const Vector v3 = v_ + 0.5 * h * a_[1];
+    if (!motion_.acceleration(t_ + 0.5 * h, q_ + 0.5 * h * v2, v3, a_[2]).ok()) return false;
+    const Vector v4 = v_ + h * a_[2];
+    if (!motion_.acceleration(t_ + h, q_ + h * v3, v4, a_[3]).ok()) return false;
+    next_q_ = q_ + h / 6.0 * (v_ + 2.0 * v2 + 2.0 * v3 + v4);
+    next_v_ = v_ + h / 6.0 * (a_[0] + 2.0 * a_[1] + 2.0 * a_[2] + a_[3]);
+    return motion_.acceleration(t_ + h, next_q_, next_v_, next_).ok() && next_q_.allFinite() &&
+           next_v_.allFinite() && next_.allFinite();
+  }
+
+  PointwiseMotion& motion_;
+  double t_, end_, typical_;
+  Vector q_, v_, next_q_, next_v_, next_;
+  std::array<Vector, 4> a_;  ///< accelerations at the stages
+};
+
+}  // namespace
+
+RateSurvey survey_rate(const Scene& scene, const SolverFactory& solvers, double end, long max_steps) {
+  PointwiseMotion motion(scene, solvers);
+  const double span = std::abs(end - scene.start.time);
+  if (!(span > 0.0) || !std::isfinite(span))
+    throw Misuse("survey of the rate: the end is the start or not finite");
+  RateSurvey survey;
+  // ω0 is not known beforehand; a first pass by |ȧ|/|a| alone, with ω0 = 0, finds it.
+  SurveyRun first(motion, scene, end, 0.0);
+  survey.failure = first.go(max_steps / 2);
+  const double typical =
+      median(first.stretches, [](const Stretch& s) { return s.v2 > 0.0 ? std::sqrt(s.a2 / s.v2) : 0.0; });
+  SurveyRun second(motion, scene, end, typical);
+  survey.failure = second.go(max_steps - max_steps / 2);
+  survey.scales.typical = typical;
+  survey.scales.lowest = std::max(lowest_rate(second.stretches, survey.scales.typical), 0.3 / span);
+  survey.covered = second.covered;
+  survey.accelerations = motion.accelerations();
+  for (const Stretch& stretch : second.stretches) {
+    const double rate = stretch.rate(survey.scales.typical);
+    survey.slowest = survey.slowest == 0.0 ? rate : std::min(survey.slowest, rate);
+    survey.fastest = std::max(survey.fastest, rate);
+  }
+  return survey;
+}
+
+}  // namespace diracstep

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <algorithm>
+#include <diracstep/core/adaptive/rate_monitor.hpp>
+#include <string>
+
+namespace diracstep {
+
+/// What a coarse run over the first part of a motion finds: Runge and Kutta's classical method on the
+/// underlying ordinary differential equation, 0.3 radians a step, constraints left to drift.
+struct RateSurvey {
+  /// For the generic monitor.  ω0: median over time of |a|/|v|; ω_min: 0.3 of the median of ω, or 0.3 radians
+  /// over the whole span where nothing changes at all.
+  MonitorScales scales;
+  double slowest = 0.0;  ///< smallest and largest ω met, ω_min left out
+  double fastest = 0.0;
+  double covered = 0.0;  ///< time surveyed
+  long accelerations = 0;
+  std::string failure = {};  ///< empty, or why the survey ended early
+
+  /// max ω / min ω: above 5 variable steps pay.
+  double ratio() const { return fastest / std::max(slowest, scales.lowest); }
+};
+
+/// Surveys from the start towards `end`, at most `max_steps` steps.  Throws Misuse for an end that is the
+/// start or not finite, and for a Lagrangian linear in v.
+RateSurvey survey_rate(const Scene& scene, const SolverFactory& solvers, double end, long max_steps);
+
+}  // namespace diracstep

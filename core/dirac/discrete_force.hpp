@@ -1,0 +1,39 @@
+#pragma once
+
+#include <diracstep/core/dirac/generating_function.hpp>
+#include <diracstep/core/dirac/step_rule.hpp>
+#include <diracstep/core/system/force.hpp>
+#include <memory>
+
+namespace diracstep {
+
+/// The two impulses of a force over one step, on straight segments with the nodes of `rule`:
+///
+///   F⁻ = h Σ w_i (1−c_i) f(t_i, q_i, (q1−q0)/h),   F⁺ = h Σ w_i c_i f(t_i, q_i, (q1−q0)/h)
+///
+/// F⁻ acts before the graph of S and F⁺ after it, whatever the type of S (discrete Lagrange–d'Alembert
+/// principle, Marsden and West, Acta Numerica 2001, 3.2): order 2 with the midpoint and trapezoidal rules, 1
+/// with the others.
+class DiscreteForce {
+ public:
+  DiscreteForce(std::shared_ptr<const Force> force, StepRule rule);
+
+  const SparsityPattern& pattern() const { return force_->pattern(); }
+
+  void evaluate(Interval step, ConstVectorRef q0, ConstVectorRef q1);
+  const Vector& minus() const { return minus_; }  ///< F⁻ where it was last evaluated
+  const Vector& plus() const { return plus_; }    ///< F⁺
+
+  /// d = ∂F⁻/∂q1 on pattern().
+  void minus_by_end(Interval step, ConstVectorRef q0, ConstVectorRef q1, VectorRef d);
+
+ private:
+  void move_to(const StepNode& node, Interval step, ConstVectorRef q0, ConstVectorRef q1);
+
+  std::shared_ptr<const Force> force_;
+  StepRule rule_;
+  double t_ = 0.0;
+  Vector q_, v_, f_, minus_, plus_, fq_, fv_;
+};
+
+}  // namespace diracstep

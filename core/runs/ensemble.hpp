@@ -1,0 +1,28 @@
+#pragma once
+
+#include <diracstep/core/integrator/integrator.hpp>
+#include <span>
+#include <vector>
+
+namespace diracstep {
+
+/// Where one trajectory of an ensemble ended; `last` says why it stopped early, if it did, and `end` is then
+/// the last point that could be read.
+struct EnsembleMember {
+  StepReport last;
+  Sample end;
+};
+
+/// Takes `steps` steps from each of the starts, which must be consistent, and reads the ends, in the order of
+/// the starts.
+///
+/// Each of `threads` threads (0: one for each processor) has an integrator of its own, made once and reset
+/// for each start, so the results are the same bits for every number of threads.  Throws Misuse as the
+/// integrator does, for an inconsistent start as well; an exception of the scene's own functions ends the
+/// ensemble and passes through.
+std::vector<EnsembleMember> run_ensemble(const std::shared_ptr<const Scene>& scene, const Registry& registry,
+                                         const SolverFactory& solvers, const IntegratorOptions& options,
+                                         std::span<const Start> starts, long steps,
+                                         Momentum momentum = Momentum::projected, int threads = 0);
+
+}  // namespace diracstep

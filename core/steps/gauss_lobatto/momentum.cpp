@@ -1,0 +1,114 @@
+#include <diracstep/core/numerics/combination.hpp>
+#include <diracstep/core/steps/gauss_lobatto/momentum.hpp>
+#include <utility>
+
+namespace diracstep {
+
+StageMomentum::StageMomentum(std::shared_ptr<const Lagrangian> lagrangian, std::shared_ptr<const Force> force,
+                             int stages, bool dense)
+    : lagrangian_(std::move(lagrangian)),
+      force_(std::move(force)),
+      s_(stages),
+      n_(lagrangian_->pattern().rows()),
+      separable_(lagrangian_->structure().separable),
+      same_jacobian_(lagrangian_->structure().quadratic && !force_ && dense) {
+  for (Columns* columns : {&lq_, &lv_}) columns->setZero(n_, s_);
+  const int nonzeros = lagrangian_->pattern().nonzeros();
+  for (Columns* blocks : {&lqq_, &lqv_, &lvv_}) blocks->setZero(nonzeros, s_);
+  if (!separable_) {
+    mirror_ = lagrangian_->pattern().transposed_positions();
+    block_.setZero(nonzeros);
+  }
+  if (!force_) return;
+  f_.setZero(n_);
+  fq_.setZero(force_->pattern().nonzeros(), s_);
+  fv_ = fq_;
+  force_block_.setZero(fq_.rows());
+}
+
+void StageMomentum::plan(BlockPattern& layout) const {
+  for (int i = 0; i < s_; ++i)
+    for (int k = 0; k < s_; ++k) layout.add(lagrangian_->pattern(), n_ * i, n_ * k);
+  if (!force_) return;
+  for (int i = 0; i < s_; ++i)
+    for (int k = 0; k < s_; ++k) layout.add(force_->pattern(), n_ * i, n_ * k);
+}
+
+void StageMomentum::evaluate(const StagePoints& at, ConstVectorRef x) {
+  for (int i = 0; i < s_; ++i) {
+    const auto v = x.segment(n_ * i, n_);
+    lagrangian_->gradient(at.gauss_time(i), at.gauss.col(i), v, lq_.col(i), lv_.col(i));
+    if (!force_) continue;
+    force_->value(at.gauss_time(i), at.gauss.col(i), v, f_);
+    lq_.col(i) += f_;
+  }
+}
+
+bool StageMomentum::second_derivatives(const StagePoints& at, ConstVectorRef x) {
+  const bool taken = !hessians_known_;
+  for (int i = 0; taken && i < s_; ++i) second_derivatives(at, x, i);
+  for (int i = 0; force_ && i < s_; ++i)
+    force_->derivatives(at.gauss_time(i), at.gauss.col(i), x.segment(n_ * i, n_), fq_.col(i), fv_.col(i));
+  hessians_known_ = lagrangian_->structure().quadratic;
+  return taken;
+}
+
+void StageMomentum::second_derivatives(const StagePoints& at, ConstVectorRef x, int stage) {
+  lagrangian_->hessian(at.gauss_time(stage), at.gauss.col(stage), x.segment(n_ * stage, n_), lqq_.col(stage),
+                       lqv_.col(stage), lvv_.col(stage));
+}
+
+/// Of a quadratic L the values are those of the last Jacobian with this step size.
+void StageMomentum::set_jacobian(const StagePoints& at, const BlockPattern& layout, VectorRef& values) {
+  if (same_jacobian_ && jacobian_step_ == at.step.size) {
+    values = jacobian_;
+    return;
+  }
+  values.setZero();
+  for (int i = 0; i < s_; ++i)
+    for (int k = 0; k < s_; ++k) {
+      add_block(at, layout, i, k, values);
+      if (force_) add_force_block(at, layout, i, k, values);
+    }
+  if (!same_jacobian_) return;
+  jacobian_ = values;
+  jacobian_step_ = at.step.size;
+}
+
+void StageMomentum::add_block(const StagePoints& at, const BlockPattern& layout, int i, int k,
+                              VectorRef& values) {
+  const StageWeights& weights = at.weights;
+  const auto size = static_cast<int>(lvv_.rows());
+  double* const block = separable_ ? lqv_.data() : block_.data();  // nobody looks at a ∂²L/∂q∂v of zero
+  combine(size, s_, &weights.stiffness(0, i * s_ + k), lqq_.data(), nullptr, block);
+  if (!separable_)
+    for (int e = 0; e < size; ++e)
+      block[e] += weights.force(k, i) * lqv_(e, k) +
+                  weights.position(k, i) * lqv_(mirror_[static_cast<std::size_t>(e)], i);
+  if (i == k)
+    for (int e = 0; e < size; ++e) block[e] += lvv_(e, i);
+  layout.add_to(values.data(), i * s_ + k, 1.0, block);
+}
+
+void StageMomentum::add_force_block(const StagePoints& at, const BlockPattern& layout, int i, int k,
+                                    VectorRef& values) {
+  const StageWeights& weights = at.weights;
+  combine(static_cast<int>(force_block_.size()), s_, &weights.stiffness(0, i * s_ + k), fq_.data(), nullptr,
+          force_block_.data());
+  force_block_ += weights.force(k, i) * fv_.col(k);
+  layout.add_to(values.data(), s_ * s_ + i * s_ + k, 1.0, force_block_.data());
+}
+
+void StageMomentum::evaluate_start(const StagePoints& at, const Vector& v0) {
+  const double t = at.step.start;
+  const auto q0 = at.lobatto.col(0);
+  lagrangian_->gradient(t, q0, v0, lq_.col(0), lv_.col(0));
+  lagrangian_->hessian(t, q0, v0, lqq_.col(0), lqv_.col(0), lvv_.col(0));
+}
+
+void StageMomentum::reset() {
+  hessians_known_ = false;
+  jacobian_step_ = 0.0;
+}
+
+}  // namespace diracstep

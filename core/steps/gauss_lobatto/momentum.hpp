@@ -1,0 +1,63 @@
+#pragma once
+
+#include <diracstep/core/steps/gauss_lobatto/points.hpp>
+#include <diracstep/core/system/force.hpp>
+#include <diracstep/core/system/phase_function.hpp>
+#include <memory>
+#include <vector>
+
+namespace diracstep {
+
+/// L and the force in the step GL(s): ∂L/∂q + f and ∂L/∂v at the Gauss nodes, and their part of the rows of
+/// the momentum in its Jacobian,
+///
+///   −h² Σ_j â_ij a_jk ∂²L/∂q²_j − h â_ik ∂²L/∂q∂v_k + h a_ik ∂²L/∂v∂q_i + δ_ik ∂²L/∂v²_i
+///
+/// in row i and column k, with the derivatives of f added to those of ∂L/∂q.
+class StageMomentum {
+ public:
+  /// `dense`: whether the values of the whole Jacobian are few enough to be kept.  No force is null.
+  StageMomentum(std::shared_ptr<const Lagrangian> lagrangian, std::shared_ptr<const Force> force, int stages,
+                bool dense);
+
+  /// Adds the blocks of the Jacobian to its layout, as its first ones.
+  void plan(BlockPattern& layout) const;
+
+  /// ∂L/∂q + f and ∂L/∂v at the Gauss points, with the stage velocities in x.
+  void evaluate(const StagePoints& at, ConstVectorRef x);
+  const Columns& forces() const { return lq_; }
+  const Columns& momenta() const { return lv_; }
+
+  /// values = their part of the Jacobian; after second_derivatives() at the same x.
+  void set_jacobian(const StagePoints& at, const BlockPattern& layout, VectorRef& values);
+  /// Those of L and of the force at the Gauss points; false where those of L, a quadratic one, are known.
+  bool second_derivatives(const StagePoints& at, ConstVectorRef x);
+  /// Those of L at one Gauss point alone.
+  void second_derivatives(const StagePoints& at, ConstVectorRef x, int stage);
+  const Columns& curvatures() const { return lqq_; }                         ///< ∂²L/∂q², values
+  const SparsityPattern& pattern() const { return lagrangian_->pattern(); }  ///< of second derivatives
+  auto mass(int stage) const { return lvv_.col(stage); }                     ///< ∂²L/∂v², values
+
+  /// ∂L/∂q and ∂²L/∂q² at the start of the step in place of the first node, to know their size.
+  void evaluate_start(const StagePoints& at, const Vector& v0);
+  /// Forgets what does not change during a run.
+  void reset();
+
+ private:
+  void add_block(const StagePoints& at, const BlockPattern& layout, int i, int k, VectorRef& values);
+  void add_force_block(const StagePoints& at, const BlockPattern& layout, int i, int k, VectorRef& values);
+
+  std::shared_ptr<const Lagrangian> lagrangian_;
+  std::shared_ptr<const Force> force_;
+  int s_, n_;
+  bool separable_;
+  std::vector<int> mirror_;  ///< places of ∂²L/∂v∂q in ∂²L/∂q∂v, where that is not zero
+  Columns lq_, lv_;
+  Columns lqq_, lqv_, lvv_, fq_, fv_;
+  Vector f_, block_, force_block_;
+  Vector jacobian_;  ///< the values of the last one, of a quadratic L without force
+  double jacobian_step_ = 0.0;
+  bool same_jacobian_, hessians_known_ = false;
+};
+
+}  // namespace diracstep

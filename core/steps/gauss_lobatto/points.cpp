@@ -1,0 +1,33 @@
+#include <diracstep/core/steps/gauss_lobatto/points.hpp>
+
+namespace diracstep {
+
+StageWeights::StageWeights(int s) : table(gauss_lobatto_tableau(s)) {
+  impulse = -table.e.leftCols(s).transpose();
+  stiffness.setZero(s, s * s);
+  row_curvature.setZero(s, s * s);
+  scale_to(1.0);
+}
+
+void StageWeights::scale_to(double h) {
+  if (h == step_) return;
+  step_ = h;
+  position = h * table.a.transpose();
+  lobatto = h * table.lobatto_a.transpose();
+  force = -h * table.a_hat.transpose();
+  end_force = h * table.b;
+  const Eigen::Index s = table.c.size();
+  for (Eigen::Index i = 0; i < s; ++i)
+    for (Eigen::Index k = 0; k < s; ++k)
+      for (Eigen::Index j = 0; j < s; ++j) {
+        stiffness(j, i * s + k) = -h * h * table.a_hat(i, j) * table.a(j, k);
+        row_curvature(j, i * s + k) = -h * table.e(i, j) * table.lobatto_a(j, k);
+      }
+}
+
+StagePoints::StagePoints(int stages, int dimension) : weights(stages) {
+  gauss.setZero(dimension, stages);
+  lobatto.setZero(dimension, stages + 1);
+}
+
+}  // namespace diracstep

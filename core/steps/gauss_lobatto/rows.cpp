@@ -1,0 +1,121 @@
+#include <algorithm>
+#include <cmath>
+#include <diracstep/core/numerics/combination.hpp>
+#include <diracstep/core/numerics/scales.hpp>
+#include <diracstep/core/steps/gauss_lobatto/rows.hpp>
+#include <utility>
+
+namespace diracstep {
+
+StageRows::StageRows(std::shared_ptr<const ConstraintRows> rows, int stages, int first, int stride)
+    : rows_(std::move(rows)), s_(stages), n_(rows_->dimension()), first_(first), stride_(stride) {
+  const int nonzeros = rows_->pattern().nonzeros(), curved = curvature_pattern().nonzeros();
+  at_lobatto_.setZero(nonzeros, s_ + 1);
+  at_gauss_.setZero(nonzeros, s_);
+  curvature_.setZero(curved, s_);
+  derivative_.setZero(nonzeros);
+  sum_.setZero(curved);
+  offset_.setZero(rows_->rows());
+}
+
+const SparsityPattern& StageRows::curvature_pattern() const {
+  static const SparsityPattern none;
+  return s_ > 1 ? rows_->curvature_pattern() : none;
+}
+
+void StageRows::plan(BlockPattern& layout) {
+  const SparsityPattern& a = rows_->pattern();
+  for (int i = 0; i < s_; ++i)
+    for (int k = 0; k < s_; ++k) {
+      const int number = layout.add(a, n_ * i, first_ + stride_ * k, true);
+      if (first_layout_ < 0) first_layout_ = number;
+      layout.add(curvature_pattern(), n_ * i, n_ * k);
+      layout.add(a, first_ + stride_ * i, n_ * k);
+    }
+}
+
+void StageRows::evaluate_lobatto(const StagePoints& at, int j) {
+  rows_->coefficients(at.lobatto_time(j), at.lobatto.col(j), at_lobatto_.col(j), offset_);
+}
+
+void StageRows::evaluate_gauss(const StagePoints& at, int j) {
+  rows_->coefficients(at.gauss_time(j), at.gauss.col(j), at_gauss_.col(j), offset_);
+}
+
+void StageRows::add_impulses(const StagePoints& at, ConstVectorRef x, Columns& impulses) {
+  gauss_known_ = false;
+  for (int j = 0; j < s_; ++j) {
+    if (j > 0) evaluate_lobatto(at, j);
+    rows_->pattern().transposed_multiply_add(at_lobatto_.col(j).data(), x.data() + first_ + stride_ * j,
+                                             impulses.col(j).data());
+  }
+}
+
+void StageRows::residual(const StagePoints& at, ConstVectorRef x, VectorRef& f) {
+  const double per_step = 1.0 / at.step.size;
+  for (int j = 0; j < s_; ++j) {
+    auto out = f.segment(first_ + stride_ * j, rows_->rows());
+    if (rows_->holonomic()) {
+      rows_->position(at.lobatto_time(j + 1), at.lobatto.col(j + 1), out);
+      out *= per_step;
+      continue;
+    }
+    evaluate_gauss(at, j);
+    out = offset_;
+    rows_->pattern().multiply_add(at_gauss_.col(j).data(), x.data() + n_ * j, out.data());
+  }
+  gauss_known_ = true;
+}
+
+void StageRows::add_to_jacobian(const StagePoints& at, const BlockPattern& layout, ConstVectorRef x,
+                                VectorRef& values) {
+  for (int j = 1; j < s_; ++j)
+    rows_->annihilator_derivative(at.lobatto_time(j), at.lobatto.col(j),
+                                  x.segment(first_ + stride_ * j, rows_->rows()), curvature_.col(j));
+  for (int i = 0; i < s_; ++i)
+    for (int k = 0; k < s_; ++k) {
+      const int place = first_layout_ + 3 * (i * s_ + k);
+      layout.add_to(values.data(), place, at.weights.impulse(k, i), at_lobatto_.col(k).data());
+      if (s_ == 1) continue;
+      combine(static_cast<int>(sum_.size()), s_ - 1, &at.weights.row_curvature(1, i * s_ + k),
+              curvature_.col(1).data(), nullptr, sum_.data());
+      layout.add_to(values.data(), place + 1, 1.0, sum_.data());
+    }
+  for (int j = 0; j < s_; ++j) add_constraint(at, layout, j, x, values);
+}
+
+void StageRows::add_constraint(const StagePoints& at, const BlockPattern& layout, int j, ConstVectorRef x,
+                               VectorRef& values) {
+  const auto place = [&](int k) { return first_layout_ + 3 * (j * s_ + k) + 2; };
+  if (rows_->holonomic()) {
+    if (j + 1 == s_) evaluate_lobatto(at, s_);  // no impulse enters there
+    for (int k = 0; k < s_; ++k)
+      layout.add_to(values.data(), place(k), at.weights.table.lobatto_a(j + 1, k),
+                    at_lobatto_.col(j + 1).data());
+    return;
+  }
+  if (!gauss_known_) evaluate_gauss(at, j);
+  layout.add_to(values.data(), place(j), 1.0, at_gauss_.col(j).data());
+  rows_->derivative(at.gauss_time(j), at.gauss.col(j), x.segment(n_ * j, n_), 1.0, derivative_);
+  for (int k = 0; k < s_; ++k)
+    layout.add_to(values.data(), place(k), at.weights.position(k, j), derivative_.data());
+}
+
+double StageRows::form_size() const { return largest_entry(at_lobatto_.col(0).data(), at_lobatto_.rows()); }
+
+double StageRows::impulse_size(ConstVectorRef multipliers) const {
+  const auto places = rows_->pattern().row_indices();
+  const double* const a = at_lobatto_.data();
+  double largest = 0.0;
+  for (int j = 0; j < s_; ++j) {
+    const double* const lambda = multipliers.data() + first_ - n_ * s_ + stride_ * j;
+    largest = std::max(largest, largest_product(a, places, lambda));
+  }
+  return largest;
+}
+
+double StageRows::curvature_size() const {
+  return s_ == 1 ? 0.0 : largest_entry(curvature_.data(), curvature_.size());
+}
+
+}  // namespace diracstep

@@ -1,0 +1,62 @@
+#pragma once
+
+#include <diracstep/core/steps/gauss_lobatto/points.hpp>
+#include <diracstep/core/system/constraint_rows.hpp>
+#include <memory>
+#include <vector>
+
+namespace diracstep {
+
+/// One block of constraint rows in the step GL(s): at the nodes of the step, in its residual and in its
+/// Jacobian.  Holonomic rows stand at the Lobatto nodes, φ(Q~_j)/h, nonholonomic ones at the Gauss nodes,
+/// A(Q_j) V_j + b; both let impulses Aᵀλ_j in at the Lobatto nodes before the last.
+class StageRows {
+ public:
+  /// In the system of the step these rows at stage j are number first + j · stride and following, and so are
+  /// their multipliers among the unknowns; the velocities of all stages come before.
+  StageRows(std::shared_ptr<const ConstraintRows> rows, int stages, int first, int stride);
+
+  /// Adds the blocks of the Jacobian to its layout.
+  void plan(BlockPattern& layout);
+
+  /// The rows at the start of the step.
+  void begin(const StagePoints& at) { evaluate_lobatto(at, 0); }
+  /// impulses += A(Q~_j)ᵀ λ_j, column j, with the multipliers in x.
+  void add_impulses(const StagePoints& at, ConstVectorRef x, Columns& impulses);
+  /// Their rows of f.
+  void residual(const StagePoints& at, ConstVectorRef x, VectorRef& f);
+  /// Their rows and columns of the Jacobian, and the curvature ∂(Aᵀλ)/∂q in the rows of the momentum; after
+  /// add_impulses() at the same x.
+  void add_to_jacobian(const StagePoints& at, const BlockPattern& layout, ConstVectorRef x,
+                       VectorRef& values);
+
+  /// A at Lobatto node j, values.
+  auto lobatto(int j) const { return at_lobatto_.col(j); }
+  const ConstraintRows& rows() const { return *rows_; }
+  int first() const { return first_ - n_ * s_; }  ///< among the rows of the scene
+
+  /// Size of A(q0).
+  double form_size() const;
+  /// Size of the impulses of these multipliers, those of all rows of the scene.
+  double impulse_size(ConstVectorRef multipliers) const;
+  /// Size of the curvature when the Jacobian was last taken.
+  double curvature_size() const;
+
+ private:
+  /// Of the curvature; empty for one stage, whose only impulse enters at the start and so has none.
+  const SparsityPattern& curvature_pattern() const;
+  void evaluate_lobatto(const StagePoints& at, int j);
+  void evaluate_gauss(const StagePoints& at, int j);
+  void add_constraint(const StagePoints& at, const BlockPattern& layout, int j, ConstVectorRef x,
+                      VectorRef& values);
+
+  std::shared_ptr<const ConstraintRows> rows_;
+  int s_, n_, first_, stride_;
+  Columns at_lobatto_, at_gauss_;  ///< A at the nodes; at the Gauss nodes nonholonomic rows only
+  Columns curvature_;              ///< ∂(Aᵀλ_j)/∂q at the Lobatto nodes
+  Vector derivative_, offset_, sum_;
+  bool gauss_known_ = false;
+  int first_layout_ = -1;  ///< three for each pair of stages: impulses, curvature, rows
+};
+
+}  // namespace diracstep

@@ -1,0 +1,354 @@
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <diracstep/core/numerics/combination.hpp>
+#include <diracstep/core/numerics/scales.hpp>
+#include <diracstep/core/steps/gauss_lobatto/compensated_sums.hpp>
+#include <diracstep/core/steps/gauss_lobatto/momentum.hpp>
+#include <diracstep/core/steps/gauss_lobatto/points.hpp>
+#include <diracstep/core/steps/gauss_lobatto/rows.hpp>
+#include <diracstep/core/steps/gauss_lobatto/splitting.hpp>
+#include <diracstep/core/steps/gauss_lobatto/step.hpp>
+#include <optional>
+
+namespace diracstep {
+
+namespace {
+
+/// Compensated sums are worth an iteration more: the residual must fall to this part of its usual bound.
+constexpr double last_bit = 0.01;
+
+/// The splitting takes full matrices.
+constexpr int largest_split = 40;
+
+class GaussLobattoStep final : public StepProblem {
+ public:
+  GaussLobattoStep(int s, const Scene& scene, bool dense)
+      : structure_(scene.lagrangian->structure()),
+        s_(s),
+        n_(scene.dimension()),
+        m_(scene.rows()),
+        points_(s, n_),
+        momentum_(scene.lagrangian, scene.force, s, dense) {
+    const GaussLobattoTableau& table = points_.weights.table;
+    const Vector lobatto_c = table.lobatto_c.head(s);
+    next_velocities_ = lagrange_basis(table.c, table.c.array() + 1.0).transpose();
+    next_impulses_ = lagrange_basis(lobatto_c, lobatto_c.array() + 1.0).transpose();
+    impulses_.setZero(n_, s_);
+    int row = n_ * s_;
+    for (const auto& block : scene.constraints) {
+      rows_.emplace_back(block, s_, row, m_);
+      row += block->rows();
+    }
+    const auto constant = [](const auto& block) { return block->constant(); };
+    affine_ = structure_.quadratic && !scene.force && std::ranges::all_of(scene.constraints, constant);
+    last_x_.setZero(size());
+    kept_.multipliers.setZero(m_ * s_);
+    p0_.setZero(n_);
+    const auto holonomic = [](const auto& block) { return block->holonomic(); };
+    const auto kinds = std::ranges::count_if(scene.constraints, holonomic);
+    if (n_ + m_ <= largest_split && (kinds == 0 || kinds == std::ssize(scene.constraints)))
+      splitting_.emplace(table, n_, m_, kinds > 0);
+    plan_jacobian(dense);
+    blocks_.push_back({"momentum", n_ * s_});
+    if (m_ > 0) blocks_.push_back({"constraint", m_ * s_});
+  }
+
+  int size() const override { return s_ * (n_ + m_); }
+  int leading_unknowns() const override { return s_ * n_; }
+
+  bool extrapolate_stages(ConstVectorRef last, VectorRef x) const override {
+    if (s_ == 1) return false;
+    for (int i = 0; i < s_; ++i) {
+      combine(n_, s_, &next_velocities_(0, i), last.data(), nullptr, x.data() + n_ * i);
+      if (m_ > 0)
+        combine(m_, s_, &next_impulses_(0, i), last.data() + n_ * s_, nullptr, x.data() + row_of(i));
+    }
+    return true;
+  }
+
+  bool compensate() override {
+    sums_.emplace(s_, n_);
+    q0_.setZero(n_);
+    return true;
+  }
+
+  void keep() override {
+    if (!kept_.known && curvature_ == 0.0) {  // solved without a Jacobian
+      (void)momentum_.second_derivatives(points_, last_x_);
+      measure_curvature();
+    }
+    kept_.known = true;
+    kept_.force = largest_entry(momentum_.forces().data(), momentum_.forces().size());
+    kept_.curvature = curvature_;
+    kept_.row_curvature = row_curvature_;
+    kept_.multipliers = last_x_.tail(m_ * s_);
+    if (sums_) sums_->keep();
+  }
+  void reset() override {
+    if (sums_) sums_->forget();
+    kept_ = {.multipliers = Vector::Zero(m_ * s_)};
+    mass_known_ = false;
+    momentum_.reset();
+  }
+  void save(Snapshot& to) const override {
+    to.put(kept_.known ? 1.0 : 0.0);
+    for (const double size : {kept_.force, kept_.curvature, kept_.row_curvature, curvature_, row_curvature_})
+      to.put(size);
+    to.put(kept_.multipliers);
+    if (!sums_) return;
+    to.put(q0_);
+    to.put(p0_);
+    sums_->save(to);
+  }
+  void restore(Snapshot& from) override {
+    kept_.known = from.whole_number(1) == 1;
+    for (double* size : {&kept_.force, &kept_.curvature, &kept_.row_curvature, &curvature_, &row_curvature_})
+      *size = from.number();
+    from.read(kept_.multipliers);
+    if (!sums_) return;
+    from.read(q0_);
+    from.read(p0_);
+    sums_->restore(from);
+  }
+  double constant_jacobian_parameter() const override { return affine_ ? step_size() : std::nan(""); }
+
+  bool has_splitting() const override { return splitting_.has_value(); }
+  void solve_splitting(VectorRef f) override {
+    if (!splitting_known_) move_splitting();
+    splitting_->solve(f);
+  }
+  const SparsityPattern& pattern() const override { return pattern_; }
+  std::span<const ResidualBlock> blocks() const override { return blocks_; }
+
+  std::string unknowns() const override {
+    std::string text = "stage velocities (" + std::to_string(s_ * n_) + ")";
+    if (m_ > 0) text += ", multipliers (" + std::to_string(s_ * m_) + ")";
+    return text;
+  }
+
+  void begin(Interval step, const Vector& q0, const Vector& p0) override {
+    points_.step = step;
+    points_.weights.scale_to(step.size);
+    if (sums_) {
+      sums_->begin(q0, p0, q0_, p0_);
+      q0_ = q0;
+    }
+    p0_ = p0;
+    points_.lobatto.col(0) = q0;
+    position_size_ = largest_entry(q0.data(), n_);
+    splitting_known_ = false;
+    force_size_ = kept_.force;
+    curvature_ = kept_.curvature;
+    row_curvature_ = kept_.row_curvature;
+    for (StageRows& rows : rows_) rows.begin(points_);
+    update_scales();
+    evaluated_ = false;
+  }
+
+  void guess(const Vector& v0, VectorRef x) override {
+    for (int i = 0; i < s_; ++i) x.segment(n_ * i, n_) = v0;
+    x.tail(m_ * s_).setZero();
+    if (!kept_.known) sample_start(v0);
+  }
+
+  void residual(ConstVectorRef x, VectorRef f) override {
+    evaluate(x);
+    const Columns& lv = momentum_.momenta();
+    for (int i = 0; i < s_; ++i) {
+      double* const momentum = f.data() + n_ * i;
+      if (sums_) {
+        sums_->momentum_row(i, step_size(), momentum_.momenta().col(i), p0_, momentum_.forces(), impulses_,
+                            f.segment(n_ * i, n_));
+        continue;
+      }
+      for_each_piece(n_, [&](int first, int rows) {
+        for (int k = first; k < first + rows; ++k) momentum[k] = lv(k, i) - p0_[k];
+        add_forces_and_impulses(first, rows, &points_.weights.force(0, i), &points_.weights.impulse(0, i),
+                                momentum, momentum);
+      });
+    }
+    for (StageRows& rows : rows_) rows.residual(points_, x, f);
+  }
+
+  void jacobian(ConstVectorRef x, VectorRef values) override {
+    evaluate(x);
+    if (momentum_.second_derivatives(points_, x)) measure_curvature();
+    momentum_.set_jacobian(points_, layout_, values);
+    row_curvature_ = 0.0;
+    for (StageRows& rows : rows_) {
+      rows.add_to_jacobian(points_, layout_, x, values);
+      row_curvature_ = std::max(row_curvature_, rows.curvature_size());
+    }
+  }
+
+  void finish(ConstVectorRef x, Vector& q1, Vector& p1, Vector& impulse) override {
+    evaluate(x);
+    const StageWeights& weights = points_.weights;
+    if (sums_) {
+      sums_->end(step_size(), q0_, p0_, velocities(x), momentum_.forces(), impulses_, q1, p1);
+    } else {
+      q1.resize(n_);
+      p1.resize(n_);
+      if (m_ > 0) q1 = points_.lobatto.col(s_);
+      for_each_piece(n_, [&](int first, int rows) {
+        if (m_ == 0)  // nothing else looks there
+          combine_piece(first, rows, n_, s_, &weights.lobatto(0, s_), x.data(), points_.lobatto.data(),
+                        q1.data());
+        add_forces_and_impulses(first, rows, weights.end_force.data(), weights.table.lobatto_b.data(),
+                                p0_.data(), p1.data());
+      });
+    }
+    // The impulse at q0 is that part of λ_0 which enters there.
+    impulse = weights.table.lobatto_b[0] * x.segment(n_ * s_, m_);
+  }
+
+ private:
+  double step_size() const { return points_.step.size; }
+  int row_of(int j) const { return n_ * s_ + m_ * j; }
+
+  Eigen::Map<const Columns> velocities(ConstVectorRef x) const { return {x.data(), n_, s_}; }
+
+  /// Everything the residual is made of, at x, unless x is where it was last taken.
+  void evaluate(ConstVectorRef x) {
+    if (evaluated_ &&
+        std::memcmp(x.data(), last_x_.data(), sizeof(double) * static_cast<std::size_t>(size())) == 0)
+      return;
+    evaluated_ = true;
+    move_points(x);
+    momentum_.evaluate(points_, x);
+    if (m_ == 0) return;
+    impulses_.setZero();
+    for (StageRows& rows : rows_) rows.add_impulses(points_, x, impulses_);
+    blocks_[0].scale = std::max(blocks_[0].scale, (sums_ ? last_bit : 1.0) * impulse_scale(x.tail(m_ * s_)));
+  }
+
+  /// to = base + Σ_j force_j ∂L/∂q_j + Σ_j impulse_j Aᵀλ_j in these rows.
+  void add_forces_and_impulses(int first, int rows, const double* force, const double* impulse,
+                               const double* base, double* to) const {
+    combine_piece(first, rows, n_, s_, force, momentum_.forces().data(), base, to);
+    if (m_ > 0) combine_piece(first, rows, n_, s_, impulse, impulses_.data(), to, to);
+  }
+
+  /// q0 + h Σ_k a_ik V_k at the Gauss nodes, and so at those Lobatto nodes that are looked at; x is kept.
+  void move_points(ConstVectorRef x) {
+    const int first_lobatto = m_ > 0 ? 1 : s_ + 1;
+    if (sums_) {
+      last_x_ = x;
+      const ExtendedGaussLobattoTableau& table = sums_->table;
+      for (int i = 0; i < s_; ++i)
+        sums_->position(step_size(), table.a.row(i), q0_, velocities(x), points_.gauss.col(i));
+      for (int j = first_lobatto; j <= s_; ++j)
+        sums_->position(step_size(), table.lobatto_a.row(j), q0_, velocities(x), points_.lobatto.col(j));
+      return;
+    }
+    const StageWeights& weights = points_.weights;
+    const double* const q0 = points_.lobatto.data();
+    for_each_piece(n_, [&](int first, int rows) {
+      for (int i = 0; i < s_; ++i) {
+        std::copy_n(x.data() + n_ * i + first, rows, last_x_.data() + n_ * i + first);
+        combine_piece(first, rows, n_, s_, &weights.position(0, i), x.data(), q0, &points_.gauss(0, i));
+      }
+      for (int j = first_lobatto; j <= s_; ++j)
+        combine_piece(first, rows, n_, s_, &weights.lobatto(0, j), x.data(), q0, &points_.lobatto(0, j));
+    });
+    last_x_.tail(m_ * s_) = x.tail(m_ * s_);
+  }
+
+  void measure_curvature() {
+    curvature_ = largest_entry(momentum_.curvatures().data(), momentum_.curvatures().size());
+  }
+
+  /// The splitting is taken in the middle of the step, at the stages that were evaluated last.
+  void move_splitting() {
+    const int middle = s_ / 2;
+    if (!mass_known_) {
+      momentum_.second_derivatives(points_, last_x_, middle);
+      splitting_->set_mass(momentum_.pattern(), momentum_.mass(middle));
+      mass_known_ = structure_.y_hessian_constant;
+    }
+    for (const StageRows& rows : rows_)
+      splitting_->set_rows(rows.first(), rows.rows().pattern(), rows.lobatto(middle));
+    if (m_ > 0) splitting_->factor_rows();
+    splitting_known_ = true;
+  }
+
+  void plan_jacobian(bool dense) {
+    BlockPattern layout(size(), size());
+    momentum_.plan(layout);
+    for (StageRows& rows : rows_) rows.plan(layout);
+    pattern_ = layout.assemble(dense);
+    layout_ = std::move(layout);
+  }
+
+  /// Size of the impulses of such multipliers, and of what they lose to the round-off of positions.
+  double impulse_scale(ConstVectorRef multipliers) const {
+    double largest = 0.0;
+    for (const StageRows& rows : rows_) largest = std::max(largest, rows.impulse_size(multipliers));
+    return largest + row_curvature_ * position_size_;
+  }
+
+  /// Before the first solve: the derivatives at the start, for the round-off scales.
+  void sample_start(const Vector& v0) {
+    momentum_.evaluate_start(points_, v0);
+    const double before = blocks_[0].scale;  // of impulses nothing is known yet
+    force_size_ = largest_entry(momentum_.forces().data(), n_);
+    curvature_ = largest_entry(momentum_.curvatures().data(), momentum_.curvatures().rows());
+    evaluated_ = false;
+    update_scales();
+    blocks_[0].scale = std::max(blocks_[0].scale, before);
+  }
+
+  /// Terms of the momentum rows are momenta, those of the last step where this one is not solved yet; a
+  /// velocity of size |q|/h loses ε|q|/h to round-off.
+  void update_scales() {
+    const double h = std::abs(step_size()), velocity = position_size_ / h;
+    double momentum = largest_entry(p0_.data(), n_) + h * force_size_ + h * curvature_ * position_size_;
+    if (m_ > 0) momentum += impulse_scale(kept_.multipliers);
+    blocks_[0].scale = usable_scale(momentum);
+    double one_forms = 0.0;
+    for (const StageRows& rows : rows_) one_forms = std::max(one_forms, rows.form_size());
+    if (m_ > 0) blocks_[1].scale = usable_scale(one_forms * velocity);
+    // What an iteration leaves of the residual is no random error: it is a smooth function of the state and
+    // drives the energy one way.  So solve to the last bit.
+    if (sums_)
+      for (ResidualBlock& block : blocks_) block.scale *= last_bit;
+  }
+
+  PhaseStructure structure_;
+  int s_, n_, m_;
+  StagePoints points_;
+  StageMomentum momentum_;
+  Columns next_velocities_, next_impulses_;  ///< stages of the next step from those of this one, by columns
+  std::vector<StageRows> rows_;
+  SparsityPattern pattern_;
+  BlockPattern layout_{0, 0};
+  std::vector<ResidualBlock> blocks_;
+
+  std::optional<CompensatedSums> sums_;
+
+  Vector q0_, p0_;  ///< q0_ for compensated sums alone; it is the first Lobatto point
+  Vector last_x_;
+  Columns impulses_;  ///< A(Q~_j)ᵀ λ_j
+  /// Sizes in the last step kept, by which the next one judges round-off.
+  struct Kept {
+    bool known = false;
+    double force = 0.0, curvature = 0.0, row_curvature = 0.0;
+    Vector multipliers = {};
+  };
+  Kept kept_;
+  double position_size_ = 0.0, row_curvature_ = 0.0;  ///< of q0 and of ∂(Aᵀλ)/∂q
+  double force_size_ = 0.0, curvature_ = 0.0;         ///< of ∂L/∂q and ∂²L/∂q²
+  std::optional<StageSplitting> splitting_;           ///< small scenes with rows of one kind
+  bool splitting_known_ = false, mass_known_ = false;
+  bool affine_ = false;     ///< the residual is affine in the unknowns
+  bool evaluated_ = false;  ///< at last_x_
+};
+
+}  // namespace
+
+std::unique_ptr<StepProblem> gauss_lobatto_step(int s, const Scene& scene, bool dense) {
+  return std::make_unique<GaussLobattoStep>(s, scene, dense);
+}
+
+}  // namespace diracstep

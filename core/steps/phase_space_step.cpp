@@ -1,0 +1,312 @@
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/numerics/scales.hpp>
+#include <diracstep/core/steps/gauss_lobatto/tableau.hpp>
+#include <diracstep/core/steps/phase_space_step.hpp>
+
+namespace diracstep {
+
+namespace {
+
+/// First and second derivatives of L at one point; L_vv vanishes.
+struct Derivatives {
+  explicit Derivatives(const Lagrangian& lagrangian) {
+    for (Vector* column : {&q, &v}) column->setZero(lagrangian.dimension());
+    for (Vector* values : {&qq, &qv, &vv}) values->setZero(lagrangian.pattern().nonzeros());
+  }
+  Vector q, v, qq, qv, vv;
+};
+
+class PhaseSpaceStep final : public StepProblem {
+ public:
+  PhaseSpaceStep(int s, const Scene& scene, bool dense)
+      : lagrangian_(scene.lagrangian),
+        s_(s),
+        n_(scene.dimension()),
+        sign_(s % 2 == 0 ? 1.0 : -1.0),
+        table_(gauss_lobatto_tableau(s)),
+        next_velocities_(lagrange_basis(table_.c, table_.c.array() + 1.0)),
+        mirror_(lagrangian_->pattern().transposed_positions()),
+        zero_(Vector::Zero(n_)),
+        stages_(static_cast<std::size_t>(s), Derivatives(*lagrangian_)),
+        start_(*lagrangian_),
+        start_along_(*lagrangian_),
+        end_(*lagrangian_),
+        end_along_(*lagrangian_) {
+    q_.setZero(n_, s_);
+    for (Vector* column : {&q0_, &p0_, &q1_, &p_start_, &p_end_}) column->setZero(n_);
+    last_x_.setConstant(size(), std::nan(""));
+    dense_ = dense;
+    Columns weights = Columns::Ones(s_ + 1, s_ + 1);
+    weights.topLeftCorner(s_, s_) = table_.a;
+    weights.bottomLeftCorner(1, s_) = table_.b.transpose();
+    weights(s_, s_) = 1.0 + sign_;
+    unmix_ = weights.inverse().transpose();
+    two_form_.setZero(n_, n_);
+    for (Columns* stages : {&split_, &mixed_}) stages->setZero(n_, s_ + 1);
+    BlockPattern layout(size(), size());
+    for (int row = 0; row <= s_; ++row)
+      for (int column = 0; column <= s_; ++column) layout.add(lagrangian_->pattern(), n_ * row, n_ * column);
+    pattern_ = layout.assemble(dense);
+    layout_ = std::move(layout);
+    blocks_ = {{"momentum", n_ * s_}, {"primary constraint", n_}};
+  }
+
+  int size() const override { return n_ * (s_ + 1); }
+  int leading_unknowns() const override { return n_ * s_; }
+  const SparsityPattern& pattern() const override { return pattern_; }
+
+  /// With B = Dθ − Dθᵀ at the middle of the step and the terms of higher order in h left out, the Jacobian is
+  /// [a 1; bᵀ 1+σ] ⊗ B in the unknowns (hV, ν).
+  bool has_splitting() const override { return dense_; }
+  void solve_splitting(VectorRef f) override {
+    if (!two_form_known_) factor_two_form();
+    split_ = f.reshaped(n_, s_ + 1);
+    mixed_ = split_.lazyProduct(unmix_);
+    split_.noalias() = two_form_factors_.permutationP() * mixed_;
+    two_form_factors_.matrixLU().triangularView<Eigen::UnitLower>().solveInPlace(split_);
+    two_form_factors_.matrixLU().triangularView<Eigen::Upper>().solveInPlace(split_);
+    split_.leftCols(s_) /= step_.size;
+    f = split_.reshaped();
+  }
+  std::span<const ResidualBlock> blocks() const override { return blocks_; }
+  std::string unknowns() const override {
+    return "stage velocities (" + std::to_string(n_ * s_) + "), projection (" + std::to_string(n_) + ")";
+  }
+
+  void begin(Interval step, const Vector& q0, const Vector& p0) override {
+    step_ = step;
+    q0_ = q0;
+    p0_ = p0;
+    last_x_[0] = std::nan("");
+    two_form_known_ = false;
+    lagrangian_->hessian(step.start, q0_, zero_, start_.qq, start_.qv, start_.vv);
+    lagrangian_->gradient(step.start, q0_, zero_, start_.q, start_.v);
+    const double size = std::max(max_norm(p0_), max_norm(start_.qv) * max_norm(q0_));
+    blocks_[0].scale = blocks_[1].scale = usable_scale(size + std::abs(step.size) * max_norm(start_.q));
+  }
+
+  void guess(const Vector& v0, VectorRef x) override {
+    for (int i = 0; i < s_; ++i) x.segment(n_ * i, n_) = v0;
+    x.tail(n_).setZero();
+  }
+
+  bool extrapolate_stages(ConstVectorRef last, VectorRef x) const override {
+    x = last;
+    x.head(n_ * s_).setZero();
+    for (int i = 0; i < s_; ++i)
+      for (int k = 0; k < s_; ++k) x.segment(n_ * i, n_) += next_velocities_(i, k) * last.segment(n_ * k, n_);
+    return true;
+  }
+
+  void residual(ConstVectorRef x, VectorRef f) override {
+    evaluate(x);
+    for (int i = 0; i < s_; ++i) {
+      auto row = f.segment(n_ * i, n_);
+      row = stage(i).v - p_start_;
+      for (int j = 0; j < s_; ++j) row -= step_.size * table_.a_hat(i, j) * stage(j).q;
+    }
+    f.tail(n_) = end_.v - p_end_ - sign_ * (end_along_.q - end_.q);
+  }
+
+  void jacobian(ConstVectorRef x, VectorRef values) override {
+    evaluate(x);
+    const auto nu = x.tail(n_);
+    for (int i = 0; i < s_; ++i) {
+      Derivatives& d = stage(i);
+      lagrangian_->hessian(time(i), q_.col(i), x.segment(n_ * i, n_), d.qq, d.qv, d.vv);
+    }
+    lagrangian_->hessian(step_.end(), q1_, zero_, end_.qq, end_.qv, end_.vv);
+    lagrangian_->hessian(step_.end(), q1_, nu, end_along_.qq, end_along_.qv, end_along_.vv);
+    values.setZero();
+    for (int row = 0; row < s_; ++row) {
+      for (int k = 0; k < s_; ++k)
+        set_block(values, row, k, [&](Eigen::Index e) { return stage_by_velocity(row, k, e); });
+      set_block(values, row, s_, [&](Eigen::Index e) { return stage_by_projection(row, e); });
+    }
+    for (int k = 0; k < s_; ++k)
+      set_block(values, s_, k, [&](Eigen::Index e) { return end_by_velocity(k, e); });
+    set_block(values, s_, s_, [&](Eigen::Index e) { return end_by_projection(e); });
+  }
+
+  void finish(ConstVectorRef x, Vector& q1, Vector& p1, Vector& impulse) override {
+    evaluate(x);
+    q1 = q1_;
+    p1 = end_.v;  // θ(q1): equal to the projected p̃1 at a solution
+    impulse.resize(0);
+  }
+
+ private:
+  Derivatives& stage(int i) { return stages_[static_cast<std::size_t>(i)]; }
+  const Derivatives& stage(int i) const { return stages_[static_cast<std::size_t>(i)]; }
+  double time(int i) const { return step_.start + table_.c[i] * step_.size; }
+
+  void factor_two_form() {
+    const int middle = s_ / 2;
+    Derivatives& d = stage(middle);
+    lagrangian_->hessian(time(middle), q_.col(middle), last_x_.segment(n_ * middle, n_), d.qq, d.qv, d.vv);
+    const auto starts = lagrangian_->pattern().column_starts();
+    const auto rows = lagrangian_->pattern().row_indices();
+    Eigen::Index e = 0;
+    for (int j = 0; j < n_; ++j)
+      for (; e < starts[static_cast<std::size_t>(j) + 1]; ++e)
+        two_form_(rows[static_cast<std::size_t>(e)], j) = theta(d, e) - d.qv[e];
+    two_form_factors_.compute(two_form_);
+    two_form_known_ = true;
+  }
+
+  void evaluate(ConstVectorRef x) {
+    if (last_x_ == x) return;
+    last_x_ = x;
+    const double h = step_.size;
+    const auto v = x.head(n_ * s_).reshaped(n_, s_);
+    const auto nu = x.tail(n_);
+    lagrangian_->gradient(step_.start, q0_, nu, start_along_.q, start_along_.v);
+    p_start_ = p0_ + start_along_.q - start_.q;  // Dθ(q0)ᵀν, since L is linear in v
+    p_end_ = p_start_;
+    q1_ = q0_ + (1.0 + sign_) * nu;
+    for (int i = 0; i < s_; ++i) {
+      q_.col(i) = q0_ + nu;
+      for (int k = 0; k < s_; ++k) q_.col(i) += h * table_.a(i, k) * v.col(k);
+      lagrangian_->gradient(time(i), q_.col(i), v.col(i), stage(i).q, stage(i).v);
+      p_end_ += h * table_.b[i] * stage(i).q;
+      q1_ += h * table_.b[i] * v.col(i);
+    }
+    lagrangian_->gradient(step_.end(), q1_, zero_, end_.q, end_.v);
+    lagrangian_->gradient(step_.end(), q1_, nu, end_along_.q, end_along_.v);
+  }
+
+  template <class Entry>
+  void set_block(VectorRef values, int row, int column, Entry entry) const {
+    const auto& places = layout_.positions(row * (s_ + 1) + column);
+    for (std::size_t e = 0; e < places.size(); ++e) values[places[e]] += entry(static_cast<Eigen::Index>(e));
+  }
+
+  // Value e of the blocks; `theta` is Dθ = L_vq, the transpose of L_qv.
+  double theta(const Derivatives& d, Eigen::Index e) const {
+    return d.qv[mirror_[static_cast<std::size_t>(e)]];
+  }
+  double stage_by_velocity(int i, int k, Eigen::Index e) const {
+    const double h = step_.size;
+    double sum = h * table_.a(i, k) * theta(stage(i), e) - h * table_.a_hat(i, k) * stage(k).qv[e];
+    for (int j = 0; j < s_; ++j) sum -= h * h * table_.a_hat(i, j) * table_.a(j, k) * stage(j).qq[e];
+    return sum;
+  }
+  double stage_by_projection(int i, Eigen::Index e) const {
+    double sum = theta(stage(i), e) - start_.qv[e];
+    for (int j = 0; j < s_; ++j) sum -= step_.size * table_.a_hat(i, j) * stage(j).qq[e];
+    return sum;
+  }
+  /// ∂(θ(q1) − σ Dθ(q1)ᵀν)/∂q1.
+  double end_by_position(Eigen::Index e) const {
+    return theta(end_, e) - sign_ * (end_along_.qq[e] - end_.qq[e]);
+  }
+  double end_by_velocity(int k, Eigen::Index e) const {
+    const double h = step_.size;
+    double sum = h * table_.b[k] * (end_by_position(e) - stage(k).qv[e]);
+    for (int j = 0; j < s_; ++j) sum -= h * h * table_.b[j] * table_.a(j, k) * stage(j).qq[e];
+    return sum;
+  }
+  double end_by_projection(Eigen::Index e) const {
+    double sum = (1.0 + sign_) * end_by_position(e) - start_.qv[e] - sign_ * end_.qv[e];
+    for (int j = 0; j < s_; ++j) sum -= step_.size * table_.b[j] * stage(j).qq[e];
+    return sum;
+  }
+
+  std::shared_ptr<const Lagrangian> lagrangian_;
+  int s_, n_;
+  double sign_;
+  GaussLobattoTableau table_;
+  Columns next_velocities_;
+  std::vector<int> mirror_;
+  SparsityPattern pattern_;
+  BlockPattern layout_{0, 0};
+  std::vector<ResidualBlock> blocks_;
+
+  Interval step_{0.0, 1.0};
+  Vector zero_;
+  Vector q0_, p0_, q1_, p_start_, p_end_, last_x_;
+  Columns q_;
+  std::vector<Derivatives> stages_;
+  Derivatives start_, start_along_;  ///< at q0 with v = 0 and with v = ν
+  Derivatives end_, end_along_;      ///< at q1, likewise
+  Columns unmix_, two_form_, split_, mixed_;
+  Eigen::PartialPivLU<Columns> two_form_factors_;
+  bool dense_ = false, two_form_known_ = false;
+};
+
+constexpr int max_coordinates_to_test = 1000;  // the test takes full matrices
+
+/// Throws Misuse where dθ has no full rank at the start: then the equations leave some velocities open, and
+/// the Lagrangian is not degenerate but wrong, or needs rows.
+void require_regular_two_form(const Scene& scene) {
+  const Lagrangian& l = *scene.lagrangian;
+  const int n = scene.dimension();
+  if (n > max_coordinates_to_test || scene.start.q.size() != n) return;
+  Derivatives at_start(l);
+  l.hessian(scene.start.time, scene.start.q, Vector::Zero(n), at_start.qq, at_start.qv, at_start.vv);
+  const Columns transposed = l.pattern().full(at_start.qv);  // Dθᵀ
+  if (!transposed.allFinite()) return;                       // the step says so itself
+  const Eigen::FullPivLU<Columns> two_form(transposed - transposed.transpose());
+  if (two_form.isInvertible()) return;
+  const Columns kernel = two_form.kernel();
+  std::string open;
+  for (int i = 0; i < n; ++i)
+    if (kernel.row(i).lpNorm<Eigen::Infinity>() > 1e-8)
+      open += " '" + scene.coordinates[static_cast<std::size_t>(i)] + "'";
+  throw Misuse("scene '" + scene.name +
+               "': its Lagrangian θ(q)·v − H(q) is linear in v, and the two-form dθ has rank " +
+               std::to_string(two_form.rank()) + " of " + std::to_string(n) +
+               " at the start, so nothing determines the velocities of" + open +
+               "; a phase-space Lagrangian pairs every coordinate with another one" +
+               (n % 2 == 1 ? ", which an odd number of them cannot be" : ""));
+}
+
+}  // namespace
+
+std::unique_ptr<StepProblem> phase_space_step(int s, const Scene& scene, bool dense) {
+  const std::string prefix = "scene '" + scene.name + "': ";
+  if (!scene.lagrangian->structure().phase_space())
+    throw Misuse(prefix + "its Lagrangian is not linear in v");
+  if (scene.rows() > 0 || scene.force)
+    throw Misuse(prefix + "rows and forces on a Lagrangian that is linear in v are not supported");
+  require_regular_two_form(scene);
+  return std::make_unique<PhaseSpaceStep>(s, scene, dense);
+}
+
+PhaseSpaceVelocityProblem::PhaseSpaceVelocityProblem(const Scene& scene, bool dense)
+    : lagrangian_(scene.lagrangian),
+      mirror_(lagrangian_->pattern().transposed_positions()),
+      layout_(lagrangian_->dimension(), lagrangian_->dimension()),
+      blocks_{{"two-form", lagrangian_->dimension()}} {
+  layout_.add(lagrangian_->pattern(), 0, 0);
+  pattern_ = layout_.assemble(dense);
+  for (Vector* column : {&q_, &lq_, &lv_}) column->setZero(lagrangian_->dimension());
+  for (Vector* values : {&lqq_, &lqv_, &lvv_}) values->setZero(lagrangian_->pattern().nonzeros());
+}
+
+void PhaseSpaceVelocityProblem::begin(double t, ConstVectorRef q) {
+  t_ = t;
+  q_ = q;
+  const Vector zero = Vector::Zero(q.size());
+  lagrangian_->hessian(t, q, zero, lqq_, lqv_, lvv_);
+  lagrangian_->gradient(t, q, zero, lq_, lv_);
+  blocks_[0].scale = usable_scale(max_norm(lq_));
+}
+
+void PhaseSpaceVelocityProblem::residual(ConstVectorRef v, VectorRef f) {
+  lagrangian_->gradient(t_, q_, v, lq_, lv_);
+  f = lq_;
+  lagrangian_->pattern().transposed_multiply_add(lqv_.data(), v.data(), f.data(), -1.0);
+}
+
+void PhaseSpaceVelocityProblem::jacobian(ConstVectorRef, VectorRef values) {
+  values.setZero();
+  const auto& places = layout_.positions(0);
+  for (std::size_t e = 0; e < places.size(); ++e)
+    values[places[e]] = lqv_[static_cast<Eigen::Index>(e)] - lqv_[mirror_[e]];
+}
+
+}  // namespace diracstep

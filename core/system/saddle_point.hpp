@@ -1,0 +1,76 @@
+#pragma once
+
+#include <diracstep/core/numerics/nonlinear_solver.hpp>
+#include <diracstep/core/system/constraint_distribution.hpp>
+#include <diracstep/core/system/scene.hpp>
+#include <vector>
+
+namespace diracstep {
+
+/// The two systems at one configuration whose Jacobian is the saddle-point matrix
+///
+///     [ ∂²L/∂v²  −Aᵀ ]
+///     [    A       0  ]
+///
+/// They turn a momentum into a velocity of the distribution, and a velocity into an acceleration and the
+/// forces of the constraint.  Both are regular where ∂²L/∂v² is so on Δ_Q and the rows are independent.
+class SaddlePointProblem : public NonlinearProblem {
+ public:
+  SaddlePointProblem(const Scene& scene, bool dense);
+
+  int size() const final { return n_ + m_; }
+  const SparsityPattern& pattern() const final { return pattern_; }
+  std::span<const ResidualBlock> blocks() const final { return blocks_; }
+
+ protected:
+  void move_to(double t, ConstVectorRef q);
+  /// The saddle-point matrix with ∂²L/∂v² as it stands in lvv_.
+  void assemble(VectorRef& values) const;
+  void set_scales(double momentum, double velocity);
+  /// The scales cover the terms at x as well: ∂²L/∂v² or ∂L/∂v of size `momentum`, and A times both parts of
+  /// x.
+  void raise_scales(double momentum, ConstVectorRef x);
+
+  const Scene& scene_;
+  int n_;
+  int m_;
+  double t_ = 0.0;
+  Vector q_;
+  ConstraintsAtPoint rows_;
+  Vector lq_, lv_, lqq_, lqv_, lvv_;
+
+ private:
+  SparsityPattern pattern_;
+  BlockPattern layout_;
+  std::vector<ResidualBlock> blocks_;
+};
+
+/// Unknowns (v, μ):   ∂L/∂v(q,v) − A(q)ᵀμ = p,   A(q) v + b(q) = 0.
+/// Its solution projects the momentum class [p] to the representative ∂L/∂v(q,v) with v ∈ Δ_Q(q).
+class VelocityProblem final : public SaddlePointProblem {
+ public:
+  using SaddlePointProblem::SaddlePointProblem;
+  void begin(double t, ConstVectorRef q, ConstVectorRef p);
+  void residual(ConstVectorRef x, VectorRef f) override;
+  void jacobian(ConstVectorRef x, VectorRef values) override;
+
+ private:
+  Vector p_;
+  bool mass_known_ = false;  ///< ∂²L/∂v² is constant and was taken
+};
+
+/// Unknowns (a, Λ), linear:   d/dt(∂L/∂v) − ∂L/∂q − f = A(q)ᵀΛ,   d/dt(A(q) v + b(q)) = 0,   a = dv/dt.
+/// Λ are the forces of the constraint rows: Aᵀ Λ is a generalised force.
+class AccelerationProblem final : public SaddlePointProblem {
+ public:
+  using SaddlePointProblem::SaddlePointProblem;
+  void begin(double t, ConstVectorRef q, ConstVectorRef v);
+  void residual(ConstVectorRef x, VectorRef f) override;
+  void jacobian(ConstVectorRef x, VectorRef values) override;
+
+ private:
+  Vector v_, known_force_, known_rate_, row_derivative_;
+  bool hessian_known_ = false;  ///< that of a quadratic L, taken once
+};
+
+}  // namespace diracstep

@@ -1,0 +1,128 @@
+#include <cmath>
+#include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/system/legendre_transform.hpp>
+#include <diracstep/core/system/scene.hpp>
+#include <sstream>
+
+namespace diracstep {
+
+namespace {
+
+constexpr double start_tolerance = 1e-10;
+
+void require_finite(const Scene& scene, const char* what, const Vector& column) {
+  for (int i = 0; i < column.size(); ++i)
+    if (!std::isfinite(column[i])) {
+      std::ostringstream message;
+      message << "scene '" << scene.name << "': the start has " << what << "_"
+              << scene.coordinates[static_cast<std::size_t>(i)] << " = " << column[i]
+              << "; a finite number is needed";
+      throw Misuse(message.str());
+    }
+}
+
+[[noreturn]] void throw_off_row(const Scene& scene, const ConstraintRows& block, int row, const char* what,
+                                double residual, double terms) {
+  std::ostringstream message;
+  message << "scene '" << scene.name << "': the start violates row '"
+          << block.names()[static_cast<std::size_t>(row)] << "': " << what << " = " << residual
+          << ", allowed " << start_tolerance * terms;
+  throw Misuse(message.str());
+}
+
+}  // namespace
+
+std::vector<std::string> Scene::row_names() const {
+  std::vector<std::string> names;
+  for (const auto& block : constraints)
+    names.insert(names.end(), block->names().begin(), block->names().end());
+  return names;
+}
+
+double Scene::energy(double t, ConstVectorRef q, ConstVectorRef v) const {
+  Vector lq(q.size()), lv(q.size());
+  lagrangian->gradient(t, q, v, lq, lv);
+  return v.dot(lv) - lagrangian->value(t, q, v);
+}
+
+void require_well_formed(const Scene& scene) {
+  const std::string prefix = "scene '" + scene.name + "': ";
+  if (scene.dimension() == 0) throw Misuse(prefix + "it has no coordinates");
+  if (!scene.lagrangian && !scene.hamiltonian)
+    throw Misuse(prefix + "it has neither a Lagrangian nor a Hamiltonian");
+  if (scene.lagrangian)
+    require_size(prefix + "the Lagrangian", scene.lagrangian->dimension(), scene.dimension());
+  if (scene.hamiltonian)
+    require_size(prefix + "the Hamiltonian", scene.hamiltonian->dimension(), scene.dimension());
+  if (scene.force) require_size(prefix + "the force", scene.force->dimension(), scene.dimension());
+  for (const auto& block : scene.constraints) {
+    if (!block) throw Misuse(prefix + "scene.constraints holds a null pointer");
+    require_size(prefix + "a constraint row", block->dimension(), scene.dimension());
+  }
+}
+
+std::shared_ptr<const Scene> completed(std::shared_ptr<const Scene> scene) {
+  if (!scene) throw Misuse("no scene was given");
+  require_well_formed(*scene);
+  const Start& start = scene->start;
+  if (scene->lagrangian && start.v.size() == 0 && scene->lagrangian->structure().y_hessian_zero) {
+    auto with_velocity = std::make_shared<Scene>(*scene);
+    with_velocity->start.v = Vector::Zero(scene->dimension());  // the motion has but one velocity at each q
+    return with_velocity;
+  }
+  const bool from_momentum = start.v.size() == 0 && start.p.size() > 0;
+  if (scene->lagrangian && !from_momentum) return scene;
+  const std::string prefix = "scene '" + scene->name + "': ";
+  require_size(prefix + "the start q", start.q.size(), scene->dimension());
+  auto complete = std::make_shared<Scene>(*scene);
+  if (from_momentum) {
+    require_size(prefix + "the start p", start.p.size(), scene->dimension());
+    Vector hq(start.q.size());
+    complete->start.v.setZero(start.q.size());  // where the Lagrangian is tested for a Hamiltonian
+    hamiltonian_of(*complete)->gradient(start.time, start.q, start.p, hq, complete->start.v);
+  }
+  if (!scene->lagrangian) {
+    const Vector& p = from_momentum ? start.p : start.v;  // regularity is tested there
+    require_size(prefix + "the start v", p.size(), scene->dimension());
+    complete->lagrangian = lagrangian_from(scene->hamiltonian, start.time, start.q, p);
+  }
+  return complete;
+}
+
+std::shared_ptr<const Hamiltonian> hamiltonian_of(const Scene& scene) {
+  if (scene.hamiltonian) return scene.hamiltonian;
+  return hamiltonian_from(scene.lagrangian, scene.start.time, scene.start.q, scene.start.v);
+}
+
+void require_consistent(const Scene& scene, const Start& start) {
+  const std::string prefix = "scene '" + scene.name + "': ";
+  require_size(prefix + "the start q", start.q.size(), scene.dimension());
+  require_size(prefix + "the start v", start.v.size(), scene.dimension());
+  require_finite(scene, "q", start.q);
+  require_finite(scene, "v", start.v);
+  if (!std::isfinite(start.time)) throw Misuse(prefix + "the start time is not finite");
+  for (const auto& block : scene.constraints) {
+    const int m = block->rows();
+    Vector a(block->pattern().nonzeros()), b(m), residual(m), terms(m), phi(m);
+    block->coefficients(start.time, start.q, a, b);
+    if (block->holonomic()) {
+      block->position(start.time, start.q, phi);
+      terms.setOnes();
+      block->pattern().multiply_add(a.cwiseAbs().eval().data(), start.q.cwiseAbs().eval().data(),
+                                    terms.data());
+      for (int r = 0; r < m; ++r)
+        if (!(std::abs(phi[r]) <= start_tolerance * terms[r]))
+          throw_off_row(scene, *block, r, "φ(q)", phi[r], terms[r]);
+    }
+    residual = b;
+    block->pattern().multiply_add(a.data(), start.v.data(), residual.data());
+    terms = b.cwiseAbs() + Vector::Ones(m);
+    block->pattern().multiply_add(a.cwiseAbs().eval().data(), start.v.cwiseAbs().eval().data(), terms.data());
+    for (int r = 0; r < m; ++r)
+      if (!(std::abs(residual[r]) <= start_tolerance * terms[r]))
+        throw_off_row(scene, *block, r, "the velocity is off the distribution, A v + b", residual[r],
+                      terms[r]);
+  }
+}
+
+}  // namespace diracstep

@@ -1,0 +1,59 @@
+#pragma once
+
+#include <diracstep/core/system/constraint_rows.hpp>
+#include <diracstep/core/system/force.hpp>
+#include <diracstep/core/system/phase_function.hpp>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace diracstep {
+
+/// Where a motion starts: a configuration, and a velocity in the distribution or a momentum whose velocity
+/// ∂H/∂p lies in it, with the scene's Hamiltonian or that of a regular Lagrangian.
+struct Start {
+  double time = 0.0;
+  Vector q;
+  Vector v;
+  Vector p = {};  ///< used where v is empty
+};
+
+/// A continuous system: (L, Δ_Q) or (H, Δ_Q), or both, and a start.
+///
+///   q̇ = v ∈ Δ_Q(q),   p = ∂L/∂v,   ṗ − ∂L/∂q − f ∈ Δ°_Q(q)      Leok and Ohsawa (4.7)
+///   q̇ = ∂H/∂p ∈ Δ_Q(q),            ṗ + ∂H/∂q − f ∈ Δ°_Q(q)      Leok and Ohsawa (4.11)
+///
+/// with an external force f beyond the paper.
+struct Scene {
+  std::string name;
+  std::vector<std::string> coordinates;
+  std::shared_ptr<const Lagrangian> lagrangian;
+  std::shared_ptr<const Hamiltonian> hamiltonian;
+  ConstraintBlocks constraints;
+  std::shared_ptr<const Force> force;  ///< null where there is none
+  Start start;
+
+  int dimension() const { return static_cast<int>(coordinates.size()); }
+  int rows() const { return row_count(constraints); }
+  std::vector<std::string> row_names() const;
+
+  /// v·∂L/∂v − L.
+  double energy(double t, ConstVectorRef q, ConstVectorRef v) const;
+};
+
+/// Throws Misuse where sizes disagree or a part is missing.
+void require_well_formed(const Scene& scene);
+
+/// The scene itself if it has a Lagrangian and a starting velocity; else a copy with both derived from its
+/// Hamiltonian.  Throws Misuse where it is not well formed or the Hamiltonian is degenerate.
+std::shared_ptr<const Scene> completed(std::shared_ptr<const Scene> scene);
+
+/// The scene's Hamiltonian, or the one derived from its Lagrangian.  Throws Misuse where that is degenerate.
+std::shared_ptr<const Hamiltonian> hamiltonian_of(const Scene& scene);
+
+/// Throws Misuse where the start is of the wrong size, is not finite, violates φ(q) = 0, or has a velocity
+/// off the distribution; names the coordinate or the row, and the amount.  A row counts as violated when its
+/// residual exceeds 1e-10 of the terms that cancel in it.
+void require_consistent(const Scene& scene, const Start& start);
+
+}  // namespace diracstep

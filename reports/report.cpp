@@ -1,0 +1,292 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <diracstep/reports/build_facts.hpp>
+#include <diracstep/reports/report.hpp>
+#include <iterator>
+#include <nlohmann/json.hpp>
+
+namespace diracstep {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+using Cells = std::vector<std::string>;
+
+std::string error_cell(double value) { return std::isfinite(value) ? fmt::format("{:.2e}", value) : "-"; }
+
+/// Three significant digits, and no exponent from 1 to 1e6.
+std::string short_number(double value) {
+  return value < 100.0 ? fmt::format("{:#.3g}", value) : fmt::format("{:.0f}", value);
+}
+
+/// How far the times lie from their median: "-3 % +8 % of 5".
+std::string spread_cell(const CpuSeconds& cpu) {
+  if (cpu.repeats < 2) return cpu.repeats == 0 ? "-" : "one run";
+  return fmt::format("{:+.0f} % {:+.0f} % of {}", 100.0 * (cpu.min / cpu.median - 1.0),
+                     100.0 * (cpu.max / cpu.median - 1.0), cpu.repeats);
+}
+
+std::string status_cell(const StudyRow& row) {
+  if (!row.is_baseline() || !std::isfinite(row.self_error)) return row.status;
+  return fmt::format("{}, by its own estimate {:.0e}", row.status, row.self_error);
+}
+
+std::size_t width(std::string_view text) {
+  return static_cast<std::size_t>(std::ranges::count_if(text, [](char c) { return (c & 0xC0) != 0x80; }));
+}
+
+Cells row_cells(const StudyRow& row) {
+  return {row.method == ida_method ? "IDA, " + row.formulation : row.method,
+          row.is_baseline() ? "" : fmt::format("{}", row.order),
+          row.is_baseline() ? fmt::format("rtol {:g}", row.rtol)
+                             : (std::isfinite(row.step) ? fmt::format("{:.4g}", row.step) : "-"),
+          fmt::format("{}", row.steps),
+          error_cell(row.error_q),
+          error_cell(row.error_p),
+          error_cell(row.constraint),
+          error_cell(row.energy_error),
+          time_cell(row.cpu_seconds.median),
+          spread_cell(row.cpu_seconds),
+          fmt::format("{}", row.newton_iterations),
+          status_cell(row)};
+}
+
+std::string rows_table(const Study& study) {
+  std::vector<Cells> cells{{"method", "order", "step", "steps", "error q", "error p", "constraint", "energy",
+                            "CPU", "spread", "Newton", "status"}};
+  for (const StudyRow& row : study.rows) cells.push_back(row_cells(row));
+  return aligned(cells);
+}
+
+std::string order_table(const Study& study) {
+  std::vector<Cells> cells{{"method", "order", "measured", "points", "the ladder ended because"}};
+  for (const MeasuredOrder& m : study.measured_orders)
+    cells.push_back({m.method, fmt::format("{}", m.order), m.slope ? fmt::format("{:.2f}", *m.slope) : "-",
+                     fmt::format("{}", m.points),
+                     m.ladder_end.empty() ? "the steps were given" : m.ladder_end});
+  return aligned(cells);
+}
+
+bool has_run(const Study& study, const std::string& method, int order) {
+  return std::ranges::any_of(study.rows, [&](const StudyRow& row) {
+    return row.ok() && row.method == method && row.order == order;
+  });
+}
+
+std::string comparison_table(const Study& study) {
+  const auto cell = [](const std::optional<double>& seconds) { return seconds ? time_cell(*seconds) : "-"; };
+  const auto ratio = [](const std::optional<double>& r) { return r ? fmt::format("{:.2f}", *r) : "-"; };
+  std::vector<Cells> cells{{"error", "method", "order", "CPU", "IDA", "IDA / ours", "erk", "erk / ours", ""}};
+  for (const AtError& at : study.at_error) {
+    if (!has_run(study, at.method, at.order)) continue;
+    cells.push_back({fmt::format("{:.0e}", at.error), at.method, fmt::format("{}", at.order),
+                     cell(at.cpu_seconds), cell(at.ida_cpu_seconds), ratio(at.ratio),
+                     cell(at.erk_cpu_seconds), ratio(at.erk_ratio), at.best ? "fastest of ours" : ""});
+  }
+  return aligned(cells);
+}
+
+Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+Json number(const std::optional<double>& value) { return value ? number(*value) : Json(nullptr); }
+
+Json row_json(const StudyRow& row, Momentum momentum) {
+  Json json{{"method", row.method}};
+  if (row.is_baseline()) {
+    json["rtol"] = row.rtol;
+    if (!row.formulation.empty()) json["formulation"] = row.formulation;
+  } else {
+    json["order"] = row.order;
+    json["momentum"] = name(momentum);
+    json["step"] = number(row.step);
+  }
+  json["status"] = row.status;
+  json["error_q"] = number(row.error_q);
+  json["error_p"] = number(row.error_p);
+  if (row.is_baseline()) json["self_error"] = number(row.self_error);
+  json["constraint"] = number(row.constraint);
+  json["energy_error"] = number(row.energy_error);
+  const CpuSeconds& cpu = row.cpu_seconds;
+  const bool timed = cpu.repeats > 0;
+  json["cpu_seconds"] = {{"median", timed ? number(cpu.median) : Json(nullptr)},
+                         {"min", timed ? number(cpu.min) : Json(nullptr)},
+                         {"max", timed ? number(cpu.max) : Json(nullptr)},
+                         {"repeats", cpu.repeats}};
+  json["steps"] = row.steps;
+  json["newton_iterations"] = row.newton_iterations;
+  json["residual_evaluations"] = row.residual_evaluations;
+  json["jacobian_evaluations"] = row.jacobian_evaluations;
+  return json;
+}
+
+Json measured_json(const MeasuredOrder& measured) {
+  return {{"method", measured.method},
+          {"order", measured.order},
+          {"slope", number(measured.slope)},
+          {"points", measured.points},
+          {"ladder_end", measured.ladder_end.empty() ? Json(nullptr) : Json(measured.ladder_end)}};
+}
+
+Json at_error_json(const AtError& at) {
+  return {{"error", at.error},
+          {"method", at.method},
+          {"order", at.order},
+          {"best", at.best},
+          {"cpu_seconds", number(at.cpu_seconds)},
+          {"ida_cpu_seconds", number(at.ida_cpu_seconds)},
+          {"ratio", number(at.ratio)},
+          {"erk_cpu_seconds", number(at.erk_cpu_seconds)},
+          {"erk_ratio", number(at.erk_ratio)}};
+}
+
+Json study_json(const Study& study) {
+  Json json{{"scene", study.scene},
+            {"parameters", Json::object()},
+            {"t_start", study.t_start},
+            {"t_end", study.t_end},
+            {"unknowns", study.unknowns},
+            {"momentum", name(study.momentum)},
+            {"interrupted", study.interrupted}};
+  for (const auto& [key, value] : study.parameters) json["parameters"][key] = number(value);
+  json["reference"] = {{"kind", study.reference_kind},
+                       {"how", study.reference_how},
+                       {"self_error", number(study.reference_error)}};
+  for (const char* list : {"rows", "measured_order", "at_error"}) json[list] = Json::array();
+  for (const StudyRow& row : study.rows) json["rows"].push_back(row_json(row, study.momentum));
+  for (const MeasuredOrder& m : study.measured_orders) json["measured_order"].push_back(measured_json(m));
+  for (const AtError& at : study.at_error) json["at_error"].push_back(at_error_json(at));
+  return json;
+}
+
+std::string csv_number(double value) { return std::isfinite(value) ? fmt::format("{:.17g}", value) : ""; }
+
+std::string csv_line(const Study& study, const StudyRow& row) {
+  const bool baseline = row.is_baseline(), timed = row.cpu_seconds.repeats > 0;
+  const auto time = [&](double seconds) { return timed ? csv_number(seconds) : std::string(); };
+  const Cells fields{csv_field(study.scene),
+                     csv_field(row.method),
+                     baseline ? "" : fmt::format("{}", row.order),
+                     baseline ? "" : name(study.momentum),
+                     csv_number(row.step),
+                     csv_number(row.rtol),
+                     csv_field(row.status),
+                     csv_number(row.error_q),
+                     csv_number(row.error_p),
+                     csv_number(row.self_error),
+                     csv_number(row.constraint),
+                     csv_number(row.energy_error),
+                     time(row.cpu_seconds.median),
+                     time(row.cpu_seconds.min),
+                     time(row.cpu_seconds.max),
+                     fmt::format("{}", row.cpu_seconds.repeats),
+                     fmt::format("{}", row.steps),
+                     fmt::format("{}", row.newton_iterations),
+                     fmt::format("{}", row.residual_evaluations),
+                     fmt::format("{}", row.jacobian_evaluations),
+                     row.formulation};
+  return fmt::format("{}\n", fmt::join(fields, ","));
+}
+
+}  // namespace
+
+std::string aligned(const std::vector<std::vector<std::string>>& rows) {
+  std::vector<std::size_t> widths;
+  for (const Cells& row : rows) {
+    widths.resize(std::max(widths.size(), row.size()));
+    for (std::size_t i = 0; i < row.size(); ++i) widths[i] = std::max(widths[i], width(row[i]));
+  }
+  std::string text;
+  for (const Cells& row : rows) {
+    std::string line;
+    for (std::size_t i = 0; i < row.size(); ++i)
+      line += row[i] + std::string(widths[i] - width(row[i]) + 2, ' ');
+    text += line.substr(0, line.find_last_not_of(' ') + 1) + '\n';
+  }
+  return text;
+}
+
+std::string study_table(const Study& study) {
+  std::string title = fmt::format("{}: t = {:g} to {:g}, {} unknowns, momentum {}", study.scene,
+                                  study.t_start, study.t_end, study.unknowns, name(study.momentum));
+  for (const auto& [key, value] : study.parameters) title += fmt::format(", {} = {:g}", key, value);
+  const std::string reference = fmt::format("reference: {} ({}), its own error {}", study.reference_kind,
+                                            study.reference_how, error_cell(study.reference_error));
+  return fmt::format("{}\n{}\n\n{}\n{}\n{}{}", title, reference, rows_table(study), order_table(study),
+                     comparison_table(study), study.interrupted ? "\ninterrupted\n" : "");
+}
+
+std::string at_error_markdown(const Study& study) {
+  std::vector<MeasuredOrder> series = study.measured_orders;
+  std::erase_if(series, [&](const MeasuredOrder& m) { return !has_run(study, m.method, m.order); });
+  std::string text =
+      fmt::format("## `{}`, t = {:g} to {:g}\n\n| error |", study.scene, study.t_start, study.t_end);
+  std::string rule = "|---|";
+  for (const MeasuredOrder& m : series) {
+    text += fmt::format(" `{}`, order {} |", m.method, m.order);
+    rule += "---|";
+  }
+  text += " IDA |\n" + rule + "---|\n";
+  for (const double error : compared_errors) {
+    text += fmt::format("| {:.0e} |", error);
+    std::optional<double> ida;
+    for (const MeasuredOrder& m : series)
+      for (const AtError& at : study.at_error) {
+        if (at.error != error || at.method != m.method || at.order != m.order) continue;
+        const std::string cell = at.cpu_seconds ? time_cell(*at.cpu_seconds) : "-";
+        text += at.best ? " **" + cell + "** |" : " " + cell + " |";
+        ida = at.ida_cpu_seconds;
+      }
+    text += fmt::format(" {} |\n", ida ? time_cell(*ida) : "-");
+  }
+  return text + '\n';
+}
+
+std::string summary_markdown(const std::vector<Study>& studies) {
+  const auto time = [](std::optional<double> t) { return t ? time_cell(*t) : std::string("-"); };
+  const auto ratio = [](std::optional<double> r) { return r ? fmt::format("{:.2f}", *r) : std::string("-"); };
+  std::string text =
+      "| scene | error | fastest of ours | ours | IDA | IDA / ours | explicit | explicit / ours |\n"
+      "|---|---|---|---|---|---|---|---|\n";
+  for (const Study& study : studies)
+    for (const AtError& at : study.at_error)
+      if (at.best && (at.error == 1e-6 || at.error == 1e-9))
+        text += fmt::format("| `{}` | {:.0e} | `{}`, order {} | {} | {} | {} | {} | {} |\n", study.scene,
+                            at.error, at.method, at.order, time(at.cpu_seconds), time(at.ida_cpu_seconds),
+                            ratio(at.ratio), time(at.erk_cpu_seconds), ratio(at.erk_ratio));
+  return text;
+}
+
+std::string studies_csv(const std::vector<Study>& studies) {
+  std::string text =
+      "scene,method,order,momentum,step,rtol,status,error_q,error_p,self_error,constraint,energy_error,"
+      "cpu_seconds_median,cpu_seconds_min,cpu_seconds_max,repeats,steps,newton_iterations,residual_"
+      "evaluations,"
+      "jacobian_evaluations,formulation\n";
+  for (const Study& study : studies)
+    for (const StudyRow& row : study.rows) text += csv_line(study, row);
+  return text;
+}
+
+std::string studies_json(const std::vector<Study>& studies) {
+  Json json{{"studies", Json::array()}, {"build", Json::object()}};
+  for (const auto& [key, value] : build_facts()) json["build"][key] = value;
+  for (const Study& study : studies) json["studies"].push_back(study_json(study));
+  return json.dump(2, ' ', false, Json::error_handler_t::replace);
+}
+
+std::string time_cell(double seconds) {
+  if (!std::isfinite(seconds) || seconds <= 0.0) return "-";
+  if (seconds < 1e-3) return short_number(seconds * 1e6) + " µs";
+  if (seconds < 1.0) return short_number(seconds * 1e3) + " ms";
+  return short_number(seconds) + " s";
+}
+
+std::string csv_field(std::string_view text) {
+  if (text.find_first_of(",\"\n\r") == std::string_view::npos) return std::string(text);
+  std::string quoted = "\"";
+  for (const char c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
+  return quoted + '"';
+}
+
+}  // namespace diracstep

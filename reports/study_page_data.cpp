@@ -1,0 +1,89 @@
+#include <fmt/format.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <diracstep/reports/report.hpp>
+#include <diracstep/reports/series_style.hpp>
+#include <diracstep/reports/study_page.hpp>
+#include <nlohmann/json.hpp>
+
+namespace diracstep {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+/// Six digits: more than a picture shows, in a third of the characters.
+Json rounded(double value) {
+  if (!std::isfinite(value)) return nullptr;
+  return std::strtod(fmt::format("{:.6g}", value).c_str(), nullptr);
+}
+
+Json rounded(const std::vector<double>& values) {
+  Json list = Json::array();
+  for (const double value : values) list.push_back(rounded(value));
+  return list;
+}
+
+Json body_json(const Motion::Body& body) {
+  Json json{{"name", body.name}, {"x", body.x}, {"y", body.y}};
+  if (body.heading >= 0) json["heading"] = body.heading;
+  return json;
+}
+
+Json motion_json(const History& history) {
+  const Motion& motion = history.motion;
+  Json json{{"form", name(motion.form)}, {"time", rounded(history.track_time)}};
+  for (const char* list : {"names", "units", "numbers", "bodies", "bars", "pins", "values"})
+    json[list] = Json::array();
+  for (std::size_t i = 0; i < motion.coordinates.size(); ++i) {
+    json["names"].push_back(motion.coordinates[i].name);
+    json["units"].push_back(motion.coordinates[i].unit);
+    json["numbers"].push_back(motion.coordinates[i].index + 1);
+    Json values = Json::array();
+    for (const Vector& at : history.positions) values.push_back(rounded(at[static_cast<Eigen::Index>(i)]));
+    json["values"].push_back(std::move(values));
+  }
+  for (const Motion::Body& body : motion.bodies) json["bodies"].push_back(body_json(body));
+  for (const Motion::Bar& bar : motion.bars) json["bars"].push_back({bar.from, bar.to});
+  for (const auto& pin : motion.pins) json["pins"].push_back({rounded(pin[0]), rounded(pin[1])});
+  return json;
+}
+
+Json history_json(const PageEntry& entry) {
+  const History& history = entry.history;
+  if (history.time.empty()) return nullptr;
+  Json json{{"method", history.method},
+            {"order", history.order},
+            {"step", history.step},
+            {"time_unit", entry.time_unit},
+            {"time", rounded(history.time)},
+            {"error", rounded(history.error)},
+            {"energy", rounded(history.energy)},
+            {"constraint", rounded(history.constraint)},
+            {"invariants", Json::array()},
+            {"motion", motion_json(history)}};
+  for (const History::Change& change : history.invariants)
+    json["invariants"].push_back({{"name", change.name}, {"values", rounded(change.values)}});
+  return json;
+}
+
+}  // namespace
+
+std::string study_page_data(const std::vector<PageEntry>& entries) {
+  std::vector<Study> studies;
+  for (const PageEntry& entry : entries) studies.push_back(entry.study);
+  Json json = Json::parse(studies_json(studies));
+  json["styles"] = Json::array();
+  json["histories"] = Json::array();
+  for (const SeriesStyle& style : series_styles(studies))
+    json["styles"].push_back({{"method", style.method},
+                              {"order", style.order},
+                              {"label", style.label()},
+                              {"colour", style.colour},
+                              {"marker", style.marker}});
+  for (const PageEntry& entry : entries) json["histories"].push_back(history_json(entry));
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+}  // namespace diracstep

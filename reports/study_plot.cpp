@@ -1,0 +1,291 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <diracstep/reports/plot.hpp>
+#include <diracstep/reports/study_plot.hpp>
+#include <functional>
+#include <string_view>
+
+namespace diracstep {
+
+namespace {
+
+/// Okabe and Ito's colours, told apart with any colour vision, without black and grey, which are the
+/// baselines', and without yellow.  The page of the study has the same, see study_page/style.css.
+constexpr std::array<std::string_view, 6> colours{"#0072B2", "#D55E00", "#009E73",
+                                                  "#CC79A7", "#E69F00", "#56B4E9"};
+constexpr std::array<int, 6> markers{7, 5, 9, 13, 11, 15};
+constexpr std::array<std::string_view, 3> dashes{"solid", "(9,5)", "(2,4)"};
+constexpr double largest_drawn = 10.0;  // errors above it show no trend
+constexpr double drawn_zero = 1e-18;    // a change of exactly zero has no logarithm
+constexpr double summary_error = 1e-6;
+constexpr std::size_t max_trails = 8;  // of bodies in one picture
+
+constexpr std::string_view style = R"(set encoding utf8
+set logscale xy
+set format x '10^{%L}'
+set format y '10^{%L}'
+set border 3 linewidth 1.2 linecolor '#404040'
+set tics nomirror out scale 0.7,0.35
+set mxtics 10
+unset mytics
+set grid xtics ytics linetype 1 linewidth 0.7 linecolor '#D9D9D9' dashtype solid
+set key outside right center Left reverse samplen 2.4 spacing 1.3 width 1 noenhanced
+)";
+
+struct Curve {
+  std::string label, look;
+  std::string data = {};  // lines "x y"
+
+  void add(double x, double y) {
+    if (std::isfinite(x) && std::isfinite(y)) data += fmt::format("{:.6e} {:.6e}\n", x, y);
+  }
+};
+
+std::string line_look(std::size_t k) {
+  return fmt::format("with lines linewidth 1.5 dashtype {} linecolor '{}'",
+                     dashes[k / colours.size() % dashes.size()], colours[k % colours.size()]);
+}
+
+std::string axes(const std::string& title, const std::string& x, const std::string& y) {
+  return fmt::format(
+      "set title {} noenhanced offset 0,-0.3\nset xlabel {} noenhanced offset 0,0.2\n"
+      "set ylabel {} noenhanced offset 0.6,0\n",
+      gnuplot_text(title), gnuplot_text(x), gnuplot_text(y));
+}
+
+std::string plotted(std::vector<Curve> curves) {
+  std::erase_if(curves, [](const Curve& curve) { return curve.data.empty(); });
+  std::string data, plots;
+  for (std::size_t i = 0; i < curves.size(); ++i) {
+    data += fmt::format("$curve{} << EOD\n{}EOD\n", i, curves[i].data);
+    plots += fmt::format("{}$curve{} {} title {}", i == 0 ? "plot " : ", \\\n     ", i, curves[i].look,
+                         gnuplot_text(curves[i].label));
+  }
+  return data + plots + "\n";
+}
+
+using Abscissa = std::function<double(const StudyRow&)>;
+
+using Choice = std::function<bool(const StudyRow&)>;
+
+void add_rows(Curve& curve, const Study& study, const Choice& chosen, const Abscissa& x) {
+  for (const StudyRow& row : study.rows)
+    if (row.ok() && chosen(row) && row.error() > 0.0 && row.error() <= largest_drawn)
+      curve.add(x(row), row.error());
+}
+
+std::vector<Curve> curves_of(const Study& study, const std::vector<SeriesStyle>& styles, const Abscissa& x) {
+  std::vector<Curve> all;
+  for (const SeriesStyle& s : styles) {
+    all.push_back(
+        {s.label(), fmt::format("with linespoints linewidth 2 dashtype {} pointtype {} "
+                                "pointsize 0.85 linecolor '{}'",
+                                dashes[s.colour / colours.size() % dashes.size()],
+                                markers[s.marker % markers.size()], colours[s.colour % colours.size()])});
+    add_rows(
+        all.back(), study,
+        [&](const StudyRow& row) { return row.method == s.method && row.order == s.order; }, x);
+  }
+  return all;
+}
+
+/// A curve of IDA for each formulation it runs in.
+void add_baselines(std::vector<Curve>& curves, const Study& study, const Abscissa& x) {
+  std::vector<std::string> formulations;
+  for (const StudyRow& row : study.rows)
+    if (row.method == ida_method && std::ranges::find(formulations, row.formulation) == formulations.end())
+      formulations.push_back(row.formulation);
+  for (std::size_t i = 0; i < formulations.size(); ++i) {
+    curves.push_back({"IDA, " + formulations[i],
+                      fmt::format("with linespoints linewidth 2 dashtype {} pointtype 4 pointsize 0.95 "
+                                  "linecolor '#000000'",
+                                  dashes[i % dashes.size()])});
+    add_rows(
+        curves.back(), study, [&](const StudyRow& row) { return row.formulation == formulations[i]; }, x);
+  }
+  curves.push_back({"explicit RK 8",
+                    "with linespoints linewidth 2 dashtype (6,4) pointtype 8 pointsize 0.95 "
+                    "linecolor '#707070'"});
+  add_rows(
+      curves.back(), study, [](const StudyRow& row) { return row.method == erk_method; }, x);
+}
+
+std::vector<double> component(const std::vector<Vector>& points, int i) {
+  std::vector<double> values;
+  for (const Vector& point : points) values.push_back(point[i]);
+  return values;
+}
+
+Curve curve(std::string label, std::size_t k, const std::vector<double>& x, const std::vector<double>& y) {
+  Curve drawn{std::move(label), line_look(k)};
+  for (std::size_t i = 0; i < std::min(x.size(), y.size()); ++i) drawn.add(x[i], y[i]);
+  return drawn;
+}
+
+Curve logarithmic(std::string label, std::size_t k, const History& history, std::vector<double> values) {
+  for (double& value : values) value = std::max(std::abs(value), drawn_zero);
+  return curve(std::move(label), k, history.time, values);
+}
+
+std::string in_unit(const std::string& name, const std::string& unit) {
+  return unit.empty() ? name : fmt::format("{} [{}]", name, unit);
+}
+
+std::string run_title(const History& history, const std::string& scene) {
+  return fmt::format("{}: {} order {}, step {:.3g}", scene, history.method, history.order, history.step);
+}
+
+std::string history_script(const History& history, const std::string& title, const std::string& time) {
+  std::vector<Curve> curves{logarithmic("total energy", 0, history, history.energy)};
+  if (!history.constraint.empty()) curves.push_back(logarithmic("rows", 1, history, history.constraint));
+  for (const History::Change& invariant : history.invariants)
+    curves.push_back(logarithmic(invariant.name, curves.size(), history, invariant.values));
+  return std::string(style) + "unset logscale x\nset format x '%g'\n" +
+         axes(title, time, "relative change, or violation [1]") + plotted(curves);
+}
+
+std::string error_script(const History& history, const std::string& title, const std::string& time,
+                         const std::vector<SeriesStyle>& styles) {
+  const auto style_of = std::ranges::find(styles, history.method, &SeriesStyle::method);
+  Curve error{"error", line_look(style_of == styles.end() ? 0 : style_of->colour)};
+  for (std::size_t i = 0; i < history.time.size(); ++i)
+    if (history.time[i] > history.time.front() && history.error[i] > 0.0)
+      error.add(history.time[i] - history.time.front(), history.error[i]);
+  if (error.data.empty()) return {};
+  return std::string(style) + axes(title, time, "error over largest q, p [1]") +
+         fmt::format("set key off\n{}", plotted({error}));
+}
+
+std::string plane_script(const History& history) {
+  const Motion& motion = history.motion;
+  const auto& x = motion.coordinates[static_cast<std::size_t>(motion.bodies[0].x)];
+  const auto& y = motion.coordinates[static_cast<std::size_t>(motion.bodies[0].y)];
+  std::vector<Curve> curves;
+  const std::size_t every = (motion.bodies.size() + max_trails - 1) / max_trails;
+  for (std::size_t i = every - 1; i < motion.bodies.size(); i += every) {
+    const Motion::Body& body = motion.bodies[i];
+    curves.push_back(curve(body.name, curves.size(), component(history.positions, body.x),
+                           component(history.positions, body.y)));
+  }
+  const std::string key = curves.size() < 2 ? "set key off\n" : "";
+  const std::string equal = x.unit == y.unit ? "set size ratio -1\n" : "";
+  return key + equal +
+         axes("", in_unit(motion.bodies.size() > 1 ? "x" : x.name, x.unit),
+              in_unit(motion.bodies.size() > 1 ? "y" : y.name, y.unit)) +
+         plotted(curves);
+}
+
+/// The elements over their number at a few times.
+std::string profile_script(const History& history) {
+  std::vector<Curve> curves;
+  std::vector<double> number;
+  for (const auto& c : history.motion.coordinates) number.push_back(c.index + 1);
+  constexpr std::size_t times = 5;
+  for (std::size_t k = 0; k < times; ++k) {
+    const std::size_t i = k * (history.track_time.size() - 1) / (times - 1);
+    const Vector& q = history.positions[i];
+    curves.push_back(
+        curve(fmt::format("t = {:.3g}", history.track_time[i]), k, number, {q.begin(), q.end()}));
+  }
+  const auto& first = history.motion.coordinates.front();
+  const std::string family = first.name.substr(0, first.name.find_last_of('_'));
+  return axes("", "number [1]", in_unit(family, first.unit)) + plotted(curves);
+}
+
+std::string curves_script(const History& history, const std::string& time) {
+  std::vector<Curve> curves;
+  for (std::size_t i = 0; i < history.motion.coordinates.size(); ++i) {
+    const auto& c = history.motion.coordinates[i];
+    curves.push_back(
+        curve(in_unit(c.name, c.unit), i, history.time, component(history.positions, static_cast<int>(i))));
+  }
+  return axes("", time, "coordinates") + plotted(curves);
+}
+
+std::string motion_script(const History& history, const std::string& time) {
+  const std::string linear = std::string(style) + "unset logscale\nset format '%g'\n";
+  switch (history.motion.form) {
+    case Motion::Form::plane:
+      return linear + plane_script(history);
+    case Motion::Form::profile:
+      return linear + profile_script(history);
+    case Motion::Form::curves:
+      break;
+  }
+  return linear + curves_script(history, time);
+}
+
+std::string first_failure(std::initializer_list<std::string> failures) {
+  for (const std::string& failure : failures)
+    if (!failure.empty()) return failure;
+  return {};
+}
+
+}  // namespace
+
+std::string draw_work_precision(const Study& study, const std::vector<SeriesStyle>& styles,
+                                const std::filesystem::path& directory) {
+  std::vector<Curve> work = curves_of(study, styles, [](const auto& row) { return row.cpu_seconds.median; });
+  add_baselines(work, study, [](const auto& row) { return row.cpu_seconds.median; });
+  const auto steps = curves_of(study, styles, [](const auto& row) { return std::abs(row.step); });
+  const auto drawn = std::ranges::count_if(work, [](const Curve& c) { return !c.data.empty(); });
+  if (drawn == 0) return study.scene + ": no run succeeded, so there is nothing to draw";
+  const std::size_t height = std::max<std::size_t>(480, 90 + 28 * static_cast<std::size_t>(drawn));
+  const std::string title = fmt::format("{}: t = {:g} … {:g}", study.scene, study.t_start, study.t_end);
+  const std::string stem = (directory / file_name(study.scene)).string(), error = "relative error of q and p";
+  const bool two_steps =  // an order takes two
+      std::ranges::any_of(steps, [](const Curve& c) { return std::ranges::count(c.data, '\n') > 1; });
+  return first_failure(
+      {render(std::string(style) + axes(title, "CPU time [s]", error + " at the end [1]") + plotted(work),
+              stem, 980, height),
+       two_steps
+           ? render(std::string(style) + axes(title, "step size", error + " at the end [1]") + plotted(steps),
+                    stem + "-orders", 980, height)
+           : ""});
+}
+
+std::string draw_history(const History& history, const std::string& scene, const std::string& time_unit,
+                         const std::vector<SeriesStyle>& styles, const std::filesystem::path& directory) {
+  const std::string stem = (directory / file_name(scene)).string(), title = run_title(history, scene);
+  const std::string time = in_unit("time", time_unit);
+  const std::string error = error_script(history, title, time, styles);
+  return first_failure({render(history_script(history, title, time), stem + "-history", 760, 420),
+                        error.empty() ? "" : render(error, stem + "-error", 760, 420),
+                        render(motion_script(history, time), stem + "-motion", 620, 420)});
+}
+
+std::string draw_summary(const std::vector<Study>& studies, const std::filesystem::path& directory) {
+  std::string ida, erk, names;
+  std::size_t place = 0;
+  for (const Study& study : studies)
+    for (const AtError& at : study.at_error) {
+      if (!at.best || at.error != summary_error) continue;
+      if (at.ratio) ida += fmt::format("{:.6e} {}\n", *at.ratio, place);
+      if (at.erk_ratio) erk += fmt::format("{:.6e} {}\n", *at.erk_ratio, place);
+      names += fmt::format("{}{} {}", place == 0 ? "" : ", ", gnuplot_text(study.scene), place);
+      ++place;
+    }
+  if (ida.empty() && erk.empty())
+    return "no study reaches 1e-6 on both sides, so there is no summary to draw";
+  const std::string script =
+      std::string(style) +
+      fmt::format(
+          "unset logscale y\nset format y '%s'\nset format x '%g'\nset xrange [*<0.5:2<*]\nset yrange "
+          "[{}:-0.7]\nset ytics ({}) "
+          "noenhanced\n"
+          "set ylabel ''\nset xlabel 'time of the baseline over ours at the error 1e-6: right of 1 ours is "
+          "faster'\n"
+          "set arrow from 1, graph 0 to 1, graph 1 nohead linewidth 1.5 linecolor '#404040'\n"
+          "$ida << EOD\n{}EOD\n$erk << EOD\n{}EOD\n",
+          static_cast<double>(place) - 0.3, names, ida.empty() ? "NaN NaN\n" : ida,
+          erk.empty() ? "NaN NaN\n" : erk) +
+      "plot $ida with points pointtype 5 pointsize 1.2 linecolor '#000000' title 'IDA', $erk with points "
+      "pointtype 9 "
+      "pointsize 1.3 linecolor '#707070' title 'explicit RK 8'\n";
+  return render(script, (directory / "summary").string(), 860, std::max<std::size_t>(260, 120 + 34 * place));
+}
+
+}  // namespace diracstep

@@ -1,0 +1,320 @@
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <diracstep/scene_format/compiler/formula_graph.hpp>
+#include <diracstep/scene_format/compiler/operations.hpp>
+#include <stdexcept>
+
+namespace diracstep::scene_compiler {
+
+int arity(Op op) {
+  switch (op) {
+    case Op::number:
+    case Op::parameter:
+    case Op::element:
+    case Op::loop_index:
+    case Op::time:
+    case Op::scale:
+    case Op::coordinate:
+    case Op::multiplier:
+      return 0;
+    case Op::list:
+    case Op::add:
+    case Op::subtract:
+    case Op::multiply:
+    case Op::divide:
+    case Op::pow:
+    case Op::atan2:
+    case Op::kepler_E:
+    case Op::sn:
+    case Op::cn:
+    case Op::dn:
+      return 2;
+    default:
+      return 1;
+  }
+}
+
+std::size_t FormulaGraph::Hash::operator()(const NodeData& node) const {
+  std::uint64_t hash = 1469598103934665603u;
+  for (const std::uint64_t part :
+       {static_cast<std::uint64_t>(node.op), static_cast<std::uint64_t>(node.a) * 3,
+        static_cast<std::uint64_t>(node.b) * 5, static_cast<std::uint64_t>(node.c) * 7,
+        std::bit_cast<std::uint64_t>(node.value)}) {
+    hash = (hash ^ part) * 1099511628211u;
+    hash ^= hash >> 29;
+  }
+  return static_cast<std::size_t>(hash);
+}
+
+Known FormulaGraph::known_of(const NodeData& node) const {
+  switch (node.op) {
+    case Op::number:
+    case Op::parameter:
+      return Known::once;
+    case Op::loop_index:
+      return Known::each_instance;
+    case Op::element:
+      return known(node.b);
+    case Op::time:
+    case Op::scale:
+    case Op::coordinate:
+    case Op::multiplier:
+    case Op::sum:
+      return Known::each_call;
+    default:
+      break;
+  }
+  const Known a = known(node.a);
+  return arity(node.op) == 2 ? std::max(a, known(node.b)) : a;
+}
+
+Node FormulaGraph::insert(const NodeData& node) {
+  const auto found = index_.find(node);
+  if (found != index_.end()) return found->second;
+  if (nodes_.size() >= size_limit) throw std::length_error("formula graph");
+  const Node id = static_cast<Node>(nodes_.size());
+  known_.push_back(known_of(node));
+  nodes_.push_back(node);
+  index_.emplace(node, id);
+  return id;
+}
+
+bool FormulaGraph::is_number(Node node, double value) const {
+  const NodeData& data = (*this)[node];
+  return data.op == Op::number && data.value == value;
+}
+
+/// Computes now what depends on numbers alone, unless the result is not finite: that is told at the start.
+Node FormulaGraph::fold(const NodeData& node) {
+  const auto constant = [&](Node child) { return (*this)[child].op == Op::number; };
+  const bool two = arity(node.op) == 2;
+  if (constant(node.a) && (!two || constant(node.b))) {
+    const double value = computed<double>(node, (*this)[node.a].value, two ? (*this)[node.b].value : 0.0);
+    if (std::isfinite(value)) return number(value);
+  }
+  return insert(node);
+}
+
+Node FormulaGraph::apply(Op op, Node a, Node b) { return fold({op, a, b}); }
+
+Node FormulaGraph::negative(Node a) {
+  if ((*this)[a].op == Op::negative) return (*this)[a].a;
+  return fold({Op::negative, a});
+}
+
+Node FormulaGraph::add(Node a, Node b) {
+  if (is_number(a, 0.0)) return b;
+  if (is_number(b, 0.0)) return a;
+  if (a == b) return multiply(number(2.0), a);
+  if ((*this)[b].op == Op::negative) return subtract(a, (*this)[b].a);
+  if ((*this)[a].op == Op::negative) return subtract(b, (*this)[a].a);
+  return fold({Op::add, std::min(a, b), std::max(a, b)});  // one order, so that a+b and b+a are one node
+}
+
+Node FormulaGraph::subtract(Node a, Node b) {
+  if (a == b) return number(0.0);
+  if (is_number(a, 0.0)) return negative(b);
+  if (is_number(b, 0.0)) return a;
+  if ((*this)[b].op == Op::negative) return add(a, (*this)[b].a);
+  return fold({Op::subtract, a, b});
+}
+
+Node FormulaGraph::multiply(Node a, Node b) {
+  if (is_number(a, 0.0) || is_number(b, 0.0)) return number(0.0);
+  if (is_number(a, 1.0)) return b;
+  if (is_number(b, 1.0)) return a;
+  if (is_number(a, -1.0)) return negative(b);
+  if (is_number(b, -1.0)) return negative(a);
+  if (a == b) return power(a, 2);
+  if ((*this)[a].op == Op::negative) return negative(multiply((*this)[a].a, b));
+  if ((*this)[b].op == Op::negative) return negative(multiply(a, (*this)[b].a));
+  // What is known earlier is gathered, so that it is computed earlier: c·(d·x) becomes (c·d)·x.
+  if (known(a) > known(b)) std::swap(a, b);
+  if (known(a) < Known::each_call && (*this)[b].op == Op::multiply && known((*this)[b].a) < Known::each_call)
+    return multiply(multiply(a, (*this)[b].a), (*this)[b].b);
+  if (known(a) == known(b) && a > b) std::swap(a, b);
+  return fold({Op::multiply, a, b});
+}
+
+Node FormulaGraph::divide(Node a, Node b) {
+  if (is_number(b, 1.0)) return a;
+  if (is_number(a, 0.0) && !is_number(b, 0.0)) return number(0.0);
+  if (known(a) == Known::each_call && known(b) < Known::each_call)  // one division beforehand, not one a call
+    return multiply(fold({Op::divide, number(1.0), b}), a);
+  return fold({Op::divide, a, b});
+}
+
+Node FormulaGraph::power(Node a, int exponent) {
+  constexpr int largest = 64;
+  if (exponent == 0) return number(1.0);
+  if (exponent == 1) return a;
+  if (exponent < 0) return divide(number(1.0), power(a, -exponent));
+  if (exponent > largest) return fold({Op::pow, a, number(exponent)});
+  return fold({Op::power, a, none, exponent});
+}
+
+Node FormulaGraph::raise(Node a, Node exponent) {
+  const NodeData e = (*this)[exponent];
+  if (e.op == Op::number && e.value == std::floor(e.value) && std::abs(e.value) <= 64.0)
+    return power(a, static_cast<int>(e.value));
+  if (is_number(exponent, 0.5)) return apply(Op::sqrt, a);
+  return fold({Op::pow, a, exponent});
+}
+
+std::vector<Node> FormulaGraph::reachable(std::span<const Node> roots, bool with_indices) const {
+  std::vector<bool> seen(nodes_.size(), false);
+  Node last = none;
+  for (const Node root : roots) {
+    seen[static_cast<std::size_t>(root)] = true;
+    last = std::max(last, root);
+  }
+  std::vector<Node> nodes;
+  for (Node node = last; node >= 0; --node) {
+    if (!seen[static_cast<std::size_t>(node)]) continue;
+    nodes.push_back(node);
+    const NodeData& data = (*this)[node];
+    if (arity(data.op) >= 1) seen[static_cast<std::size_t>(data.a)] = true;
+    const bool index =
+        with_indices && (data.op == Op::element || data.op == Op::coordinate) && data.b != none;
+    if (arity(data.op) == 2 || index) seen[static_cast<std::size_t>(data.b)] = true;
+  }
+  std::ranges::reverse(nodes);
+  return nodes;
+}
+
+Node FormulaGraph::partial(Node node, bool second) {
+  const NodeData f = (*this)[node];
+  const Node a = f.a, b = f.b, one = number(1.0);
+  const auto inverse = [&](Node x) { return divide(one, x); };
+  const auto one_plus = [&](Node x) { return add(one, x); };
+  const auto one_minus = [&](Node x) { return subtract(one, x); };
+  switch (f.op) {
+    case Op::negative:
+      return number(-1.0);
+    case Op::add:
+      return one;
+    case Op::subtract:
+      return number(second ? -1.0 : 1.0);
+    case Op::multiply:
+      return second ? a : b;
+    case Op::divide:
+      return second ? negative(multiply(node, inverse(b))) : inverse(b);
+    case Op::power:
+      return multiply(number(f.c), power(a, f.c - 1));
+    case Op::pow:
+      return second ? multiply(node, apply(Op::log, a)) : multiply(b, raise(a, subtract(b, one)));
+    case Op::sqrt:
+      return multiply(number(0.5), inverse(node));
+    case Op::sin:
+      return apply(Op::cos, a);
+    case Op::cos:
+      return negative(apply(Op::sin, a));
+    case Op::tan:
+      return one_plus(power(node, 2));
+    case Op::asin:
+      return inverse(apply(Op::sqrt, one_minus(power(a, 2))));
+    case Op::acos:
+      return negative(inverse(apply(Op::sqrt, one_minus(power(a, 2)))));
+    case Op::atan:
+      return inverse(one_plus(power(a, 2)));
+    case Op::atan2: {
+      const Node norm = inverse(add(power(a, 2), power(b, 2)));
+      return second ? negative(multiply(a, norm)) : multiply(b, norm);
+    }
+    case Op::sinh:
+      return apply(Op::cosh, a);
+    case Op::cosh:
+      return apply(Op::sinh, a);
+    case Op::tanh:
+      return one_minus(power(node, 2));
+    case Op::asinh:
+      return inverse(apply(Op::sqrt, one_plus(power(a, 2))));
+    case Op::acosh:
+      return inverse(apply(Op::sqrt, subtract(power(a, 2), one)));
+    case Op::atanh:
+      return inverse(one_minus(power(a, 2)));
+    case Op::exp:
+      return node;
+    case Op::log:
+      return inverse(a);
+    case Op::abs:
+      return apply(Op::sign, a);
+    case Op::sign:
+      return number(0.0);
+    default:
+      throw std::logic_error("a function without a derivative was differentiated");
+  }
+}
+
+std::vector<Node> FormulaGraph::derivative(std::span<const Node> roots, Node symbol) {
+  const Node zero = number(0.0);
+  const std::vector<Node> nodes = reachable(roots);
+  std::unordered_map<Node, Node> changes;  // only those other than zero
+  const auto change = [&](Node node) {
+    const auto found = changes.find(node);
+    return found == changes.end() ? zero : found->second;
+  };
+  for (const Node node : nodes) {
+    if (node == symbol) {
+      changes[node] = number(1.0);
+      continue;
+    }
+    const NodeData data = (*this)[node];
+    Node sum = zero;
+    for (const bool second : {false, true}) {
+      if (arity(data.op) < (second ? 2 : 1) || data.op == Op::list) continue;
+      const Node inner = change(second ? data.b : data.a);
+      if (inner != zero) sum = add(sum, multiply(inner, partial(node, second)));
+    }
+    if (sum != zero) changes[node] = sum;
+  }
+  std::vector<Node> derivatives;
+  for (const Node root : roots) derivatives.push_back(change(root));
+  return derivatives;
+}
+
+Node FormulaGraph::rebuild(const NodeData& node) {
+  switch (node.op) {
+    case Op::negative:
+      return negative(node.a);
+    case Op::add:
+      return add(node.a, node.b);
+    case Op::subtract:
+      return subtract(node.a, node.b);
+    case Op::multiply:
+      return multiply(node.a, node.b);
+    case Op::divide:
+      return divide(node.a, node.b);
+    case Op::power:
+      return power(node.a, node.c);
+    case Op::pow:
+      return raise(node.a, node.b);
+    default:
+      return fold(node);
+  }
+}
+
+std::vector<Node> FormulaGraph::substitute(std::span<const Node> roots, Node leaf, Node replacement) {
+  std::unordered_map<Node, Node> changed{{leaf, replacement}};
+  const auto now = [&](Node node) {
+    const auto found = changed.find(node);
+    return found == changed.end() ? node : found->second;
+  };
+  for (const Node node : reachable(roots)) {
+    NodeData data = (*this)[node];
+    const int arguments = arity(data.op);
+    if (arguments == 0) continue;
+    const Node a = now(data.a), b = arguments == 2 ? now(data.b) : data.b;
+    if (a == data.a && b == data.b) continue;
+    data.a = a;
+    data.b = b;
+    changed[node] = rebuild(data);
+  }
+  std::vector<Node> results;
+  for (const Node root : roots) results.push_back(now(root));
+  return results;
+}
+
+}  // namespace diracstep::scene_compiler

@@ -1,0 +1,399 @@
+#include <algorithm>
+#include <array>
+#include <diracstep/scene_format/compiler/formula_parser.hpp>
+#include <numbers>
+#include <stdexcept>
+
+namespace diracstep::scene_compiler {
+
+namespace {
+
+struct Function {
+  std::string_view name;
+  Op op;
+  int arguments;
+  bool reference = false;
+};
+
+constexpr std::array functions{Function{"sin", Op::sin, 1},
+                               Function{"cos", Op::cos, 1},
+                               Function{"tan", Op::tan, 1},
+                               Function{"asin", Op::asin, 1},
+                               Function{"acos", Op::acos, 1},
+                               Function{"atan", Op::atan, 1},
+                               Function{"atan2", Op::atan2, 2},
+                               Function{"sinh", Op::sinh, 1},
+                               Function{"cosh", Op::cosh, 1},
+                               Function{"tanh", Op::tanh, 1},
+                               Function{"asinh", Op::asinh, 1},
+                               Function{"acosh", Op::acosh, 1},
+                               Function{"atanh", Op::atanh, 1},
+                               Function{"exp", Op::exp, 1},
+                               Function{"log", Op::log, 1},
+                               Function{"sqrt", Op::sqrt, 1},
+                               Function{"abs", Op::abs, 1},
+                               Function{"pow", Op::pow, 2},
+                               Function{"kepler_E", Op::kepler_E, 2, true},
+                               Function{"sn", Op::sn, 2, true},
+                               Function{"cn", Op::cn, 2, true},
+                               Function{"dn", Op::dn, 2, true}};
+
+/// Functions with arguments of their own kind.
+constexpr std::array<std::string_view, 5> forms{"sum", "rate", "diff", "min", "max"};
+constexpr std::array<std::string_view, 12> keys{"t",      "pi",   "kind",   "digits",  "how", "with",
+                                                "source", "name", "method", "project", "for", "each"};
+
+}  // namespace
+
+bool is_reserved(std::string_view name) {
+  const auto is = [&](std::string_view other) { return other == name; };
+  return std::ranges::any_of(keys, is) || std::ranges::any_of(forms, is) ||
+         std::ranges::any_of(functions, is, &Function::name);
+}
+
+/// Reads one text by recursive descent.
+class FormulaParser::Reader : FormulaScanner {
+ public:
+  Reader(FormulaParser& parser, const FormulaText& text, const Context& context)
+      : FormulaScanner(parser.file_, text),
+        parser_(parser),
+        graph_(parser.graph_),
+        symbols_(parser.symbols_),
+        context_(context) {
+    if (text.text.size() > longest_formula)
+      fail(0, "a formula of " + std::to_string(text.text.size()) + " characters; the limit is " +
+                  std::to_string(longest_formula));
+  }
+
+  Node whole_formula() {
+    const Node node = expression();
+    expect_end();
+    return node;
+  }
+
+  Node whole_equation() {
+    const Node left = expression();
+    expect('=', "'=' and the right-hand side");
+    const Node right = expression();
+    expect_end();
+    return located(graph_.subtract(left, right), 0);
+  }
+
+  std::vector<int> whole_loops() {
+    std::vector<int> loops;
+    do loops.push_back(loop());
+    while (take(','));
+    expect_end();
+    return loops;
+  }
+
+  Node whole_coordinate() {
+    const Node node = primary();
+    expect_end();
+    if (graph_[node].op != Op::coordinate) fail(0, "expected a coordinate, a velocity or a momentum");
+    return node;
+  }
+
+ private:
+  Node located(Node node, std::size_t offset) {
+    symbols_.places.try_emplace(node, place(offset));
+    return node;
+  }
+
+  Node expression() {
+    Node left = term();
+    for (;;) {
+      const char c = peek();
+      if (c != '+' && c != '-') return left;
+      const std::size_t place = at();
+      take(c);
+      const Node right = term();
+      left = located(c == '+' ? graph_.add(left, right) : graph_.subtract(left, right), place);
+    }
+  }
+
+  Node term() {
+    Node left = unary();
+    for (;;) {
+      const char c = peek();
+      if ((c != '*' && c != '/') || follows("**")) return left;
+      const std::size_t place = at();
+      take(c);
+      const Node right = unary();
+      left = located(c == '*' ? graph_.multiply(left, right) : graph_.divide(left, right), place);
+    }
+  }
+
+  Node unary() {
+    const Deeper deeper(*this);
+    const std::size_t place = at();
+    if (take('+')) return unary();
+    if (take('-')) return located(graph_.negative(unary()), place);
+    const Node base = primary();
+    peek();
+    const std::size_t sign = at();
+    if (!take("**") && !take('^')) return base;
+    return located(graph_.raise(base, unary()), sign);
+  }
+
+  Node primary() {
+    const char c = peek();
+    const std::size_t place = at();
+    if (number_follows()) return located(graph_.number(number()), place);
+    if (take('(')) {
+      const Node inner = expression();
+      expect(')', "')'");
+      return inner;
+    }
+    if (starts_name(c)) return located(named(place, word()), place);
+    fail_expecting("a number, a name or '('");
+  }
+
+  Node named(std::size_t place, const std::string& name) {
+    if (peek() == '(') return call(place, name);
+    if (name == "pi") return graph_.number(std::numbers::pi);
+    for (auto loop = context_.loops.rbegin(); loop != context_.loops.rend(); ++loop)
+      if (symbols_.loops[static_cast<std::size_t>(*loop)].variable == name) return graph_.loop_index(*loop);
+    if (name == "t") {
+      if (!context_.time) fail(place, "the time t may not stand in " + context_.what);
+      return graph_.time();
+    }
+    for (std::size_t i = 0; i < symbols_.parameters.size(); ++i)
+      if (symbols_.parameters[i].name == name) return parameter(place, static_cast<int>(i));
+    if (const auto found = symbols_.definitions.find(name); found != symbols_.definitions.end())
+      return definition(place, found->first, found->second);
+    if (const Node node = coordinate(place, name, Role::position); node != none) return node;
+    if (name.size() > 2 && name[1] == '_' && (name[0] == 'v' || name[0] == 'p'))
+      if (const Node node = coordinate(place, name, Role::second); node != none) return node;
+    fail(place, "unknown name '" + name + "' in " + context_.what + suggestion(name, known_names()));
+  }
+
+  Node parameter(std::size_t place, int id) {
+    const Symbols::Parameter& parameter = symbols_.parameters[static_cast<std::size_t>(id)];
+    if (!parameter.array) return graph_.parameter(id);
+    expect('[', "'[' and an index, for '" + parameter.name + "' is an array");
+    const Node index = this->index(place);
+    expect(']', "']'");
+    return located(graph_.element(id, index), place);
+  }
+
+  /// An index or bound: made of whole numbers, sizes and loop variables.
+  Node index(std::size_t place) {
+    const Node node = expression();
+    if (graph_.known(node) == Known::each_call)
+      fail(place, "an index or bound is made of numbers, sizes and loop variables only");
+    return node;
+  }
+
+  Node coordinate(std::size_t place, const std::string& name, Role role) {
+    const std::string_view base = role == Role::position ? name : std::string_view(name).substr(2);
+    const auto family = std::ranges::find(symbols_.families, base, &Symbols::Family::name);
+    if (family == symbols_.families.end()) return none;
+    if (role == Role::position && !context_.positions)
+      fail(place, "the coordinate '" + name + "' may not stand in " + context_.what);
+    if (role == Role::second && name[0] != context_.second)
+      fail(place,
+           "'" + name + "' may not stand in " + context_.what +
+               (context_.second != 0 ? std::string("; expected ") + context_.second + '_' + std::string(base)
+                                     : std::string()));
+    const int id = static_cast<int>(family - symbols_.families.begin());
+    return graph_.coordinate(id, subscript(place, name, family->loops.size()), role);
+  }
+
+  Node subscript(std::size_t place, const std::string& name, std::size_t count) {
+    if (count == 0) {
+      if (peek() == '[')
+        fail(at(), "'" + name + "' has no index; declare it with for = \"i = 1..N\" to repeat it");
+      return none;
+    }
+    expect('[', count == 1 ? "'[' and an index, for '" + name + "' is repeated"
+                           : "'[' and two indices, for '" + name + "' is repeated twice");
+    Node node = index(place);
+    if (count == 2) {
+      expect(',', "',' and the second index");
+      node = graph_.list(node, index(place));
+    }
+    expect(']', "']'");
+    return node;
+  }
+
+  Node definition(std::size_t place, const std::string& name, const FormulaText& text) {
+    std::string key = name + ' ' + context_.second + (context_.positions ? 'q' : ' ') +
+                      (context_.time ? 't' : ' ') + (context_.sums ? 's' : ' ') +
+                      (context_.reference ? 'r' : ' ');
+    for (const int loop : context_.loops) key += ' ' + std::to_string(loop);
+    const auto found = parser_.defined_.find(key);
+    if (found != parser_.defined_.end()) return found->second;
+    if (std::ranges::find(parser_.being_defined_, name) != parser_.being_defined_.end())
+      fail(place, "the definition of '" + name + "' uses itself");
+    parser_.being_defined_.push_back(name);
+    const Deeper deeper(*this);
+    const Node node = Reader(parser_, text, context_).whole_formula();
+    parser_.being_defined_.pop_back();
+    return parser_.defined_[key] = node;
+  }
+
+  Node call(std::size_t place, const std::string& name) {
+    expect('(', "'('");
+    if (name == "sum") return sum(place);
+    if (name == "rate") return rate(place);
+    if (name == "diff") return diff(place);
+    if (name == "min" || name == "max") return extreme(name == "max");
+    const auto function = std::ranges::find(functions, name, &Function::name);
+    if (function == functions.end())
+      fail(place, "unknown function '" + name + "'" + suggestion(name, function_names()));
+    if (function->reference && !context_.reference)
+      fail(place, "'" + name + "' may stand in references only, not in " + context_.what);
+    const Node a = expression();
+    Node b = none;
+    if (function->arguments == 2) {
+      expect(',', "',' and the second argument of " + name);
+      b = expression();
+    }
+    expect(')', "')'");
+    return function->op == Op::pow ? graph_.raise(a, b) : graph_.apply(function->op, a, b);
+  }
+
+  int loop() {
+    const std::size_t place = at();
+    const std::string variable = word();
+    if (!is_name(variable) || is_reserved(variable)) fail(place, "expected a loop variable, as in i = 1..N");
+    expect('=', "'=' and a range, as in i = 1..N");
+    const Node first = index(place);
+    if (!take("..")) fail_expecting("'..' and the last value, as in i = 1..N");
+    const Node last = index(place);
+    symbols_.loops.push_back({variable, first, last});
+    const int id = static_cast<int>(symbols_.loops.size()) - 1;
+    context_.loops.push_back(id);
+    return id;
+  }
+
+  /// Whether "name =" follows: one more loop of a sum.
+  bool loop_follows() {
+    const std::size_t here = at();
+    const std::string name = word();
+    const bool is_loop = !name.empty() && peek() == '=';
+    back_to(here);
+    return is_loop;
+  }
+
+  Node sum(std::size_t place) {
+    if (!context_.sums) fail(place, "a sum may not stand in " + context_.what);
+    const std::vector<int> outside = context_.loops;
+    std::vector<int> loops;
+    do {
+      loops.push_back(loop());
+      expect(',', "',' and what is summed");
+    } while (loop_follows());
+    Node node = expression();
+    expect(')', "')'");
+    context_.loops = outside;
+    for (auto id = loops.rbegin(); id != loops.rend(); ++id) node = located(graph_.sum(node, *id), place);
+    return node;
+  }
+
+  Node rate(std::size_t place) {
+    if (context_.second != 'v')
+      fail(place, "rate(f) needs velocities, and there are none in " + context_.what);
+    const Node f = expression();
+    expect(')', "')'");
+    require_no_sum(f, place, "rate");
+    return parser_.rate(f);
+  }
+
+  Node diff(std::size_t place) {
+    const Node f = expression();
+    expect(',', "',' and a coordinate");
+    const std::size_t symbol_place = at();
+    const Node symbol = primary();
+    expect(')', "')'");
+    if (graph_[symbol].op != Op::coordinate && graph_[symbol].op != Op::time)
+      fail(symbol_place, "diff(f, x) takes a coordinate, a velocity or t as its second argument");
+    require_no_sum(f, place, "diff");
+    return graph_.derivative(f, symbol);
+  }
+
+  void require_no_sum(Node f, std::size_t place, const char* form) const {
+    for (const Node node : graph_.reachable(std::span(&f, 1)))
+      if (graph_[node].op == Op::sum || graph_[node].op >= Op::kepler_E)
+        fail(place, std::string(form) + " cannot take a sum or a reference function");
+  }
+
+  /// max(a,b) = (a + b + |a−b|)/2, so that it has derivatives.
+  Node extreme(bool largest) {
+    const Node a = expression();
+    expect(',', "',' and the second argument");
+    const Node b = expression();
+    expect(')', "')'");
+    const Node distance = graph_.apply(Op::abs, graph_.subtract(a, b)), both = graph_.add(a, b);
+    return graph_.multiply(graph_.number(0.5),
+                           largest ? graph_.add(both, distance) : graph_.subtract(both, distance));
+  }
+
+  std::vector<std::string> known_names() const {
+    std::vector<std::string> names{"pi"};
+    if (context_.time) names.emplace_back("t");
+    for (const auto& family : symbols_.families) {
+      if (context_.positions) names.push_back(family.name);
+      if (context_.second != 0) names.push_back(std::string(1, context_.second) + '_' + family.name);
+    }
+    for (const auto& parameter : symbols_.parameters) names.push_back(parameter.name);
+    for (const auto& [name, text] : symbols_.definitions) names.push_back(name);
+    for (const int loop : context_.loops)
+      names.push_back(symbols_.loops[static_cast<std::size_t>(loop)].variable);
+    return names;
+  }
+
+  std::vector<std::string> function_names() const {
+    std::vector<std::string> names(forms.begin(), forms.end());
+    for (const Function& function : functions)
+      if (!function.reference || context_.reference) names.emplace_back(function.name);
+    return names;
+  }
+
+  /// Counts how deep the recursion is, so that no text can exhaust the stack.
+  struct Deeper {
+    explicit Deeper(Reader& r) : reader(r) {
+      if (++reader.parser_.depth_ > deepest_nesting)
+        reader.fail(reader.at(), "nested deeper than " + std::to_string(deepest_nesting) + " levels");
+    }
+    ~Deeper() { --reader.parser_.depth_; }
+    Deeper(const Deeper&) = delete;
+    Deeper& operator=(const Deeper&) = delete;
+    Reader& reader;
+  };
+
+  FormulaParser& parser_;
+  FormulaGraph& graph_;
+  Symbols& symbols_;
+  Context context_;
+};
+
+Node FormulaParser::formula(const FormulaText& text, const Context& context) {
+  return Reader(*this, text, context).whole_formula();
+}
+
+Node FormulaParser::equation(const FormulaText& text, const Context& context) {
+  return Reader(*this, text, context).whole_equation();
+}
+
+std::vector<int> FormulaParser::loops(const FormulaText& text, Context context) {
+  return Reader(*this, text, context).whole_loops();
+}
+
+Node FormulaParser::coordinate(const FormulaText& text, const Context& context) {
+  return Reader(*this, text, context).whole_coordinate();
+}
+
+Node FormulaParser::rate(Node f) {
+  Node rate = graph_.derivative(f, graph_.time());
+  for (const Node node : graph_.reachable(std::span(&f, 1))) {
+    const NodeData leaf = graph_[node];
+    if (leaf.op != Op::coordinate || leaf.c != static_cast<int>(Role::position)) continue;
+    const Node velocity = graph_.coordinate(leaf.a, leaf.b, Role::second);
+    rate = graph_.add(rate, graph_.multiply(graph_.derivative(f, node), velocity));
+  }
+  return rate;
+}
+
+}  // namespace diracstep::scene_compiler

@@ -1,0 +1,87 @@
+#pragma once
+
+#include <diracstep/scene_format/compiler/formula_graph.hpp>
+#include <diracstep/scene_format/compiler/formula_scanner.hpp>
+#include <map>
+#include <string>
+#include <string_view>
+#include <unordered_map>
+#include <utility>
+#include <vector>
+
+namespace diracstep::scene_compiler {
+
+/// A loop variable and its range.
+struct Loop {
+  std::string variable;
+  Node first = none;
+  Node last = none;
+};
+
+/// What the names in a formula may stand for.
+struct Symbols {
+  struct Family {
+    std::string name;
+    std::vector<int> loops = {};  ///< of a repeated coordinate
+    bool cyclic = false;          ///< its index wraps around
+  };
+  struct Parameter {
+    std::string name;
+    bool array = false;
+  };
+  std::vector<Family> families;
+  std::vector<Parameter> parameters;  ///< sizes first
+  std::map<std::string, FormulaText, std::less<>> definitions;
+  std::vector<Loop> loops;
+
+  /// Where the nodes that came straight from the file stand there.
+  std::unordered_map<Node, Place> places;
+};
+
+/// What a formula may contain, by the place where it stands.
+struct Context {
+  std::string what;        ///< "the Lagrangian", for messages
+  bool positions = false;  ///< coordinates
+  char second = 0;         ///< 'v' or 'p': velocities or momenta
+  bool time = false;
+  bool sums = false;
+  bool reference = false;       ///< Kepler's and Jacobi's functions
+  std::vector<int> loops = {};  ///< loop variables in force
+};
+
+/// Reads formulas into a graph.  The grammar is arithmetic and a fixed list of functions, nothing else: a
+/// formula cannot name a file, call a program or define anything.
+class FormulaParser {
+ public:
+  static constexpr std::size_t longest_formula = 100'000;  ///< characters
+  static constexpr int deepest_nesting = 150;
+
+  FormulaParser(std::string file, FormulaGraph& graph, Symbols& symbols)
+      : file_(std::move(file)), graph_(graph), symbols_(symbols) {}
+
+  Node formula(const FormulaText& text, const Context& context);
+  /// Left side minus right side of "a = b".
+  Node equation(const FormulaText& text, const Context& context);
+  /// "i = 1..N, j = 1..i-1": adds the loops to the symbols and returns their numbers.
+  std::vector<int> loops(const FormulaText& text, Context context);
+  /// A coordinate, velocity or momentum: "x", "v_x[N]".
+  Node coordinate(const FormulaText& text, const Context& context);
+
+  /// df/dt = Σ ∂f/∂q v + ∂f/∂t.
+  Node rate(Node f);
+  const std::string& file() const { return file_; }
+
+ private:
+  class Reader;
+  std::string file_;
+  FormulaGraph& graph_;
+  Symbols& symbols_;
+  std::map<std::string, Node> defined_;  ///< definitions by name and context
+  std::vector<std::string> being_defined_;
+  int depth_ = 0;
+};
+
+/// Names that a file may not give to anything of its own.
+bool is_reserved(std::string_view name);
+
+}  // namespace diracstep::scene_compiler

@@ -1,0 +1,295 @@
+#include <fmt/format.h>
+
+#include <cstdint>
+#include <diracstep/scene_format/compiler/kernel.hpp>
+#include <diracstep/scene_format/compiler/operations.hpp>
+#include <set>
+
+namespace diracstep::scene_compiler {
+
+int Constants::add(Node node) {
+  const auto [found, added] = numbers_.try_emplace(node, static_cast<int>(nodes_.size()));
+  if (added) nodes_.push_back(node);
+  return found->second;
+}
+
+Kernel::Kernel(FormulaGraph& graph, std::vector<Store> stores, const PieceLayout& layout, Constants& known,
+               Constants& instance)
+    : width_(layout.width()) {
+  std::vector<Node> roots;
+  for (const Store& store : stores)
+    if (!graph.is_number(store.value, 0.0)) {
+      stores_.push_back(store);
+      roots.push_back(store.value);
+    }
+  // Of what is known beforehand only the roots and the arguments of computed nodes are read here.
+  std::set<Node> needed(roots.begin(), roots.end());
+  const std::vector<Node> nodes = graph.reachable(roots);
+  for (const Node node : nodes) {
+    const NodeData& data = graph[node];
+    if (graph.known(node) != Known::each_call) continue;
+    if (arity(data.op) >= 1) needed.insert(data.a);
+    if (arity(data.op) == 2) needed.insert(data.b);
+  }
+  std::unordered_map<Node, int> number;
+  for (const Node node : nodes) {
+    if (!needed.contains(node)) continue;
+    NodeData data = graph[node];
+    From from = From::computed;
+    if (data.op == Op::number) {
+      from = From::literal;
+    } else if (graph.known(node) != Known::each_call) {
+      const bool once = graph.known(node) == Known::once;
+      from = once ? From::known : From::instance;
+      data.a = (once ? known : instance).add(node);
+    } else if (data.op == Op::coordinate) {
+      from = From::coordinate;
+      data.a = layout.slots.at(graph.coordinate(data.a, data.b, Role::position));
+    } else if (data.op == Op::multiplier) {
+      from = From::multiplier;
+      data.a += layout.slot_count;
+    } else if (data.op == Op::time) {
+      from = From::time;
+    } else if (data.op == Op::scale) {
+      from = From::scale;
+    } else {
+      data.a = number.at(data.a);
+      if (arity(data.op) == 2) data.b = number.at(data.b);
+    }
+    number[node] = static_cast<int>(code_.size());
+    code_.push_back({from, data});
+  }
+  for (Store& store : stores_) store.value = number.at(store.value);
+}
+
+void Kernel::run(const KernelCall& call, int instance_width, int position_width) const {
+  thread_local std::vector<double> values;
+  values.resize(std::max(values.size(), code_.size()));
+  for (long i = 0; i < call.count; ++i) {
+    const int* const slots = call.slots + i * width_;
+    const int* const positions = call.positions + i * position_width;
+    const double* const instance = call.instance + i * instance_width;
+    for (std::size_t k = 0; k < code_.size(); ++k) {
+      const NodeData& data = code_[k].data;
+      const auto value = [&](int a) { return values[static_cast<std::size_t>(a)]; };
+      switch (code_[k].from) {
+        case From::literal:
+          values[k] = data.value;
+          break;
+        case From::known:
+          values[k] = call.known[data.a];
+          break;
+        case From::instance:
+          values[k] = instance[data.a];
+          break;
+        case From::coordinate:
+          values[k] = call.in[data.c][slots[data.a]];
+          break;
+        case From::multiplier:
+          values[k] = call.multipliers[slots[data.a]];
+          break;
+        case From::time:
+          values[k] = call.t;
+          break;
+        case From::scale:
+          values[k] = call.s;
+          break;
+        case From::computed:
+          values[k] = computed(data, value(data.a), arity(data.op) == 2 ? value(data.b) : 0.0);
+          break;
+      }
+    }
+    for (const Store& store : stores_) {
+      const int at = store.table == Store::Table::fixed   ? store.entry
+                     : store.table == Store::Table::slots ? slots[store.entry]
+                                                          : positions[store.entry];
+      call.out[store.column][at] += values[static_cast<std::size_t>(store.value)];
+    }
+  }
+}
+
+namespace {
+
+std::string literal(double value) {
+  std::string text = fmt::format("{:.17g}", value);
+  if (text.find_first_of(".en") == std::string::npos) text += ".0";
+  return value < 0.0 ? '(' + text + ')' : text;
+}
+
+const char* function_name(Op op) {
+  switch (op) {
+    case Op::pow:
+      return "pow";
+    case Op::sqrt:
+      return "sqrt";
+    case Op::sin:
+      return "sin";
+    case Op::cos:
+      return "cos";
+    case Op::tan:
+      return "tan";
+    case Op::asin:
+      return "asin";
+    case Op::acos:
+      return "acos";
+    case Op::atan:
+      return "atan";
+    case Op::atan2:
+      return "atan2";
+    case Op::sinh:
+      return "sinh";
+    case Op::cosh:
+      return "cosh";
+    case Op::tanh:
+      return "tanh";
+    case Op::asinh:
+      return "asinh";
+    case Op::acosh:
+      return "acosh";
+    case Op::atanh:
+      return "atanh";
+    case Op::exp:
+      return "exp";
+    case Op::log:
+      return "log";
+    case Op::abs:
+      return "fabs";
+    case Op::sign:
+      return "diracstep_sign";
+    default:
+      return nullptr;
+  }
+}
+
+/// x to the power n with the multiplications of whole_power.
+std::string power_text(const std::string& x, int exponent) {
+  std::string result, square = x;
+  for (; exponent > 0; exponent /= 2, square = '(' + square + " * " + square + ')')
+    if (exponent % 2 == 1) result = result.empty() ? square : '(' + result + " * " + square + ')';
+  return result;
+}
+
+}  // namespace
+
+std::string Kernel::expression(const Instruction& instruction) const {
+  const NodeData& data = instruction.data;
+  const std::string a = fmt::format("r{}", data.a), b = fmt::format("r{}", data.b);
+  switch (instruction.from) {
+    case From::literal:
+      return literal(data.value);
+    case From::known:
+      return fmt::format("known[{}]", data.a);
+    case From::instance:
+      return fmt::format("instance[{}]", data.a);
+    case From::coordinate:
+      return fmt::format("in{}[slots[{}]]", data.c, data.a);
+    case From::multiplier:
+      return fmt::format("multipliers[slots[{}]]", data.a);
+    case From::time:
+      return "call->t";
+    case From::scale:
+      return "call->s";
+    case From::computed:
+      break;
+  }
+  switch (data.op) {
+    case Op::negative:
+      return '-' + a;
+    case Op::add:
+      return a + " + " + b;
+    case Op::subtract:
+      return a + " - " + b;
+    case Op::multiply:
+      return a + " * " + b;
+    case Op::divide:
+      return a + " / " + b;
+    case Op::power:
+      return power_text(a, data.c);
+    default:
+      break;
+  }
+  return arity(data.op) == 2 ? fmt::format("{}({}, {})", function_name(data.op), a, b)
+                             : fmt::format("{}({})", function_name(data.op), a);
+}
+
+std::string Kernel::source(const std::string& name, int instance_width, int position_width) const {
+  std::set<std::string> pointers, tables;  // those that are used: no compiler shall warn
+  std::string body;
+  for (std::size_t k = 0; k < code_.size(); ++k) {
+    const From from = code_[k].from;
+    body += fmt::format("    const double r{} = {};\n", k, expression(code_[k]));
+    if (from == From::known) pointers.insert("const double* const known = call->known;");
+    if (from == From::instance)
+      tables.insert(fmt::format("const double* const instance = call->instance + i * {};", instance_width));
+    if (from == From::multiplier) pointers.insert("const double* const multipliers = call->multipliers;");
+    if (from == From::coordinate)
+      pointers.insert(fmt::format("const double* const in{0} = call->in[{0}];", code_[k].data.c));
+    if (from == From::coordinate || from == From::multiplier)
+      tables.insert(fmt::format("const int* const slots = call->slots + i * {};", width_));
+  }
+  for (const Store& store : stores_) {
+    pointers.insert(fmt::format("double* const DIRACSTEP_RESTRICT out{0} = call->out[{0}];", store.column));
+    const bool in_slots = store.table == Store::Table::slots;
+    if (store.table == Store::Table::fixed) {
+      body += fmt::format("    out{}[{}] += r{};\n", store.column, store.entry, store.value);
+      continue;
+    }
+    if (in_slots)
+      tables.insert(fmt::format("const int* const slots = call->slots + i * {};", width_));
+    else
+      tables.insert(fmt::format("const int* const positions = call->positions + i * {};", position_width));
+    body += fmt::format("    out{}[{}[{}]] += r{};\n", store.column, in_slots ? "slots" : "positions",
+                        store.entry, store.value);
+  }
+  std::string text = fmt::format(
+      "static void {}(const void* data) {{\n  const diracstep_call* const call = (const "
+      "diracstep_call*)data;\n",
+      name);
+  for (const auto& pointer : pointers) text += "  " + pointer + '\n';
+  text += "  for (long i = 0; i < call->count; ++i) {\n";
+  for (const auto& table : tables) text += "    " + table + '\n';
+  return text + body + "  }\n}\n";
+}
+
+const std::string& kernel_prelude() {
+  static const std::string text = R"(/* Written by DiracStep from a scene file: valid C and C++. */
+#include <math.h>
+#if defined(__GNUC__)
+#define DIRACSTEP_RESTRICT __restrict__
+#else
+#define DIRACSTEP_RESTRICT
+#endif
+#ifdef __cplusplus
+#define DIRACSTEP_PUBLIC extern "C"
+#else
+#define DIRACSTEP_PUBLIC
+#endif
+typedef struct {
+  long count;
+  const int* slots;
+  const int* positions;
+  const double* known;
+  const double* instance;
+  const double* in[3];
+  const double* multipliers;
+  double* out[3];
+  double t, s;
+} diracstep_call;
+typedef void (*diracstep_kernel)(const void*);
+static inline double diracstep_sign(double x) { return x > 0.0 ? 1.0 : x < 0.0 ? -1.0 : 0.0; }
+)";
+  return text;
+}
+
+std::string content_name(const std::string& text) {
+  std::uint64_t first = 14695981039346656037u, second = 0x9e3779b97f4a7c15u;
+  for (const char c : text) {
+    const auto byte = static_cast<std::uint64_t>(static_cast<unsigned char>(c));
+    first = (first ^ byte) * 1099511628211u;
+    second = (second + byte) * 0xff51afd7ed558ccdu;
+    second ^= second >> 31;
+  }
+  return fmt::format("{:016x}{:016x}", first, second);
+}
+
+}  // namespace diracstep::scene_compiler

@@ -1,0 +1,307 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <diracstep/scene_format/compiler/scene_document.hpp>
+#include <diracstep/scene_format/compiler/table_reader.hpp>
+#include <initializer_list>
+#include <set>
+
+namespace diracstep::scene_compiler {
+
+bool Limits::allow(double value) const {
+  return std::isfinite(value) && (!min || value >= *min) && (!max || value <= *max) &&
+         (!above || value > *above) && (!below || value < *below);
+}
+
+std::string Limits::text() const {
+  const bool low = min || above, high = max || below;
+  const double least = min ? *min : above.value_or(0.0), most = max ? *max : below.value_or(0.0);
+  if (low && high) return fmt::format("in {}{:g}, {:g}{}", min ? '[' : '(', least, most, max ? ']' : ')');
+  if (low) return fmt::format("{} {:g}", min ? "at least" : "above", least);
+  if (high) return fmt::format("{} {:g}", max ? "at most" : "below", most);
+  return "finite";
+}
+
+namespace {
+
+class DocumentReader : TableReader {
+ public:
+  DocumentReader(const std::string& file, const std::string& text) : TableReader(file, text) {
+    document_.file = file;
+  }
+
+  SceneDocument read(const toml::table& root) {
+    check_keys(root, "the scene",
+               {"name",        "class",       "description", "source",   "needs",          "lagrangian",
+                "hamiltonian", "dissipation", "coordinates", "sizes",    "parameters",     "definitions",
+                "rows",        "force",       "start",       "span",     "reference",      "invariants",
+                "recommended", "inductor",    "capacitor",   "resistor", "source_voltage", "mutual"});
+    read_head(root);
+    read_parameters(root, "sizes", true);
+    read_parameters(root, "parameters", false);
+    read_coordinates(root);
+    read_circuit(root);
+    for (const Item& item : items(root, "definitions")) {
+      require_new_name(item.key, item.place);
+      document_.definitions.emplace(item.key, formula(*item.node, item.key));
+    }
+    read_rows(root);
+    for (const Item& item : items(root, "force")) document_.force.push_back(entry(item));
+    read_start(root);
+    read_span(root);
+    read_references(root);
+    read_invariants(root);
+    read_recommended(root);
+    return std::move(document_);
+  }
+
+ private:
+  SceneDocument::Entry entry(const Item& item) const {
+    SceneDocument::Entry entry{{item.key, item.place}, {}, item.node->is_array()};
+    if (entry.array)
+      for (const auto& element : *item.node->as_array()) entry.values.push_back(formula(element, item.key));
+    else
+      entry.values.push_back(formula(*item.node, item.key));
+    return entry;
+  }
+
+  void require_new_name(const std::string& name, Place place) {
+    if (!is_name(name))
+      fail(place,
+           fmt::format("'{}' is no name: expected a letter, then at most 63 letters, digits and _", name));
+    if (is_reserved(name))
+      fail(place, fmt::format("the name '{}' is taken by the format; choose another", name));
+    if (!names_.insert(name).second) fail(place, fmt::format("the name '{}' is used twice", name));
+  }
+
+  void read_head(const toml::table& root) {
+    document_.name = required_string(root, "name", "a scene");
+    if (!is_name(document_.name))
+      fail(place_of(root.get("name")->source()),
+           fmt::format("name = \"{}\": expected letters, digits and _ only", document_.name));
+    document_.kind = string(root, "class");
+    document_.description = string(root, "description");
+    document_.source = string(root, "source");
+    document_.needs = string(root, "needs");
+    document_.lagrangian = optional_formula(root, "lagrangian");
+    document_.hamiltonian = optional_formula(root, "hamiltonian");
+    document_.dissipation = optional_formula(root, "dissipation");
+  }
+
+  Limits limits(const toml::table& table) const {
+    return {number(table, "min"), number(table, "max"), number(table, "above"), number(table, "below")};
+  }
+
+  void read_parameters(const toml::table& root, const char* key, bool sizes) {
+    for (const Item& item : items(root, key)) {
+      require_new_name(item.key, item.place);
+      SceneDocument::Parameter parameter;
+      parameter.name = item.key;
+      parameter.size = sizes;
+      parameter.place = item.place;
+      const toml::node* value = item.node;
+      if (item.node->is_table()) {
+        const toml::table& entry = *item.node->as_table();
+        check_keys(entry, "'" + item.key + "'", {"value", "unit", "meaning", "min", "max", "above", "below"});
+        value = entry.get("value");
+        if (value == nullptr) fail(item.place, fmt::format("'{}' needs 'value'", item.key));
+        parameter.unit = string(entry, "unit");
+        parameter.meaning = string(entry, "meaning");
+        parameter.limits = limits(entry);
+      }
+      parameter.array = value->is_array();
+      if (parameter.array && sizes)
+        fail(item.place, fmt::format("the size '{}' must be one number", item.key));
+      if (parameter.array)
+        for (const auto& element : *value->as_array()) parameter.values.push_back(number(element, item.key));
+      else
+        parameter.values.push_back(number(*value, item.key));
+      for (const double one : parameter.values)
+        if (!parameter.limits.allow(one) || (sizes && one != std::floor(one)))
+          fail(place_of(value->source()),
+               fmt::format("'{}' = {:g}; it must be {}{}", item.key, one, sizes ? "a whole number " : "",
+                           parameter.limits.text()));
+      document_.parameters.push_back(std::move(parameter));
+    }
+  }
+
+  void add_coordinate(SceneDocument::Coordinate coordinate) {
+    require_new_name(coordinate.name, coordinate.place);
+    for (const char* prefix : {"v_", "p_"})
+      if (!names_.insert(prefix + coordinate.name).second)
+        fail(coordinate.place,
+             fmt::format("'{}{}' is the velocity or momentum of '{}' and cannot name anything else", prefix,
+                         coordinate.name, coordinate.name));
+    document_.coordinates.push_back(std::move(coordinate));
+  }
+
+  void read_coordinates(const toml::table& root) {
+    for (const Item& item : items(root, "coordinates")) {
+      const toml::table& entry = table(item, "x = { unit = \"m\", meaning = \"…\" }");
+      check_keys(entry, "coordinate '" + item.key + "'", {"unit", "meaning", "for", "cyclic"});
+      SceneDocument::Coordinate coordinate;
+      coordinate.name = item.key;
+      coordinate.place = item.place;
+      coordinate.unit = string(entry, "unit");
+      coordinate.meaning = string(entry, "meaning");
+      coordinate.loops = optional_formula(entry, "for");
+      coordinate.cyclic = flag(entry, "cyclic");
+      if (coordinate.cyclic && !coordinate.loops) fail(item.place, "cyclic = true needs for = \"i = 1..N\"");
+      add_coordinate(std::move(coordinate));
+    }
+  }
+
+  /// Branches become coordinates qNAME, the charge that has passed from the first node to the second.
+  void read_circuit(const toml::table& root) {
+    for (const char* kind : {"inductor", "capacitor", "resistor", "source_voltage"})
+      for (const toml::table* branch : tables(root, kind)) read_branch(*branch, kind);
+    std::ranges::stable_sort(document_.branches, [](const auto& a, const auto& b) {
+      return std::pair(a.place.line, a.place.column) < std::pair(b.place.line, b.place.column);
+    });
+    for (const auto& branch : document_.branches)
+      add_coordinate({"q" + branch.name,
+                      "C",
+                      "charge through " + branch.kind + ' ' + branch.name,
+                      {},
+                      false,
+                      branch.place});
+    for (const toml::table* mutual : tables(root, "mutual")) {
+      check_keys(*mutual, "[[mutual]]", {"between", "value"});
+      const auto [first, second] = two_names(*mutual, "between");
+      document_.mutuals.push_back(
+          {first, second, required_formula(*mutual, "value", "[[mutual]]"), place_of(mutual->source())});
+    }
+  }
+
+  void read_branch(const toml::table& branch, const std::string& kind) {
+    const std::string what = "[[" + kind + "]]";
+    check_keys(branch, what, {"name", "nodes", "value"});
+    const auto [from, to] = two_names(branch, "nodes");
+    if (from == to) fail(place_of(branch.source()), what + " joins a node to itself");
+    document_.branches.push_back({kind, required_string(branch, "name", what), from, to,
+                                  required_formula(branch, "value", what), place_of(branch.source())});
+  }
+
+  std::pair<std::string, std::string> two_names(const toml::table& table, const char* key) const {
+    const toml::node* node = table.get(key);
+    const toml::array* array = node == nullptr ? nullptr : node->as_array();
+    if (array == nullptr || array->size() != 2 || !(*array)[0].is_string() || !(*array)[1].is_string())
+      fail(place_of(table.source()), fmt::format("expected {} = [\"a\", \"b\"]", key));
+    return {(*array)[0].as_string()->get(), (*array)[1].as_string()->get()};
+  }
+
+  void read_rows(const toml::table& root) {
+    for (const toml::table* row : tables(root, "rows")) {
+      check_keys(*row, "[[rows]]", {"name", "equation", "for"});
+      const Place place = place_of(row->source());
+      const std::string name = string(*row, "name", fmt::format("row{}", document_.rows.size() + 1));
+      if (!is_name(name)) fail(place, fmt::format("'{}' is no name for a row", name));
+      for (const auto& other : document_.rows)
+        if (other.name == name) fail(place, fmt::format("two rows are named '{}'", name));
+      document_.rows.push_back(
+          {name, required_formula(*row, "equation", "[[rows]]"), optional_formula(*row, "for"), place});
+    }
+  }
+
+  void read_start(const toml::table& root) {
+    for (const Item& item : items(root, "start")) {
+      if (item.key == "project")
+        document_.project = flag(*root["start"].as_table(), "project");
+      else if (item.key == "t")
+        document_.start_time = formula(*item.node, "t");
+      else
+        document_.start.push_back(entry(item));
+    }
+  }
+
+  void read_span(const toml::table& root) {
+    const toml::node* node = root.get("span");
+    if (node == nullptr || !node->is_table())
+      fail(place_of(root.source()), "a scene needs a table [span] with 'end' and 'step'");
+    const toml::table& span = *node->as_table();
+    check_keys(span, "[span]", {"end", "step", "study_end"});
+    const auto end = number(span, "end"), step = number(span, "step");
+    if (!end || !step) fail(place_of(span.source()), "[span] needs 'end' and 'step'");
+    if (!(*step > 0.0)) fail(place_of(span.get("step")->source()), "'step': expected a number above 0");
+    document_.t_end = *end;
+    document_.step = *step;
+    document_.study_end = number(span, "study_end").value_or(*end);
+  }
+
+  void read_references(const toml::table& root) {
+    for (const toml::table* table : tables(root, "reference")) {
+      SceneDocument::Reference reference{required_string(*table, "kind", "[[reference]]"),
+                                         string(*table, "how"),
+                                         0.0,
+                                         number(*table, "t"),
+                                         {},
+                                         {},
+                                         place_of(table->source())};
+      if (reference.kind != "exact" && reference.kind != "published" && reference.kind != "own")
+        fail(place_of(table->get("kind")->source()), "'kind': expected \"exact\", \"published\" or \"own\"");
+      reference.digits = number(*table, "digits").value_or(0.0);
+      if (!(reference.digits > 0.0)) fail(reference.place, "[[reference]] needs 'digits', above 0");
+      for (const Item& item : in_file_order(*table)) {
+        if (item.key == "with")
+          for (const Item& parameter : in_file_order(this->table(item, "with = { k = 1e4 }")))
+            reference.with[parameter.key] = number(*parameter.node, parameter.key);
+        else if (item.key != "kind" && item.key != "how" && item.key != "digits" && item.key != "t")
+          reference.entries.push_back(entry(item));
+      }
+      if (reference.entries.empty()) fail(reference.place, "[[reference]] holds no value");
+      document_.references.push_back(std::move(reference));
+    }
+  }
+
+  void read_invariants(const toml::table& root) {
+    for (const Item& item : items(root, "invariants")) {
+      if (!item.node->is_table()) {
+        document_.invariants.push_back({item.key, formula(*item.node, item.key), {}});
+        continue;
+      }
+      const toml::table& entry = *item.node->as_table();
+      check_keys(entry, "invariant '" + item.key + "'", {"formula", "value"});
+      document_.invariants.push_back({item.key,
+                                      required_formula(entry, "formula", "invariant '" + item.key + "'"),
+                                      number(entry, "value")});
+    }
+  }
+
+  void read_recommended(const toml::table& root) {
+    const toml::node* node = root.get("recommended");
+    if (node == nullptr) return;
+    if (!node->is_table()) fail(place_of(node->source()), "expected a table [recommended]");
+    const toml::table& table = *node->as_table();
+    check_keys(table, "[recommended]", {"method", "order", "step", "end", "tolerance"});
+    SceneDocument::Recommended& recommended = document_.recommended;
+    recommended.method = string(table, "method", recommended.method);
+    const double order = number(table, "order").value_or(0.0);
+    recommended.step = number(table, "step").value_or(0.0);
+    recommended.end = number(table, "end").value_or(0.0);
+    recommended.tolerance = number(table, "tolerance").value_or(0.0);
+    if (recommended.step < 0.0 || recommended.tolerance < 0.0 || !(order >= 0.0 && order <= 64.0))
+      fail(place_of(table.source()),
+           "[recommended]: expected an order in [1, 64], or 0 for the method's own, a step and a tolerance "
+           "above 0");
+    recommended.order = static_cast<int>(order);
+  }
+
+  SceneDocument document_;
+  std::set<std::string> names_;
+};
+
+}  // namespace
+
+SceneDocument read_document(const std::string& file, const std::string& text) {
+  if (text.size() > largest_file)
+    throw SceneError(file, {}, fmt::format("{} bytes; the limit is {}", text.size(), largest_file));
+  try {
+    const toml::table root = toml::parse(std::string_view(text), std::string_view(file));
+    return DocumentReader(file, text).read(root);
+  } catch (const toml::parse_error& error) {
+    throw SceneError(file, place_of(error.source()), std::string(error.description()));
+  }
+}
+
+}  // namespace diracstep::scene_compiler

@@ -1,0 +1,107 @@
+#pragma once
+
+#include <diracstep/scene_format/compiler/formula_parser.hpp>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace diracstep::scene_compiler {
+
+/// Values a parameter may take.
+struct Limits {
+  std::optional<double> min, max;      ///< allowed themselves
+  std::optional<double> above, below;  ///< not allowed themselves
+
+  bool allow(double value) const;
+  std::string text() const;  ///< "above 0", "in [0, 1)"
+};
+
+/// A scene file as data: every formula still a text, with the place where it stands.
+struct SceneDocument {
+  struct Coordinate {
+    std::string name;
+    std::string unit, meaning;
+    std::optional<FormulaText> loops;  ///< "i = 1..N" of a repeated coordinate
+    bool cyclic = false;
+    Place place = {};
+  };
+  struct Parameter {
+    std::string name;
+    std::string unit, meaning;
+    std::vector<double> values;  ///< one, or those of an array
+    bool array = false;
+    bool size = false;  ///< a whole number that sets how much of the scene there is
+    Limits limits;
+    Place place = {};
+  };
+  struct Row {
+    std::string name;
+    FormulaText equation;
+    std::optional<FormulaText> loops;
+    Place place;
+  };
+  /// "x = …", "v_x = […]": a value, or one for each element of a repeated coordinate.
+  struct Entry {
+    FormulaText key;
+    std::vector<FormulaText> values;
+    bool array = false;
+  };
+  struct Reference {
+    std::string kind, how;
+    double digits = 0.0;
+    std::optional<double> t;             ///< none: a closed form for every t
+    std::map<std::string, double> with;  ///< parameters it holds for, where they are not the file's own
+    std::vector<Entry> entries;
+    Place place;
+  };
+  struct Invariant {
+    std::string name;
+    FormulaText formula;
+    std::optional<double> value;
+  };
+  /// A branch of a circuit between two nodes.
+  struct Branch {
+    std::string kind;  ///< "inductor", "capacitor", "resistor", "source"
+    std::string name;
+    std::string from, to;
+    FormulaText value;
+    Place place;
+  };
+  struct Mutual {
+    std::string first, second;  ///< names of inductors
+    FormulaText value;
+    Place place;
+  };
+  struct Recommended {
+    std::string method = "type1/midpoint";
+    int order = 0;           ///< 0: the method's own
+    double step = 0.0;       ///< 0: the span's
+    double end = 0.0;        ///< 0: the last reference
+    double tolerance = 0.0;  ///< relative error in q and v that this reaches; 0: none stated
+  };
+
+  std::string file;  ///< its name, for messages
+  std::string name, kind, description, source, needs;
+  std::optional<FormulaText> lagrangian, hamiltonian, dissipation;
+  std::vector<Coordinate> coordinates;
+  std::vector<Parameter> parameters;  ///< sizes first
+  std::map<std::string, FormulaText, std::less<>> definitions;
+  std::vector<Row> rows;
+  std::vector<Entry> force, start;
+  std::optional<FormulaText> start_time;
+  bool project = false;
+  double t_end = 0.0, step = 0.0, study_end = 0.0;
+  std::vector<Reference> references;
+  std::vector<Invariant> invariants;
+  std::vector<Branch> branches;
+  std::vector<Mutual> mutuals;
+  Recommended recommended;
+};
+
+inline constexpr std::size_t largest_file = 16'000'000;  ///< bytes
+
+/// Reads the text of a scene file.  Throws SceneError.
+SceneDocument read_document(const std::string& file, const std::string& text);
+
+}  // namespace diracstep::scene_compiler

@@ -1,0 +1,392 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <diracstep/scene_format/compiler/circuit_formulas.hpp>
+#include <diracstep/scene_format/compiler/piece_builder.hpp>
+#include <diracstep/scene_format/compiler/scene_program.hpp>
+#include <diracstep/scene_format/compiler/sum_terms.hpp>
+#include <stdexcept>
+
+namespace diracstep::scene_compiler {
+
+namespace {
+
+bool is_velocity(const NodeData& data) {
+  return data.op == Op::coordinate && data.c == static_cast<int>(Role::second);
+}
+
+class SceneCompiler {
+ public:
+  explicit SceneCompiler(SceneProgram& program)
+      : program_(program),
+        document_(program.document),
+        graph_(program.graph),
+        symbols_(program.symbols),
+        parser_(document_.file, graph_, symbols_),
+        terms_(document_.file, graph_, symbols_),
+        circuit_(document_, graph_, symbols_, parser_),
+        builder_(graph_, program.known) {}
+
+  void compile() {
+    declare();
+    compile_energies();
+    compile_rows();
+    compile_force();
+    compile_start();
+    compile_references();
+    compile_invariants();
+    write_source();
+  }
+
+ private:
+  [[noreturn]] void fail(Place place, const std::string& message) const {
+    throw SceneError(document_.file, place, message);
+  }
+
+  Context mechanics(const std::string& what, char second, std::vector<int> loops = {}) const {
+    return {.what = what,
+            .positions = true,
+            .second = second,
+            .time = true,
+            .sums = true,
+            .loops = std::move(loops)};
+  }
+
+  void declare() {
+    if (document_.coordinates.empty()) fail({}, "the scene has no [coordinates]");
+    for (const auto& parameter : document_.parameters)
+      symbols_.parameters.push_back({parameter.name, parameter.array});
+    symbols_.definitions = document_.definitions;
+    for (const auto& coordinate : document_.coordinates) {
+      Symbols::Family family{coordinate.name, {}, coordinate.cyclic};
+      if (coordinate.loops)
+        family.loops = parser_.loops(*coordinate.loops, {.what = "the range of '" + coordinate.name + "'"});
+      if (family.loops.size() > 2)
+        fail(coordinate.place, "a coordinate is repeated over one or two loops, no more");
+      symbols_.families.push_back(std::move(family));
+    }
+  }
+
+  bool has_velocity(std::span<const Node> roots) const {
+    return std::ranges::any_of(graph_.reachable(roots), [&](Node node) { return is_velocity(graph_[node]); });
+  }
+
+  SceneFunction phase_function(Node whole, const std::string& what, Place place) {
+    SceneFunction function{FunctionKind::phase};
+    bool second = false;
+    for (Term& term : terms_.of(whole, {}, what, place)) {
+      second = second || has_velocity(std::span(&term.node, 1));
+      Piece piece;
+      piece.loops = std::move(term.loops);
+      piece.outputs = {term.node};
+      builder_.add_phase(function, std::move(piece));
+    }
+    if (!second)
+      fail(place, fmt::format("{} contains no {}: nothing would move", what,
+                              what == "the Lagrangian" ? "velocity v_…" : "momentum p_…"));
+    return function;
+  }
+
+  void compile_energies() {
+    if (document_.lagrangian || !document_.branches.empty()) {
+      const Place place =
+          document_.lagrangian ? document_.lagrangian->start : document_.branches.front().place;
+      Node whole = document_.lagrangian
+                       ? parser_.formula(*document_.lagrangian, mechanics("the Lagrangian", 'v'))
+                       : graph_.number(0.0);
+      program_.lagrangian = phase_function(graph_.add(whole, circuit_.lagrangian()), "the Lagrangian", place);
+    }
+    if (document_.hamiltonian)
+      program_.hamiltonian =
+          phase_function(parser_.formula(*document_.hamiltonian, mechanics("the Hamiltonian", 'p')),
+                         "the Hamiltonian", document_.hamiltonian->start);
+    if (!program_.lagrangian && !program_.hamiltonian)
+      fail({},
+           "the scene has neither a 'lagrangian' nor a 'hamiltonian'; these keys stand above the first "
+           "[table]");
+  }
+
+  // Rows.
+
+  struct Row {
+    RowGroup group;
+    Node node;
+  };
+
+  void compile_rows() {
+    std::vector<Row> rows;
+    for (const auto& row : document_.rows) {
+      const std::string what = "row '" + row.name + "'";
+      std::vector<int> loops;
+      if (row.loops) loops = parser_.loops(*row.loops, {.what = what});
+      rows.push_back({{row.name, loops, row.equation.start},
+                      parser_.equation(row.equation, mechanics(what, 'v', loops))});
+    }
+    for (const auto& [name, node] : circuit_.current_laws()) rows.push_back({{name, {}, {}}, node});
+    std::vector<bool> order;  // which kinds there are, by first appearance
+    for (const Row& row : rows) {
+      const bool holonomic = is_holonomic(row);
+      if (std::ranges::find(order, holonomic) == order.end()) order.push_back(holonomic);
+    }
+    for (const bool holonomic : order) {
+      SceneFunction function{FunctionKind::rows, holonomic};
+      Piece single;  // the rows that are not repeated
+      for (const Row& row : rows)
+        if (is_holonomic(row) == holonomic) add_row(function, single, row);
+      if (!single.outputs.empty()) {
+        const std::vector<Node> offsets = require_linear(function, single);
+        builder_.add_rows(function, std::move(single), offsets);
+      }
+      program_.rows.push_back(std::move(function));
+    }
+  }
+
+  bool is_holonomic(const Row& row) const { return !has_velocity(std::span(&row.node, 1)); }
+
+  void add_row(SceneFunction& function, Piece& single, const Row& row) {
+    const int group = static_cast<int>(function.groups.size());
+    function.groups.push_back(row.group);
+    const std::string what = "row '" + row.group.name + "'";
+    bool coordinates = false;
+    for (Term& term : terms_.of(row.node, row.group.loops, what, row.group.place)) {
+      for (const Node node : graph_.reachable(std::span(&term.node, 1)))
+        coordinates = coordinates || graph_[node].op == Op::coordinate;
+      if (term.loops.empty()) {
+        single.outputs.push_back(term.node);
+        single.groups.push_back(group);
+        continue;
+      }
+      Piece piece;
+      piece.loops = std::move(term.loops);
+      piece.counting_loops = row.group.loops.size();
+      piece.outputs = {term.node};
+      piece.groups = {group};
+      const std::vector<Node> offsets = require_linear(function, piece);
+      builder_.add_rows(function, std::move(piece), offsets);
+    }
+    if (!coordinates) fail(row.group.place, what + " contains no coordinate and no velocity");
+  }
+
+  /// The outputs at v = 0, once it is sure that they are affine in v.
+  std::vector<Node> require_linear(const SceneFunction& function, const Piece& piece) {
+    std::vector<Node> offsets = piece.outputs;
+    if (function.holonomic) return offsets;
+    for (const Node leaf : graph_.reachable(piece.outputs)) {
+      if (!is_velocity(graph_[leaf])) continue;
+      for (std::size_t r = 0; r < piece.outputs.size(); ++r) {
+        const Node slope = graph_.derivative(piece.outputs[r], leaf);
+        if (!has_velocity(std::span(&slope, 1))) continue;
+        const RowGroup& group = function.groups[static_cast<std::size_t>(piece.groups[r])];
+        const std::string& name = symbols_.families[static_cast<std::size_t>(graph_[leaf].a)].name;
+        fail(group.place,
+             fmt::format("row '{}' is not linear in v_{}; expected A(q,t) v + b(q,t) = 0 or, without "
+                         "velocities, f(q,t) = 0",
+                         group.name, name));
+      }
+      offsets = graph_.substitute(offsets, leaf, graph_.number(0.0));
+    }
+    return offsets;
+  }
+
+  // Forces.
+
+  void compile_force() {
+    SceneFunction function{FunctionKind::force};
+    Piece single;
+    for (const auto& entry : document_.force) add_force(function, single, entry);
+    add_dissipation(function, single);
+    if (!single.outputs.empty()) builder_.add_force(function, std::move(single));
+    if (!function.pieces.empty()) program_.force = std::move(function);
+  }
+
+  void add_force_terms(SceneFunction& function, Piece& single, const std::vector<Term>& terms, Node target) {
+    for (const Term& term : terms) {
+      Piece repeated;
+      Piece& piece = term.loops.empty() ? single : repeated;
+      piece.loops = term.loops;
+      piece.outputs.push_back(term.node);
+      piece.targets.push_back(target);
+      if (!term.loops.empty()) builder_.add_force(function, std::move(repeated));
+    }
+  }
+
+  void add_force(SceneFunction& function, Piece& single, const SceneDocument::Entry& entry) {
+    const std::string& name = entry.key.text;
+    const auto family = std::ranges::find(symbols_.families, name, &Symbols::Family::name);
+    if (family == symbols_.families.end())
+      fail(entry.key.start,
+           fmt::format("[force]: there is no coordinate '{}'{}", name, suggestion(name, coordinates())));
+    if (entry.array) fail(entry.key.start, "[force]: expected one formula for each coordinate");
+    const std::string what = "the force on '" + name + "'";
+    const Node node = parser_.formula(entry.values[0], mechanics(what, 'v', family->loops));
+    const Node target = graph_.coordinate(static_cast<int>(family - symbols_.families.begin()),
+                                          own_index(*family), Role::position);
+    add_force_terms(function, single, terms_.of(node, family->loops, what, entry.values[0].start), target);
+  }
+
+  /// The force −∂R/∂v of Rayleigh's function R.
+  void add_dissipation(SceneFunction& function, Piece& single) {
+    Node whole = circuit_.dissipation();
+    Place place;
+    if (document_.dissipation) {
+      whole = graph_.add(parser_.formula(*document_.dissipation, mechanics("the dissipation", 'v')), whole);
+      place = document_.dissipation->start;
+    }
+    if (document_.dissipation && !has_velocity(std::span(&whole, 1)))
+      fail(place, "the dissipation contains no velocity v_…");
+    for (const Term& term : terms_.of(whole, {}, "the dissipation", place)) {
+      Piece repeated;
+      Piece& piece = term.loops.empty() ? single : repeated;
+      piece.loops = term.loops;
+      for (const Node leaf : graph_.reachable(std::span(&term.node, 1))) {
+        const NodeData data = graph_[leaf];
+        if (!is_velocity(data)) continue;
+        piece.outputs.push_back(graph_.negative(graph_.derivative(term.node, leaf)));
+        piece.targets.push_back(graph_.coordinate(data.a, data.b, Role::position));
+      }
+      if (!term.loops.empty()) builder_.add_force(function, std::move(repeated));
+    }
+  }
+
+  Node own_index(const Symbols::Family& family) {
+    if (family.loops.empty()) return none;
+    const Node first = graph_.loop_index(family.loops[0]);
+    return family.loops.size() == 1 ? first : graph_.list(first, graph_.loop_index(family.loops[1]));
+  }
+
+  std::vector<std::string> coordinates() const {
+    std::vector<std::string> names;
+    for (const auto& family : symbols_.families) names.push_back(family.name);
+    return names;
+  }
+
+  // The start, references and invariants.
+
+  NamedValue named_value(const SceneDocument::Entry& entry, Context context) {
+    const std::string& key = entry.key.text;
+    const bool momentum = key.starts_with("p_");
+    const std::string bare = key.size() > 2 && (key.starts_with("v_") || momentum) ? key.substr(2) : key;
+    NamedValue named{none, none, Role::position, momentum, {}, entry.key.start};
+    for (const bool second : {false, true}) {
+      const auto family = std::ranges::find(symbols_.families, second ? bare : key, &Symbols::Family::name);
+      if (named.family != none || family == symbols_.families.end()) continue;
+      named.family = static_cast<int>(family - symbols_.families.begin());
+      named.role = second ? Role::second : Role::position;
+      context.loops = family->loops;
+    }
+    if (named.family == none) {
+      const NodeData leaf = graph_[parser_.coordinate(
+          entry.key, {.what = context.what, .positions = true, .second = momentum ? 'p' : 'v'})];
+      named.family = leaf.a;
+      named.index = leaf.b;
+      named.role = static_cast<Role>(leaf.c);
+    }
+    if (entry.array && context.loops.empty())
+      fail(entry.key.start, fmt::format("'{}' takes one value, not an array", key));
+    context.what = "the value of '" + key + "'";
+    for (const FormulaText& value : entry.values) named.values.push_back(parser_.formula(value, context));
+    return named;
+  }
+
+  void compile_start() {
+    bool velocities = false;
+    for (const auto& entry : document_.start) {
+      program_.start.push_back(named_value(entry, {.what = "the start"}));
+      const NamedValue& value = program_.start.back();
+      if (value.role != Role::second) continue;
+      if (velocities && program_.start_by_momentum != value.momentum)
+        fail(value.place, "the start is given by velocities or by momenta, not by both");
+      velocities = true;
+      program_.start_by_momentum = value.momentum;
+    }
+    if (program_.start_by_momentum && !program_.hamiltonian)
+      fail(program_.start.front().place,
+           "a start with momenta needs a 'hamiltonian'; give velocities v_… instead");
+    program_.start_time = document_.start_time
+                              ? parser_.formula(*document_.start_time, {.what = "the start time"})
+                              : graph_.number(0.0);
+  }
+
+  void compile_references() {
+    for (const auto& reference : document_.references) {
+      ReferenceProgram& program = program_.references.emplace_back();
+      for (const auto& entry : reference.entries)
+        program.values.push_back(
+            named_value(entry, {.what = "the reference", .time = true, .reference = true}));
+    }
+  }
+
+  void compile_invariants() {
+    for (const auto& invariant : document_.invariants) {
+      const std::string what = "invariant '" + invariant.name + "'";
+      const Node node = parser_.formula(invariant.formula, mechanics(what, program_.lagrangian ? 'v' : 'p'));
+      SceneFunction function{FunctionKind::phase};
+      for (Term& term : terms_.of(node, {}, what, invariant.formula.start)) {
+        Piece piece;
+        piece.loops = std::move(term.loops);
+        piece.outputs = {term.node};
+        builder_.add_value(function, std::move(piece));
+      }
+      program_.invariants.push_back({invariant.name, std::move(function), invariant.value});
+    }
+  }
+
+  void write_source() {
+    std::string body = kernel_prelude(), table;
+    int number = 0;
+    for (const SceneFunction* function : program_.functions())
+      for (const Piece& piece : function->pieces)
+        for (std::size_t k = 0; k < piece.kernels.size(); ++k) {
+          const Kernel& kernel = piece.kernels[k];
+          if (kernel.empty()) {
+            table += "0, ";
+            continue;
+          }
+          const std::string name = fmt::format("k{}", number++);
+          body += kernel.source(name, piece.instance_width(), piece.position_width(function->kind, k));
+          table += name + ", ";
+        }
+    program_.name = content_name(body + table);
+    // "extern" first: a constant of C++ would otherwise stay inside its file.
+    const std::string name = "diracstep_kernels_" + program_.name;
+    program_.source = body + fmt::format(
+                                 "DIRACSTEP_PUBLIC const diracstep_kernel {0}[];\n"
+                                 "const diracstep_kernel {0}[] = {{{1}0}};\n",
+                                 name, table);
+  }
+
+  SceneProgram& program_;
+  const SceneDocument& document_;
+  FormulaGraph& graph_;
+  Symbols& symbols_;
+  FormulaParser parser_;
+  SumTerms terms_;
+  CircuitFormulas circuit_;
+  PieceBuilder builder_;
+};
+
+}  // namespace
+
+std::vector<const SceneFunction*> SceneProgram::functions() const {
+  std::vector<const SceneFunction*> all;
+  for (const auto* function : {&lagrangian, &hamiltonian, &force})
+    if (*function) all.push_back(&**function);
+  for (const SceneFunction& function : rows) all.push_back(&function);
+  return all;
+}
+
+std::unique_ptr<SceneProgram> compile_scene(const std::string& file, const std::string& text) {
+  auto program = std::make_unique<SceneProgram>(read_document(file, text));
+  try {
+    SceneCompiler(*program).compile();
+  } catch (const std::length_error&) {
+    throw SceneError(
+        file, {},
+        fmt::format("the formulas and their derivatives have more than {} parts, the limit; write "
+                    "repeated elements with for = \"i = 1..N\" and sum(i = 1..N, …)",
+                    FormulaGraph::size_limit));
+  }
+  return program;
+}
+
+}  // namespace diracstep::scene_compiler

@@ -1,0 +1,23 @@
+#pragma once
+
+#include <diracstep/scene_format/loader/coordinate_layout.hpp>
+#include <diracstep/scene_format/loader/kernel_library.hpp>
+#include <memory>
+#include <vector>
+
+namespace diracstep {
+
+/// A scene file with its parameters set: all that its functions share.
+struct LoadedScene {
+  LoadedScene(std::unique_ptr<const scene_compiler::SceneProgram> compiled,
+              scene_compiler::ParameterValues values);
+
+  std::unique_ptr<const scene_compiler::SceneProgram> program;
+  scene_compiler::ParameterValues parameters;
+  CoordinateLayout layout;
+  std::vector<double> known;  ///< subexpressions of the parameters alone
+  KernelLibrary library;
+};
+using LoadedScenePtr = std::shared_ptr<const LoadedScene>;
+
+}  // namespace diracstep

@@ -1,0 +1,296 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/system/consistent_start.hpp>
+#include <diracstep/scene_format/loader/defined_start.hpp>
+#include <diracstep/scene_format/loader/scene_file.hpp>
+#include <diracstep/scene_format/loader/scene_functions.hpp>
+#include <diracstep/solvers/kinsol_solver.hpp>
+#include <fstream>
+#include <limits>
+#include <sstream>
+
+namespace diracstep {
+
+using namespace scene_compiler;
+
+namespace {
+
+constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+constexpr double same_time = 1e-12;  // relative difference of times that are the same
+
+const SceneDocument::Parameter* find_parameter(const SceneDocument& document, const std::string& name) {
+  const auto found = std::ranges::find(document.parameters, name, &SceneDocument::Parameter::name);
+  return found == document.parameters.end() || found->array ? nullptr : &*found;
+}
+
+void require_parameter(const SceneDocument& document, const std::string& name, double value) {
+  const SceneDocument::Parameter* parameter = find_parameter(document, name);
+  if (parameter == nullptr) {
+    std::string known;
+    for (const auto& other : document.parameters)
+      if (!other.array) known += ' ' + other.name;
+    throw Misuse(fmt::format("scene '{}' has no parameter '{}'; its parameters are{}", document.name, name,
+                             known.empty() ? " none" : known));
+  }
+  if (!std::isfinite(value))
+    throw Misuse(
+        fmt::format("scene '{}': parameter {} = {}; a finite number is needed", document.name, name, value));
+  if (!parameter->limits.allow(value))
+    throw Misuse(fmt::format("scene '{}': {} {} = {:g}; it must be {}", document.name,
+                             parameter->size ? "size" : "parameter", name, value, parameter->limits.text()));
+  if (parameter->size && value != std::floor(value))
+    throw Misuse(
+        fmt::format("scene '{}': size {} = {:g}; a whole number is needed", document.name, name, value));
+}
+
+ParameterValues parameter_values(const SceneDocument& document, const Parameters& changes) {
+  for (const auto& [name, value] : changes) require_parameter(document, name, value);
+  ParameterValues values;
+  for (const auto& parameter : document.parameters) {
+    values.push_back(parameter.values);
+    const auto change = changes.find(parameter.name);
+    if (change != changes.end()) values.back() = {change->second};
+  }
+  return values;
+}
+
+/// Calls set(index, value) for each element that `named` gives a value to.
+template <class Set>
+void for_each_value(const LoadedScene& loaded, const NamedValue& named, double t, const Set& set) {
+  const SceneProgram& program = *loaded.program;
+  std::vector<Node> roots = named.values;
+  const bool two = named.index != none && program.graph[named.index].op == Op::list;
+  if (two)
+    roots.insert(roots.end(), {program.graph[named.index].a, program.graph[named.index].b});
+  else if (named.index != none)
+    roots.push_back(named.index);
+  Evaluator evaluator(program, loaded.parameters, roots);
+  evaluator.set_time(t);
+  if (named.index != none) {
+    evaluator.evaluate();
+    const std::array<long, 2> index{evaluator.whole(1), two ? evaluator.whole(2) : 0};
+    const int position = loaded.layout.position(named.family, index);
+    if (position < 0)
+      throw SceneError(program.document.file, named.place,
+                       "there is no " + loaded.layout.name(named.family, index));
+    return set(position, static_cast<double>(evaluator.value(0)));
+  }
+  const long count = loaded.layout.count(named.family);
+  if (named.values.size() > 1 && static_cast<long>(named.values.size()) != count)
+    throw SceneError(program.document.file, named.place,
+                     fmt::format("{} values; expected {}", named.values.size(), count));
+  const auto& loops = program.symbols.families[static_cast<std::size_t>(named.family)].loops;
+  for (long i = 0; i < count; ++i) {
+    const auto index = loaded.layout.element(named.family, i);
+    for (std::size_t k = 0; k < loops.size(); ++k) evaluator.set_loop(loops[k], index[k]);
+    evaluator.evaluate();
+    const std::size_t which = named.values.size() > 1 ? static_cast<std::size_t>(i) : 0;
+    set(loaded.layout.position(named.family, index), static_cast<double>(evaluator.value(which)));
+  }
+}
+
+Start start_of(const LoadedScene& loaded) {
+  const SceneProgram& program = *loaded.program;
+  Evaluator time(program, loaded.parameters, {program.start_time});
+  time.evaluate();
+  Start start{static_cast<double>(time.value(0)), Vector::Zero(loaded.layout.dimension()), {}, {}};
+  Vector second = Vector::Zero(loaded.layout.dimension());
+  for (const NamedValue& named : program.start)
+    for_each_value(loaded, named, start.time, [&](int index, double value) {
+      if (!std::isfinite(value))
+        throw SceneError(program.document.file, named.place,
+                         fmt::format("the start of '{}' is {}; expected a finite number",
+                                     loaded.layout.names()[static_cast<std::size_t>(index)], value));
+      (named.role == Role::position ? start.q : second)[index] = value;
+    });
+  const bool by_momentum = program.start_by_momentum || !program.lagrangian;
+  (by_momentum ? start.p : start.v) = second;
+  return start;
+}
+
+/// References for which the scene has the right parameters.
+class References {
+ public:
+  explicit References(LoadedScenePtr loaded) : loaded_(std::move(loaded)) {
+    const auto lagrangian = file_lagrangian(loaded_);
+    momentum_of_position_ = lagrangian && lagrangian->structure().y_hessian_zero;
+    const SceneDocument& document = loaded_->program->document;
+    for (std::size_t i = 0; i < document.references.size(); ++i)
+      if (holds(document.references[i])) valid_.push_back(i);
+  }
+
+  std::vector<KnownState> at_stated_times() const {
+    std::vector<KnownState> states;
+    for (const std::size_t i : valid_)
+      if (const auto& t = stated(i).t) states.push_back(state(i, *t));
+    return states;
+  }
+
+  /// The first closed form, else nothing.
+  std::optional<KnownState> closed_form(double t) const {
+    for (const std::size_t i : valid_)
+      if (!stated(i).t) return state(i, t);
+    return std::nullopt;
+  }
+
+  Reference summary() const {
+    const auto complete = std::ranges::find_if(
+        valid_, [&](std::size_t i) { return point(i, stated(i).t.value_or(start())).has_value(); });
+    if (complete == valid_.end()) return {};
+    const SceneDocument::Reference& first = stated(*complete);
+    return {first.kind == "exact" ? "exact" : "published", first.how, std::pow(10.0, -first.digits),
+            [references = *this](double t) { return references.at(t); }};
+  }
+
+ private:
+  const SceneDocument::Reference& stated(std::size_t i) const {
+    return loaded_->program->document.references[i];
+  }
+  double start() const { return loaded_->program->document.t_end; }
+
+  /// A closed form holds for all parameters unless it names some; digits hold for those of the file.
+  bool holds(const SceneDocument::Reference& reference) const {
+    const auto& parameters = loaded_->program->document.parameters;
+    for (const auto& [name, value] : reference.with)
+      if (find_parameter(loaded_->program->document, name) == nullptr)
+        throw SceneError(loaded_->program->document.file, reference.place,
+                         fmt::format("'with' names '{}', which is no parameter", name));
+    for (std::size_t i = 0; i < parameters.size(); ++i) {
+      const auto given = reference.with.find(parameters[i].name);
+      if (given != reference.with.end() ? loaded_->parameters[i] != std::vector{given->second}
+                                        : reference.t && loaded_->parameters[i] != parameters[i].values)
+        return false;
+    }
+    return true;
+  }
+
+  KnownState state(std::size_t i, double t) const {
+    const SceneDocument::Reference& reference = stated(i);
+    KnownState state{t, reference.kind, reference.how, reference.digits, {}};
+    for (const NamedValue& named : loaded_->program->references[i].values) {
+      if (named.momentum) continue;  // not compared
+      const bool velocity = named.role == Role::second;
+      for_each_value(*loaded_, named, t, [&](int index, double value) {
+        const std::string& name = loaded_->layout.names()[static_cast<std::size_t>(index)];
+        state.components.push_back({velocity ? "v_" + name : name, index, velocity, value});
+      });
+    }
+    return state;
+  }
+
+  /// The whole state, where the reference gives all of it.  Where L is linear in v the position is the state:
+  /// p = ∂L/∂v(q), and v = 0 stands for a velocity that is not stated.
+  std::optional<ReferencePoint> point(std::size_t i, double t) const {
+    const auto n = loaded_->layout.dimension();
+    ReferencePoint point{Vector::Constant(n, unknown),
+                         Vector::Constant(n, momentum_of_position_ ? 0.0 : unknown)};
+    for (const auto& component : state(i, t).components)
+      (component.velocity ? point.v : point.q)[component.index] = component.value;
+    if (!point.q.allFinite() || !point.v.allFinite()) return std::nullopt;
+    return point;
+  }
+
+  std::optional<ReferencePoint> at(double t) const {
+    for (const std::size_t i : valid_) {
+      const auto& time = stated(i).t;
+      if (time && std::abs(*time - t) > same_time * std::max(1.0, std::abs(t))) continue;
+      if (auto found = point(i, t)) return found;
+    }
+    return std::nullopt;
+  }
+
+  LoadedScenePtr loaded_;
+  bool momentum_of_position_ = false;  ///< a Lagrangian linear in v
+  std::vector<std::size_t> valid_;
+};
+
+Scene scene_of(const LoadedScenePtr& loaded) {
+  Scene scene;
+  scene.name = loaded->program->document.name;
+  scene.coordinates = loaded->layout.names();
+  scene.lagrangian = file_lagrangian(loaded);
+  scene.hamiltonian = file_hamiltonian(loaded);
+  scene.constraints = file_constraints(loaded);
+  scene.force = file_force(loaded);
+  scene.start = start_of(*loaded);
+  return scene;
+}
+
+void require_defined_start(const LoadedScene& loaded, const Scene& scene) {
+  Vector p = scene.start.p;
+  if (p.size() == 0 && scene.lagrangian && scene.hamiltonian) {
+    Vector lq(scene.dimension());
+    p.resize(scene.dimension());
+    scene.lagrangian->gradient(scene.start.time, scene.start.q, scene.start.v, lq, p);
+  }
+  const Vector v = scene.start.v.size() > 0 ? scene.start.v : Vector(Vector::Zero(scene.dimension()));
+  require_defined(loaded, scene, scene.start.time, scene.start.q, v, p);
+}
+
+/// Moves the start onto the rows where the file asks for it.
+void project(const SceneDocument& document, Scene& scene) {
+  if (document.project && scene.start.v.size() > 0)
+    scene.start = project_start(scene, scene.start, kinsol()).start;
+}
+
+Recommendation recommendation(const SceneDocument& document) {
+  const SceneDocument::Recommended& stated = document.recommended;
+  return {stated.method, stated.order, stated.step > 0.0 ? stated.step : document.step,
+          stated.end != 0.0 ? stated.end : document.study_end, stated.tolerance};
+}
+
+void describe(CatalogueScene& entry, const LoadedScene& loaded) {
+  const SceneDocument& document = loaded.program->document;
+  for (const auto& coordinate : document.coordinates)
+    entry.notes.push_back({coordinate.name, coordinate.unit, coordinate.meaning});
+  for (std::size_t i = 0; i < document.parameters.size(); ++i) {
+    const auto& parameter = document.parameters[i];
+    entry.notes.push_back({parameter.name, parameter.unit, parameter.meaning});
+    if (!parameter.array) entry.parameters[parameter.name] = loaded.parameters[i][0];
+  }
+}
+
+}  // namespace
+
+CatalogueScene scene_from_text(const std::string& file, const std::string& text, const Parameters& changes) {
+  auto program = compile_scene(file, text);
+  ParameterValues values = parameter_values(program->document, changes);
+  const LoadedScenePtr loaded = std::make_shared<const LoadedScene>(std::move(program), std::move(values));
+  const SceneDocument& document = loaded->program->document;
+  Scene scene = scene_of(loaded);
+  require_defined_start(*loaded, scene);
+  project(document, scene);
+
+  CatalogueScene entry;
+  entry.kind = document.kind;
+  entry.description = document.description;
+  entry.source = document.source;
+  entry.t_end = document.study_end;
+  entry.natural_step = document.step;
+  entry.needs = document.needs;
+  entry.code = loaded->library.origin;
+  entry.recommended = recommendation(document);
+  describe(entry, *loaded);
+  const References references(loaded);
+  entry.reference = references.summary();
+  entry.known = references.at_stated_times();
+  if (const auto exact = references.closed_form(entry.recommended.end)) entry.known.push_back(*exact);
+  for (std::size_t i = 0; i < loaded->program->invariants.size(); ++i)
+    entry.invariants.push_back({loaded->program->invariants[i].name, file_invariant(loaded, i),
+                                loaded->program->invariants[i].value});
+  entry.scene = std::make_shared<const Scene>(std::move(scene));
+  return entry;
+}
+
+CatalogueScene scene_from_file(const std::string& path, const Parameters& changes) {
+  std::ifstream file(path, std::ios::binary);
+  if (!file) throw Misuse(fmt::format("the scene file '{}' cannot be read", path));
+  std::ostringstream text;
+  text << file.rdbuf();
+  return scene_from_text(path, text.str(), changes);
+}
+
+}  // namespace diracstep

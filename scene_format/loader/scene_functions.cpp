@@ -1,0 +1,229 @@
+#include <algorithm>
+#include <array>
+#include <diracstep/scene_format/loader/loaded_function.hpp>
+#include <diracstep/scene_format/loader/scene_functions.hpp>
+#include <utility>
+
+namespace diracstep {
+
+using namespace scene_compiler;
+
+namespace {
+
+/// The pattern of the entries and of their mirrors.
+SparsityPattern symmetric_pattern(int n, std::vector<std::pair<int, int>> entries) {
+  const std::size_t count = entries.size();
+  for (std::size_t k = 0; k < count; ++k) entries.emplace_back(entries[k].second, entries[k].first);
+  return {n, n, std::move(entries)};
+}
+
+/// Member by member: a struct set to zero as a whole costs more than the kernel of a small scene.
+KernelCall call_at(double t, const double* x, const double* y = nullptr) {
+  return {0, nullptr, nullptr, nullptr, nullptr, {x, y, nullptr}, nullptr, {nullptr, nullptr, nullptr},
+          t, 0.0};
+}
+
+constexpr int few = 8;
+
+template <int... I>
+void clear_few(double* x, Eigen::Index size, std::integer_sequence<int, I...>) {
+  ((I < size ? void(x[I] = 0.0) : void()), ...);
+}
+
+/// x = 0, without a call for the few entries of a small scene.
+void clear(VectorRef& x) {  // by reference: copies of references are not free
+  if (x.size() > few) return void(x.setZero());
+  clear_few(x.data(), x.size(), std::make_integer_sequence<int, few>());
+}
+
+template <class Base>
+class FilePhaseFunction final : public Base {
+ public:
+  explicit FilePhaseFunction(LoadedFunction function)
+      : Base(symmetric_pattern(function.dimension(), function.entries(false)),
+             structure_of(function.function())),
+        function_(std::move(function)) {
+    function_.find_positions(this->pattern(), false);
+  }
+
+  double value(double t, ConstVectorRef x, ConstVectorRef y) const override {
+    double sum = 0.0;
+    KernelCall call = call_at(t, x.data(), y.data());
+    call.out[0] = &sum;
+    function_.run(0, call);
+    return sum;
+  }
+
+  void gradient(double t, ConstVectorRef x, ConstVectorRef y, VectorRef fx, VectorRef fy) const override {
+    clear(fx);
+    clear(fy);
+    KernelCall call = call_at(t, x.data(), y.data());
+    call.out[0] = fx.data();
+    call.out[1] = fy.data();
+    function_.run(1, call);
+  }
+
+  void hessian(double t, ConstVectorRef x, ConstVectorRef y, VectorRef fxx, VectorRef fxy,
+               VectorRef fyy) const override {
+    clear(fxx);
+    clear(fxy);
+    clear(fyy);
+    KernelCall call = call_at(t, x.data(), y.data());
+    call.out[0] = fxx.data();
+    call.out[1] = fxy.data();
+    call.out[2] = fyy.data();
+    function_.run(2, call);
+  }
+
+  void gradient_rate(double t, ConstVectorRef x, ConstVectorRef y, VectorRef fyt) const override {
+    clear(fyt);
+    KernelCall call = call_at(t, x.data(), y.data());
+    call.out[0] = fyt.data();
+    function_.run(3, call);
+  }
+
+  void position_gradient_rate(double t, ConstVectorRef x, ConstVectorRef y, VectorRef fxt) const override {
+    clear(fxt);
+    KernelCall call = call_at(t, x.data(), y.data());
+    call.out[0] = fxt.data();
+    function_.run(4, call);
+  }
+
+ private:
+  static PhaseStructure structure_of(const SceneFunction& f) {
+    return {f.separable, f.y_hessian_constant, f.y_hessian_diagonal, f.quadratic, f.y_hessian_zero};
+  }
+
+  LoadedFunction function_;
+};
+
+class FileRows final : public ConstraintRows {
+ public:
+  explicit FileRows(LoadedFunction function)
+      : ConstraintRows(function.function().holonomic,
+                       SparsityPattern(static_cast<int>(function.row_names().size()), function.dimension(),
+                                       function.entries(false)),
+                       symmetric_pattern(function.dimension(), function.entries(true)), function.row_names()),
+        function_(std::move(function)) {
+    function_.find_positions(pattern(), false);
+    function_.find_positions(curvature_pattern(), true);
+  }
+
+  bool constant() const override {
+    return std::ranges::all_of(function_.function().pieces, [](const Piece& piece) {
+      return std::ranges::all_of(std::array{std::size_t{2}, std::size_t{3}, annihilator_kernel},
+                                 [&](std::size_t number) { return piece.kernels[number].empty(); });
+    });
+  }
+
+  void position(double t, ConstVectorRef q, VectorRef phi) const override {
+    if (!holonomic()) return ConstraintRows::position(t, q, phi);
+    clear(phi);
+    KernelCall call = call_at(t, q.data());
+    call.out[0] = phi.data();
+    function_.run(0, call);
+  }
+
+  void coefficients(double t, ConstVectorRef q, VectorRef a, VectorRef b) const override {
+    clear(a);
+    clear(b);
+    KernelCall call = call_at(t, q.data());
+    call.out[0] = a.data();
+    call.out[1] = b.data();
+    function_.run(1, call);
+  }
+
+  void derivative(double t, ConstVectorRef q, ConstVectorRef w, double s, VectorRef d) const override {
+    clear(d);
+    KernelCall call = call_at(t, q.data());
+    call.in[2] = w.data();
+    call.s = s;
+    call.out[0] = d.data();
+    function_.run(2, call);
+  }
+
+  void time_derivative(double t, ConstVectorRef q, ConstVectorRef v, VectorRef d) const override {
+    clear(d);
+    KernelCall call = call_at(t, q.data());
+    call.in[2] = v.data();
+    call.out[0] = d.data();
+    function_.run(3, call);
+  }
+
+  void annihilator_derivative(double t, ConstVectorRef q, ConstVectorRef lambda, VectorRef d) const override {
+    clear(d);
+    KernelCall call = call_at(t, q.data());
+    call.multipliers = lambda.data();
+    call.out[0] = d.data();
+    function_.run(annihilator_kernel, call);
+  }
+
+ private:
+  LoadedFunction function_;
+};
+
+class FileForce final : public Force {
+ public:
+  explicit FileForce(LoadedFunction function)
+      : Force(symmetric_pattern(function.dimension(), function.entries(false))),
+        function_(std::move(function)) {
+    function_.find_positions(pattern(), false);
+  }
+
+  void value(double t, ConstVectorRef q, ConstVectorRef v, VectorRef f) const override {
+    clear(f);
+    KernelCall call = call_at(t, q.data(), v.data());
+    call.out[0] = f.data();
+    function_.run(0, call);
+  }
+
+  void derivatives(double t, ConstVectorRef q, ConstVectorRef v, VectorRef fq, VectorRef fv) const override {
+    clear(fq);
+    clear(fv);
+    KernelCall call = call_at(t, q.data(), v.data());
+    call.out[0] = fq.data();
+    call.out[1] = fv.data();
+    function_.run(1, call);
+  }
+
+ private:
+  LoadedFunction function_;
+};
+
+}  // namespace
+
+std::shared_ptr<const Lagrangian> file_lagrangian(const LoadedScenePtr& scene) {
+  if (!scene->program->lagrangian) return nullptr;
+  return std::make_shared<FilePhaseFunction<Lagrangian>>(LoadedFunction(scene, *scene->program->lagrangian));
+}
+
+std::shared_ptr<const Hamiltonian> file_hamiltonian(const LoadedScenePtr& scene) {
+  if (!scene->program->hamiltonian) return nullptr;
+  return std::make_shared<FilePhaseFunction<Hamiltonian>>(
+      LoadedFunction(scene, *scene->program->hamiltonian));
+}
+
+std::shared_ptr<const Force> file_force(const LoadedScenePtr& scene) {
+  if (!scene->program->force) return nullptr;
+  return std::make_shared<FileForce>(LoadedFunction(scene, *scene->program->force));
+}
+
+ConstraintBlocks file_constraints(const LoadedScenePtr& scene) {
+  ConstraintBlocks blocks;
+  for (const SceneFunction& rows : scene->program->rows)
+    blocks.push_back(std::make_shared<FileRows>(LoadedFunction(scene, rows)));
+  return blocks;
+}
+
+InvariantFunction file_invariant(const LoadedScenePtr& scene, std::size_t number) {
+  auto function = std::make_shared<const LoadedFunction>(scene, scene->program->invariants[number].function);
+  return [function](double t, ConstVectorRef q, ConstVectorRef y) {
+    double sum = 0.0;
+    KernelCall call = call_at(t, q.data(), y.data());
+    call.out[0] = &sum;
+    function->run(0, call);
+    return sum;
+  };
+}
+
+}  // namespace diracstep

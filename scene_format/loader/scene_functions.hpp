@@ -1,0 +1,20 @@
+#pragma once
+
+#include <diracstep/core/system/scene.hpp>
+#include <diracstep/scene_format/loader/loaded_scene.hpp>
+#include <functional>
+#include <memory>
+
+namespace diracstep {
+
+/// The functions of a loaded scene as the library takes them; null where the scene has none.
+std::shared_ptr<const Lagrangian> file_lagrangian(const LoadedScenePtr& scene);
+std::shared_ptr<const Hamiltonian> file_hamiltonian(const LoadedScenePtr& scene);
+std::shared_ptr<const Force> file_force(const LoadedScenePtr& scene);
+ConstraintBlocks file_constraints(const LoadedScenePtr& scene);
+
+/// The value of an invariant f(t, q, v or p).
+using InvariantFunction = std::function<double(double t, ConstVectorRef q, ConstVectorRef y)>;
+InvariantFunction file_invariant(const LoadedScenePtr& scene, std::size_t number);
+
+}  // namespace diracstep

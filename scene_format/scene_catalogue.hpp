@@ -1,0 +1,92 @@
+#pragma once
+
+#include <diracstep/core/system/scene.hpp>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace diracstep {
+
+using Parameters = std::map<std::string, double>;
+
+/// A point of the true motion.
+struct ReferencePoint {
+  Vector q;
+  Vector v;
+};
+
+/// What the errors of a study are taken against.
+struct Reference {
+  std::string kind;         ///< "exact": a closed form; "published": digits from a source
+  std::string how;          ///< the closed form or the source in a line
+  double self_error = 0.0;  ///< relative error of the reference itself
+  /// The true motion at time t; empty where the reference does not reach t.
+  std::function<std::optional<ReferencePoint>(double t)> at;
+};
+
+/// Values of some coordinates and velocities at one time, from a reference.
+struct KnownState {
+  struct Component {
+    std::string name;  ///< "x", "v_x_64"
+    int index;         ///< of the coordinate
+    bool velocity;
+    double value;
+  };
+  double t = 0.0;
+  std::string kind, how;  ///< as in Reference; also "own": computed by the authors of the scene
+  double digits = 0.0;    ///< that are good
+  std::vector<Component> components;
+};
+
+/// Something that the true motion keeps.
+struct Invariant {
+  std::string name;
+  std::function<double(double t, ConstVectorRef q, ConstVectorRef v)>
+      at;                       ///< p in place of v without a Lagrangian
+  std::optional<double> value;  ///< as stated
+};
+
+/// A method that suits the scene, and what it reaches.
+struct Recommendation {
+  std::string method = "type1/midpoint";
+  int order = 0;  ///< 0: the method's own
+  double step = 0.0;
+  double end = 0.0;
+  double tolerance = 0.0;  ///< error at `end`, relative to the largest component; 0 where none is stated
+};
+
+/// A symbol of the scene as its author describes it.
+struct SymbolNote {
+  std::string name, unit, meaning;
+};
+
+/// A scene as the command and the studies know it.
+struct CatalogueScene {
+  std::shared_ptr<const Scene> scene;
+  std::string kind;  ///< "unconstrained", "holonomic", "large, holonomic", …
+  std::string description;
+  std::string source;         ///< where the data come from
+  Parameters parameters;      ///< as used, after changes
+  double t_end = 0.0;         ///< where studies end
+  double natural_step = 0.0;  ///< a coarse but sensible step: the start of a study's ladder
+  Reference reference;
+  std::string needs = {};  ///< what the integrators lack to run it, empty where they run it: "degenerate"
+  std::vector<KnownState> known = {};  ///< references that hold for the parameters, as the file lists them
+  std::vector<Invariant> invariants = {};
+  Recommendation recommended = {};
+  std::vector<SymbolNote> notes = {};  ///< coordinates, sizes and parameters
+  std::string code = {};               ///< how the formulas are computed: compiled, or interpreted and why
+};
+
+/// Names of the scenes that come with the library, sorted.
+std::vector<std::string> scene_names();
+
+/// A scene by name or by the path of its file (NAME.toml), some of its parameters and sizes changed.  Throws
+/// Misuse for an unknown scene or parameter, listing the known ones, for a value the scene cannot have, and
+/// for a file that is wrong, with the line and column.
+CatalogueScene make_scene(const std::string& name, const Parameters& changes = {});
+
+}  // namespace diracstep

@@ -1,0 +1,324 @@
+/// What must hold for every registered method on every constraint class; a new method is covered by being
+/// registered.
+#include <gtest/gtest.h>
+
+#include <diracstep/core/dirac/discrete_action.hpp>
+#include <diracstep/core/runs/run.hpp>
+
+#include "differences.hpp"
+#include "methods.hpp"
+#include "scenes.hpp"
+#include "stepping.hpp"
+
+namespace diracstep {
+namespace {
+
+using testing::join;
+using testing::samples_of;
+using testing::SingleStep;
+
+constexpr double h = 0.05;
+constexpr long steps = 20;
+
+class DiracLaws : public ::testing::TestWithParam<std::string> {
+ protected:
+  Method method() const { return Registry::with_built_ins().method(GetParam()); }
+  IntegratorOptions options() const { return {.method = GetParam(), .step = h}; }
+};
+
+/// Laws of some of the methods.
+class LawsOfTransforms : public DiracLaws {};
+class LawsOfTypesOneToThree : public DiracLaws {};  ///< no structure, principle or force is stated for type 4
+class LawsOfOrderOne : public DiracLaws {};
+
+template <class Condition>
+std::vector<std::string> methods_where(Condition holds) {
+  std::vector<std::string> names = testing::every_method();
+  const Registry registry = Registry::with_built_ins();
+  std::erase_if(names, [&](const std::string& name) { return !holds(registry.method(name).info); });
+  return names;
+}
+
+Vector momentum_at(const Scene& scene, const Vector& q, const Vector& v) {
+  Vector lq(q.size()), p(q.size());
+  scene.lagrangian->gradient(0.0, q, v, lq, p);
+  return p;
+}
+
+/// Largest entry of MᵀΩM − Ω for the Jacobian M of (q,p) ↦ step.
+double symplecticity_defect(const Method& method, const Scene& scene) {
+  const int n = scene.dimension();
+  SingleStep step(method, scene);
+  const auto map = [&](const Vector& z) {
+    const auto end = step({0.0, h}, z.head(n), z.tail(n), scene.start.v);
+    return join(end.q1, end.p1);
+  };
+  const Vector z = join(scene.start.q, momentum_at(scene, scene.start.q, scene.start.v));
+  const Eigen::MatrixXd m = testing::difference_jacobian(map, z);
+  Eigen::MatrixXd omega = Eigen::MatrixXd::Zero(2 * n, 2 * n);
+  omega.topRightCorner(n, n).setIdentity();
+  omega.bottomLeftCorner(n, n) = -Eigen::MatrixXd::Identity(n, n);
+  return (m.transpose() * omega * m - omega).cwiseAbs().maxCoeff();
+}
+
+TEST_P(DiracLaws, UnconstrainedStepIsSymplectic) {
+  EXPECT_LT(symplecticity_defect(method(), *testing::unconstrained()), 1e-8);
+}
+
+TEST_P(LawsOfTransforms, GiveTheTrajectoryOfTheirDiscreteLagrangian) {
+  const std::string original = GetParam().substr(15, GetParam().size() - 16);
+  for (const auto& scene : testing::every_constraint_class()) {
+    const auto transformed = samples_of(scene, options(), steps);
+    const auto expected = samples_of(scene, {.method = original, .step = h}, steps);
+    for (std::size_t k = 0; k < expected.size(); ++k) {
+      EXPECT_LT((transformed[k].q - expected[k].q).lpNorm<Eigen::Infinity>(), 2e-13)
+          << scene->name << " " << k;
+      EXPECT_LT((transformed[k].p - expected[k].p).lpNorm<Eigen::Infinity>(), 5e-12)
+          << scene->name << " " << k;
+    }
+  }
+}
+
+TEST_P(DiracLaws, PlusAndMinusSystemsShareConfigurationsAndDifferByTheImpulse) {
+  for (const auto& scene : testing::every_constraint_class()) {
+    const auto plus = samples_of(scene, options(), steps, Momentum::plus);
+    const auto minus = samples_of(scene, options(), steps, Momentum::minus);
+    SingleStep step(method(), *scene);
+    for (std::size_t k = 0; k + 1 < plus.size(); ++k) {
+      EXPECT_LT((plus[k].q - minus[k].q).lpNorm<Eigen::Infinity>(), 1e-14) << scene->name;
+      const auto end = step({plus[k].time, h}, plus[k].q, plus[k].p, plus[k].v);
+      Vector expected = plus[k].p;
+      if (scene->rows() > 0) {
+        ConstraintsAtPoint rows(scene->constraints, scene->dimension());
+        rows.evaluate(plus[k].time, plus[k].q);
+        rows.add_annihilator(end.impulse, expected);
+        EXPECT_GT((minus[k].p - plus[k].p).norm(), 1e-6) << "the impulse vanishes, so nothing is tested";
+      }
+      EXPECT_LT((minus[k].p - expected).lpNorm<Eigen::Infinity>(), 5e-12) << scene->name;
+    }
+  }
+}
+
+/// The trajectory with both momentum representatives.
+struct Trajectory {
+  std::vector<Vector> q, plus, minus;
+};
+
+Trajectory trajectory_of(const std::shared_ptr<const Scene>& scene, const IntegratorOptions& options) {
+  Trajectory t;
+  for (const Sample& s : samples_of(scene, options, steps, Momentum::plus)) {
+    t.q.push_back(s.q);
+    t.plus.push_back(s.p);
+  }
+  for (const Sample& s : samples_of(scene, options, steps, Momentum::minus)) t.minus.push_back(s.p);
+  return t;
+}
+
+/// The covector that a method's S gives over step k: D^±L_d or dH_{d±}, inner columns stationary.
+Covector differential(GeneratingFunction& s, const Trajectory& t, std::size_t k, bool plus) {
+  const GraphOf graph = graph_of(s.type());
+  const Interval step{static_cast<double>(k) * h, h};
+  Columns y(s.dimension(), s.columns()), g(s.dimension(), s.columns());
+  y.col(0) = graph.starts_from_position ? t.q[k] : t.minus[k];
+  y.col(1) = graph.ends_at_position ? t.q[k + 1] : t.plus[k + 1];
+  if (s.inner_columns() > 0) {
+    s.guess_inner(step, t.q[k], t.minus[k], (t.q[k + 1] - t.q[k]) / h, y.rightCols(s.inner_columns()));
+    EXPECT_TRUE(make_stationary(s, step, y));
+  }
+  s.gradient(step, y, g);
+  const Covector d{y.col(0), y.col(1), g.col(0), g.col(1)};
+  if (s.type() != GeneratingType::one) return d;
+  return plus ? gamma_plus(d) : gamma_minus(d);
+}
+
+TEST_P(LawsOfTypesOneToThree, EveryStepIsAMemberOfTheDiscreteDiracStructure) {
+  const auto type = method().info.type;
+  for (const auto& scene : testing::every_constraint_class()) {
+    const auto s = method().make(*scene);
+    const Trajectory t = trajectory_of(scene, options());
+    DiscreteDiracStructure structure(scene->constraints, scene->dimension(), method().info.constraint_rule);
+    for (std::size_t k = 0; k < steps; ++k) {
+      const Interval step{static_cast<double>(k) * h, h};
+      std::vector<Membership> memberships;
+      if (type != GeneratingType::three)
+        memberships.push_back(structure.plus(step, {t.q[k], t.plus[k]}, {t.q[k + 1], t.plus[k + 1]},
+                                             differential(*s, t, k, true)));
+      if (type != GeneratingType::two)
+        memberships.push_back(structure.minus(step, {t.q[k], t.minus[k]}, {t.q[k + 1], t.minus[k + 1]},
+                                              differential(*s, t, k, false)));
+      for (const Membership& m : memberships) {
+        EXPECT_LT(m.constraint, 1e-14) << scene->name << " " << k;
+        EXPECT_LT(m.annihilator, 5e-12) << scene->name << " " << k;
+      }
+    }
+  }
+}
+
+TEST_P(LawsOfTypesOneToThree, TrajectoriesAreStationaryForTheirPrinciple) {
+  const auto type = method().info.type;
+  for (const auto& scene : testing::every_constraint_class()) {
+    const auto s = method().make(*scene);
+    Trajectory t = trajectory_of(scene, options());
+    DiscreteDiracStructure structure(scene->constraints, scene->dimension(), method().info.constraint_rule);
+    const auto residual = [&](const std::vector<Vector>& p) {
+      return stationarity_residual(*s, structure, curve_of(0.0, h, t.q, p));
+    };
+    if (type != GeneratingType::three) {
+      EXPECT_LT(residual(t.plus), 5e-12) << scene->name;
+    }
+    if (type != GeneratingType::two) {
+      EXPECT_LT(residual(t.minus), 5e-12) << scene->name;
+    }
+    t.q[steps / 2] += Vector::Constant(3, 1e-3);
+    EXPECT_GT(residual(type == GeneratingType::three ? t.minus : t.plus), 1e-5) << "a wrong curve passes";
+  }
+}
+
+/// Error against a run with a far finer step, maximum norm over q and projected p at t = 1.
+double error_at(const std::shared_ptr<const Scene>& scene, const IntegratorOptions& options,
+                const Sample& reference) {
+  const StepGrid grid = fit_steps(0.0, 1.0, options.step);
+  Integrator integrator(scene, Registry::with_built_ins(), kinsol(), options);
+  EXPECT_TRUE(run(integrator, grid.steps, Momentum::projected, 1, nullptr).ok());
+  Sample end;
+  EXPECT_TRUE(integrator.sample(Momentum::projected, end).ok());
+  return (join(end.q, end.p) - join(reference.q, reference.p)).lpNorm<Eigen::Infinity>();
+}
+
+double measured_order(const std::shared_ptr<const Scene>& scene, IntegratorOptions options, double coarse) {
+  const auto reference =
+      samples_of(scene, {.method = "type1/midpoint", .order = 8, .step = 1.0 / 128.0}, 128).back();
+  options.step = coarse;
+  const double first = error_at(scene, options, reference);
+  options.step = coarse / 2.0;
+  return std::log2(first / error_at(scene, options, reference));
+}
+
+TEST_P(DiracLaws, MeasuredOrderIsTheStatedOne) {
+  for (const auto& scene : testing::every_constraint_class()) {
+    const double order = measured_order(scene, options(), 1.0 / 160.0);
+    EXPECT_NEAR(order, method().info.order, 0.1) << scene->name;
+  }
+}
+
+TEST_P(LawsOfTypesOneToThree, ForcesKeepTheStatedOrder) {
+  for (const auto& scene : testing::every_constraint_class()) {
+    const double order = measured_order(testing::forced(scene), options(), 1.0 / 160.0);
+    EXPECT_NEAR(order, method().info.order, 0.1) << scene->name;
+  }
+}
+
+TEST_P(LawsOfOrderOne, SymmetrisedWithItsAdjointTheOrderIsTwo) {
+  for (const auto& scene : testing::every_constraint_class()) {
+    IntegratorOptions symmetric = options();
+    symmetric.order = 2;
+    EXPECT_NEAR(measured_order(scene, symmetric, 1.0 / 40.0), 2.0, 0.1) << scene->name;
+  }
+}
+
+TEST_P(DiracLaws, AdjointStepIsTheInverseOfTheBackwardStep) {
+  const Method original = method(), adjoint = Registry::with_built_ins().adjoint_of(original);
+  for (const auto& scene : testing::every_constraint_class()) {
+    // From one projected point to the next with the step, and back with its adjoint run backwards.
+    const Sample start = samples_of(scene, options(), 0).front();
+    const auto there = samples_of(scene, options(), 1).back();
+    auto back = std::make_shared<Scene>(*scene);
+    back->start = {0.0, there.q, there.v};
+    const auto again = samples_of(back, {.method = adjoint.info.name, .step = -h}, 1).back();
+    EXPECT_LT((again.q - start.q).lpNorm<Eigen::Infinity>(), 1e-13) << scene->name;
+    EXPECT_LT((again.p - start.p).lpNorm<Eigen::Infinity>(), 5e-12) << scene->name;
+  }
+}
+
+TEST_P(DiracLaws, HolonomicRowsDoNotDrift) {
+  const auto scene = testing::mixed();
+  const auto samples = samples_of(scene, options(), 400);
+  Vector phi(1);
+  scene->constraints.front()->position(0.0, samples.back().q, phi);
+  EXPECT_LT(std::abs(phi[0]), 1e-14);
+}
+
+const auto by_name = [](const auto& test) { return testing::test_name(test.param); };
+INSTANTIATE_TEST_SUITE_P(EveryMethod, DiracLaws, ::testing::ValuesIn(testing::every_method()), by_name);
+INSTANTIATE_TEST_SUITE_P(EveryTransform, LawsOfTransforms,
+                         ::testing::ValuesIn(methods_where([](const auto& m) {
+                           return m.name.find("legendre") != std::string::npos;
+                         })),
+                         by_name);
+INSTANTIATE_TEST_SUITE_P(EveryMethod, LawsOfTypesOneToThree,
+                         ::testing::ValuesIn(methods_where([](const auto& m) {
+                           return m.type != GeneratingType::four;
+                         })),
+                         by_name);
+INSTANTIATE_TEST_SUITE_P(EveryMethod, LawsOfOrderOne,
+                         ::testing::ValuesIn(methods_where([](const auto& m) { return m.order == 1; })),
+                         by_name);
+
+TEST(DiracStructure, MomentumFunctionsAreThePotentialsOfTheSumOfTheOneForms) {
+  std::srand(3);
+  const auto random_point = [] { return PhasePoint{Vector::Random(4), Vector::Random(4)}; };
+  const PhasePoint z0 = random_point(), z1 = random_point(), w0 = random_point(), w1 = random_point();
+  const auto pairing = [](const Covector& a, const Vector& x, const Vector& y) {
+    return a.xi.dot(x) + a.eta.dot(y);
+  };
+  const auto moved = [](const PhasePoint& z, const PhasePoint& w, double e) {
+    return PhasePoint{z.q + e * w.q, z.p + e * w.p};
+  };
+  const auto derivative = [&](auto g) {  // exact: the functions are bilinear
+    return (g(moved(z0, w0, 1.0), moved(z1, w1, 1.0)) - g(moved(z0, w0, -1.0), moved(z1, w1, -1.0))) / 2.0;
+  };
+  const double lambda = pairing(discrete_kappa(z0, z1), w0.q, w1.q);
+  EXPECT_NEAR(lambda + pairing(omega_flat_plus(z0, z1), w0.q, w1.p), derivative(momentum_function_plus),
+              1e-14);
+  EXPECT_NEAR(lambda + pairing(omega_flat_minus(z0, z1), w0.p, w1.q), derivative(momentum_function_minus),
+              1e-14);
+}
+
+TEST(DiracStructure, MapsComposeAsStated) {
+  std::srand(4);
+  const PhasePoint z0{Vector::Random(2), Vector::Random(2)}, z1{Vector::Random(2), Vector::Random(2)};
+  const auto same = [](const Covector& a, const Covector& b) {
+    return a.x == b.x && a.y == b.y && a.xi == b.xi && a.eta == b.eta;
+  };
+  EXPECT_TRUE(same(gamma_plus(discrete_kappa(z0, z1)), omega_flat_plus(z0, z1)));
+  EXPECT_TRUE(same(gamma_minus(discrete_kappa(z0, z1)), omega_flat_minus(z0, z1)));
+  const PhaseVelocity z{z0.q, z0.p, z1.q, z1.p};
+  EXPECT_TRUE(same(gamma(kappa(z)), omega_flat(z)));
+}
+
+TEST(DiracStructure, LegendreTransformsAndEnergiesOfADiscreteLagrangian) {
+  const auto scene = testing::unconstrained();
+  const Interval step{0.0, h};
+  const auto l_d = Registry::with_built_ins().method("type1/midpoint").make(*scene);
+  Columns y(3, 2);
+  y.col(0) = scene->start.q;
+  y.col(1) = scene->start.q + h * scene->start.v;
+  const DiscreteLagrangianAt l = evaluate(*l_d, step, y);
+  // H_{d±} as the generating functions of types 2 and 3, whose own arguments are found by the transform.
+  for (const bool plus : {true, false}) {
+    const auto h_d = Registry::with_built_ins()
+                         .method(plus ? "type2/legendre(type1/midpoint)" : "type3/legendre(type1/midpoint)")
+                         .make(*scene);
+    Columns z(3, 3);
+    z.col(0) = plus ? l.q0 : legendre_minus(l).p;
+    z.col(1) = plus ? legendre_plus(l).p : l.q1;
+    z.col(2) = (plus ? l.q1 : l.q0) + Vector::Constant(3, 0.01);
+    ASSERT_TRUE(make_stationary(*h_d, step, z));
+    EXPECT_NEAR(h_d->value(step, z), plus ? discrete_hamiltonian_plus(l) : discrete_hamiltonian_minus(l),
+                1e-13);
+    EXPECT_LT((z.col(2) - (plus ? l.q1 : l.q0)).norm(), 1e-13);
+  }
+}
+
+TEST(DiscreteAction, SumsOfLagrangianAndHamiltonianAgreeOnATrajectory) {
+  const auto scene = testing::nonholonomic();
+  const auto make = [&](const char* name) { return Registry::with_built_ins().method(name).make(*scene); };
+  const Trajectory t = trajectory_of(scene, {.method = "type1/midpoint", .step = h});
+  const auto curve = curve_of(0.0, h, t.q, t.plus), curve_minus = curve_of(0.0, h, t.q, t.minus);
+  const double sum = hamilton_pontryagin_sum(*make("type1/midpoint"), curve);
+  EXPECT_NEAR(phase_space_sum(*make("type2/legendre(type1/midpoint)"), curve), sum, 1e-12);
+  EXPECT_NEAR(phase_space_sum(*make("type3/legendre(type1/midpoint)"), curve_minus), sum, 1e-12);
+}
+
+}  // namespace
+}  // namespace diracstep

@@ -1,0 +1,151 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <diracstep/core/runs/run.hpp>
+#include <diracstep/core/runs/run_checks.hpp>
+#include <diracstep/scene_format/scene_catalogue.hpp>
+#include <diracstep/solvers/kinsol_solver.hpp>
+
+/// What tells when a run is not to be believed although every step was solved: it speaks where steps are too
+/// large, is silent where they are not, and leaves the bits alone.
+namespace diracstep {
+namespace {
+
+Integrator integrator_for(const CatalogueScene& entry, const std::string& method, double factor) {
+  return {entry.scene,
+          Registry::with_built_ins(),
+          kinsol(),
+          {.method = method, .step = factor * entry.natural_step}};
+}
+
+/// The text after so many steps, or after those that could be taken.
+std::string doubt_of(Integrator& integrator, long steps) {
+  RunChecks doubt(integrator, steps);
+  for (long k = 0; k < steps; ++k) {
+    doubt.before_step(integrator);
+    if (!integrator.step().ok()) break;
+    doubt.after_step(integrator);
+  }
+  return doubt.text();
+}
+
+TEST(RunChecks, IsSilentOnEverySceneAtItsNaturalStep) {
+  for (const std::string& name : scene_names()) {
+    const CatalogueScene entry = make_scene(name);
+    if (!entry.needs.empty()) continue;
+    for (const double factor : {0.5, 1.0}) {
+      Integrator integrator = integrator_for(entry, automatic_method, factor);
+      EXPECT_EQ(doubt_of(integrator, 300), "") << name << ", step * " << factor;
+    }
+    if (entry.scene->rows() == 0 || name == "hanging_chain")
+      continue;  // the chain's natural step is too large
+    Integrator midpoint = integrator_for(entry, "type1/midpoint", 1.0);
+    EXPECT_EQ(doubt_of(midpoint, 300), "") << name;
+  }
+}
+
+TEST(RunChecks, IsSilentWhereNothingMovesButRoundOff) {
+  const std::vector<std::pair<std::string, Parameters>> at_rest{{"hanging_chain", {{"N", 8}, {"g", 0.0}}},
+                                                                {"andrews_squeezer", {{"mom", 0.0}}}};
+  for (const auto& [name, parameters] : at_rest) {
+    const CatalogueScene entry = make_scene(name, parameters);
+    Integrator integrator = integrator_for(entry, automatic_method, 1.0);
+    RunChecks doubt(integrator, 300);
+    Sample point;
+    for (int k = 0; k < 300; ++k) {
+      ASSERT_TRUE(integrator.sample(Momentum::projected, point).ok());
+      doubt.see(point);
+      doubt.before_step(integrator);
+      ASSERT_TRUE(integrator.step().ok());
+      doubt.after_step(integrator);
+    }
+    EXPECT_EQ(doubt.text(), "") << name;
+  }
+}
+
+TEST(StepSizeCheck, SeesLargeStepsOfDampedScenes) {
+  const CatalogueScene governor = make_scene("flyball_governor");
+  Integrator trapezoidal = integrator_for(governor, "type1/trapezoidal", 4.0);
+  EXPECT_NE(doubt_of(trapezoidal, 100).find("two half steps from t ="), std::string::npos);
+  Integrator implicit = integrator_for(governor, "type1/gl:3", 4.0);
+  EXPECT_EQ(doubt_of(implicit, 100), "");
+}
+
+TEST(StepSizeCheck, SeesLargeStepsOfDrivenScenes) {
+  // q'' = -q + cos(20 t): steps of 5/20 resolve the oscillator, and miss the force
+  Scene scene;
+  scene.name = "driven";
+  scene.coordinates = {"q"};
+  scene.lagrangian = lagrangian<1>([](const auto& q, const auto& v, const auto& t) {
+    using std::cos;
+    return 0.5 * (v[0] * v[0] - q[0] * q[0]) + 20.0 * q[0] * cos(20.0 * t);
+  });
+  scene.start = {0.0, Vector{{1.0}}, Vector{{0.0}}};
+  const auto shared = std::make_shared<const Scene>(scene);
+  const auto text = [&](double step) {
+    Integrator integrator(shared, Registry::with_built_ins(), kinsol(),
+                          {.method = "type1/midpoint", .step = step});
+    return doubt_of(integrator, 40);
+  };
+  EXPECT_NE(text(0.25).find("two half steps"), std::string::npos);
+  EXPECT_EQ(text(0.01), "");
+}
+
+TEST(StepSizeCheck, LeavesTheBitsAlone) {
+  for (const char* name :
+       {"knife_edge", "pendulum_cartesian", "kepler_e06", "lotka_volterra_2d", "hanging_chain"}) {
+    const CatalogueScene entry = make_scene(name);
+    Integrator watched = integrator_for(entry, "type1/gl:2", 0.2),
+               alone = integrator_for(entry, "type1/gl:2", 0.2);
+    (void)doubt_of(watched, 40);
+    for (int k = 0; k < 40; ++k) ASSERT_TRUE(alone.step().ok()) << name;
+    EXPECT_EQ(watched.save().numbers(), alone.save().numbers()) << name;
+  }
+}
+
+/// A four-bar mechanism of one window whose coupler is turned over by force at a flat pose: the velocity of
+/// its second upright is reversed, which every row allows there.
+TEST(BranchCheck, SeesAMotionThatLeavesItsBranch) {
+  const CatalogueScene entry = make_scene("n_four_bar", {{"N", 1}});
+  Integrator integrator = integrator_for(entry, "type1/gl:2", 0.5);
+  BranchCheck doubt(integrator);
+  double lowest = HUGE_VAL;
+  for (int k = 0; k < 400; ++k) {
+    ASSERT_TRUE(integrator.step().ok());
+    doubt.after(integrator);
+    lowest = std::min(lowest, std::abs(integrator.position()[1]));
+  }
+  EXPECT_LT(lowest, 0.05) << "no flat pose was passed";
+  EXPECT_EQ(doubt.text(), "") << "the branch was kept";
+
+  const double start = integrator.time();
+  while (integrator.position()[1] *
+             (integrator.position()[1] + 0.5 * entry.natural_step * integrator.velocity_estimate()[1]) >
+         0.0)
+    ASSERT_TRUE(integrator.step().ok()), doubt.after(integrator);
+  ASSERT_LT(integrator.time(), start + 10.0);
+  Vector v = integrator.velocity_estimate(), p = integrator.momentum();
+  v.tail(2) *= -1.0;
+  p.tail(2) *= -1.0;
+  integrator.restart(integrator.time(), integrator.position(), p, v);
+  for (int k = 0; k < 2 && integrator.step().ok(); ++k) doubt.after(integrator);
+  EXPECT_NE(doubt.text().find("may have left its branch"), std::string::npos);
+}
+
+/// Of ten windows, type2/euler at h = 0.01 used to fold one at the flat pose of t = 15.
+TEST(Branches, AreKeptThroughFlatPoses) {
+  const CatalogueScene entry = make_scene("n_four_bar", {{"N", 10}});
+  for (const char* method : {"type2/euler", "type3/euler"}) {
+    Integrator integrator = integrator_for(entry, method, 1.0);
+    EXPECT_EQ(doubt_of(integrator, 2000), "") << method;
+    EXPECT_GE(integrator.work().retries.other_branches, 1) << method << ": nothing to keep";
+    const Vector& q = integrator.position();
+    for (Eigen::Index j = 1; 2 * j < q.size(); ++j) {
+      EXPECT_NEAR(q[2 * j] - static_cast<double>(j), q[0], 1e-9) << method;
+      EXPECT_NEAR(q[2 * j + 1], q[1], 1e-9) << method;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace diracstep

@@ -1,0 +1,47 @@
+#pragma once
+
+#include <diracstep/core/steps/phase_space_step.hpp>
+#include <diracstep/core/system/saddle_point.hpp>
+#include <diracstep/solvers/detail/linear_solver.hpp>
+#include <diracstep/validation/references/reference_run.hpp>
+#include <memory>
+
+namespace diracstep {
+
+/// The continuous system with its index reduced to 0, as one would write it by hand: the rows enter only
+/// differentiated, so that a numerical solution drifts off them.
+///
+///   L regular on Δ_Q   y = (q, v),   q̇ = v,   v̇ = a with  [∂²L/∂v² −Aᵀ; A 0] (a, Λ) = …
+///   L linear in v      y = q,        q̇ = v with  (Dθᵀ − Dθ) v = ∂H/∂q
+///
+/// The accelerations are those of AccelerationProblem, the velocities those of PhaseSpaceVelocityProblem.
+class ReducedEquations {
+ public:
+  /// With `dense` the linear system of a rate is factored as a full matrix.
+  ReducedEquations(const Scene& scene, bool dense);
+
+  int size() const { return (acceleration_ ? 2 : 1) * n_; }
+
+  /// ẏ at y; false where the linear system is singular.
+  bool rate(double t, ConstVectorRef y, VectorRef rate);
+
+  /// The velocity at y, and the forces of the rows.
+  bool read(double t, ConstVectorRef y, Vector& v, Vector& forces);
+
+ private:
+  bool solve_linear(NonlinearProblem& problem);
+
+  int n_;
+  std::unique_ptr<AccelerationProblem> acceleration_;  ///< one of the two
+  std::unique_ptr<PhaseSpaceVelocityProblem> phase_velocity_;
+  std::unique_ptr<detail::LinearSolver> linear_solver_;
+  Vector zero_, values_, solution_;
+};
+
+/// Integrates the equations above from the scene's start to `t_end` with SUNDIALS ARKODE's explicit
+/// Runge–Kutta method of order 8 with an embedded one of order 7 (Fehlberg, 13 stages).  Counts: one residual
+/// evaluation is one right-hand side.  Throws Misuse for a bad scene, start, end or option; what a user's
+/// function throws passes through.
+ReferenceRun integrate_explicitly(const Scene& scene, double t_end, const ReferenceOptions& options);
+
+}  // namespace diracstep

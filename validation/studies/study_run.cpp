@@ -1,0 +1,214 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <diracstep/validation/references/explicit_reference.hpp>
+#include <diracstep/validation/references/ida_reference.hpp>
+#include <diracstep/validation/studies/study_run.hpp>
+#include <diracstep/validation/studies/work_precision.hpp>
+
+namespace diracstep {
+
+namespace {
+
+constexpr double long_run = 0.3;          // CPU seconds above which a run is repeated less often
+constexpr double own_warm_up = 1.0;       // … above which it is not run once more to warm up
+constexpr double reference_rtol = 1e-13;  // of IDA, where a scene has no reference
+constexpr long steps_between_looks = 4096;
+
+CpuSeconds summary(std::vector<double> seconds) {
+  std::ranges::sort(seconds);
+  const std::size_t n = seconds.size();
+  const double median = n % 2 == 1 ? seconds[n / 2] : 0.5 * (seconds[n / 2 - 1] + seconds[n / 2]);
+  return {median, seconds.front(), seconds.back(), static_cast<int>(n)};
+}
+
+/// Times a run as often as its length allows; `run` returns its CPU seconds, or a negative number to stop.
+template <class Run>
+CpuSeconds repeat(Run run, int repeats) {
+  const double first = run();
+  if (first < 0.0) return {};
+  if (first > own_warm_up) return summary({first});
+  const int count = first <= long_run ? repeats : std::max(1, static_cast<int>(repeats * long_run / first));
+  std::vector<double> seconds;
+  for (int i = 0; i < count; ++i) seconds.push_back(run());
+  return summary(std::move(seconds));
+}
+
+double violation(const ConstraintRows& rows, const Sample& end) {
+  Vector a(rows.pattern().nonzeros()), residual(rows.rows()), phi = Vector::Zero(rows.rows());
+  rows.coefficients(end.time, end.q, a, residual);
+  rows.pattern().multiply_add(a.data(), end.v.data(), residual.data());
+  if (rows.holonomic()) rows.position(end.time, end.q, phi);
+  return std::max(residual.lpNorm<Eigen::Infinity>(), phi.lpNorm<Eigen::Infinity>());
+}
+
+/// In the first formulation that completes of those that keep φ = 0.
+ReferenceEnd true_end_by_ida(const Scene& scene, double t_end) {
+  ReferenceRun fine;
+  ReferenceOptions options{.rtol = reference_rtol};
+  for (const DaeFormulation formulation : {DaeFormulation::rates, DaeFormulation::rates_loose, DaeFormulation::index_2}) {
+    options.formulation = formulation;
+    fine = integrate_with_ida(scene, t_end, options);
+    if (fine.ok() || scene.rows() == 0) break;
+  }
+  options.rtol *= 10.0;
+  const ReferenceRun coarse = fine.ok() ? integrate_with_ida(scene, t_end, options) : ReferenceRun{};
+  ReferenceEnd reference{.kind = ida_method,
+              .how = fmt::format("IDA at rtol {:g}, beside {:g}", reference_rtol, options.rtol),
+              .missing = fine.ok() ? "" : "no reference: IDA stopped: " + fine.failure,
+              .q = fine.end.q,
+              .p = fine.end.p};
+  if (options.formulation != DaeFormulation::rates) reference.how += std::string(", formulation ") + name(options.formulation);
+  if (fine.ok() && coarse.ok()) reference.self_error = reference.distance(coarse.end);
+  return reference;
+}
+
+/// The start, the steps and the reading of the end.  Empty, or why that failed; `looking` is time spent in
+/// `look`.
+std::string run_once(Integrator& integrator, long steps, Momentum momentum, const Look& look, Sample& end,
+                     double& looking) {
+  integrator.reset();
+  for (long k = 1; k <= steps; ++k) {
+    const StepReport report = integrator.step();
+    if (!report.ok()) return report.failure;
+    if (!look || k % steps_between_looks != 0) continue;
+    const double before = thread_seconds();
+    look();
+    looking += thread_seconds() - before;
+  }
+  const SolveReport reading = integrator.sample(momentum, end);
+  if (reading.ok()) return {};
+  return fmt::format("reading the state at t = {}: {}", integrator.time(), describe(reading.status));
+}
+
+}  // namespace
+
+double ReferenceEnd::distance(const Sample& end) const {
+  return std::max(relative_error(end.q, q), relative_error(end.p, p));
+}
+
+double largest_violation(const Scene& scene, const Sample& at) {
+  double largest = 0.0;
+  for (const auto& rows : scene.constraints) largest = std::max(largest, violation(*rows, at));
+  return largest;
+}
+
+std::optional<ReferenceEnd> known_point(const CatalogueScene& scene, double t) {
+  const auto point = scene.reference.at ? scene.reference.at(t) : std::nullopt;
+  if (!point) return std::nullopt;
+  ReferenceEnd reference{.kind = scene.reference.kind,
+              .how = scene.reference.how,
+              .self_error = scene.reference.self_error,
+              .missing = {},
+              .q = point->q,
+              .p = Vector::Zero(point->q.size())};
+  Vector force = reference.p;
+  completed(scene.scene)->lagrangian->gradient(t, point->q, point->v, force, reference.p);
+  return reference;
+}
+
+ReferenceEnd reference_end(const CatalogueScene& scene, double t_end) {
+  if (auto known = known_point(scene, t_end)) return *std::move(known);
+  return true_end_by_ida(*completed(scene.scene), t_end);
+}
+
+void judge(StudyRow& row, const Scene& scene, const Sample& end, const ReferenceEnd& reference) {
+  const double energy = scene.energy(scene.start.time, scene.start.q, scene.start.v);
+  row.constraint = largest_violation(scene, end);
+  row.energy_error = std::abs(end.energy - energy) / std::max(std::abs(energy), 1.0);
+  if (reference.missing.empty()) {
+    row.error_q = relative_error(end.q, reference.q);
+    row.error_p = relative_error(end.p, reference.p);
+  }
+  if (!end.q.allFinite() || !end.p.allFinite())
+    row.status = "the end point is not finite";
+  else if (!reference.missing.empty())
+    row.status = reference.missing;
+}
+
+namespace {
+
+/// The counts of the work and the errors, or why there are none.
+void conclude(StudyRow& row, const Work& work, const std::string& failure, const Scene& scene,
+              const Sample& end, const ReferenceEnd& reference) {
+  row.steps = work.steps;
+  row.newton_iterations = work.iterations;
+  row.residual_evaluations = work.residual_evaluations;
+  row.jacobian_evaluations = work.jacobian_evaluations;
+  if (failure.empty())
+    judge(row, scene, end, reference);
+  else
+    row.status = failure;
+}
+
+}  // namespace
+
+StudyRow run_ours(Integrator& integrator, long steps, Momentum momentum, int repeats, const ReferenceEnd& reference,
+                  const Look& look) {
+  Sample end;
+  std::string failure;
+  const auto once = [&] {
+    double looking = 0.0;
+    const double before = thread_seconds();
+    failure = run_once(integrator, steps, momentum, look, end, looking);
+    return failure.empty() ? thread_seconds() - before - looking : -1.0;
+  };
+  const IntegratorOptions& options = integrator.options();
+  StudyRow row{.method = options.method, .order = options.order, .step = options.step};
+  row.cpu_seconds = repeat(once, repeats);
+  conclude(row, integrator.work(), failure, integrator.scene(), end, reference);
+  return row;
+}
+
+StudyRow run_variable(AdaptiveIntegrator& integrator, double t_end, Momentum momentum, int repeats,
+                      const ReferenceEnd& reference, const Look& look) {
+  Sample end;
+  std::string failure;
+  const auto once = [&] {
+    double looking = 0.0;
+    long observed = 0;
+    const double before = thread_seconds();
+    integrator.reset();
+    const RunReport report = run(integrator, t_end, momentum, steps_between_looks, [&](const Sample& sample) {
+      end = sample;
+      const double pause = thread_seconds();
+      if (look && observed++ > 0) look();
+      looking += thread_seconds() - pause;
+      return true;
+    });
+    failure = report.last.failure;
+    return failure.empty() ? thread_seconds() - before - looking : -1.0;
+  };
+  const IntegratorOptions& options = integrator.options();
+  StudyRow row{
+      .method = options.method + variable_steps, .order = options.order, .step = integrator.adaptive().eps};
+  row.cpu_seconds = repeat(once, repeats);
+  conclude(row, integrator.work(), failure, integrator.integrator().scene(), end, reference);
+  return row;
+}
+
+StudyRow run_baseline(const std::string& method, const Scene& scene, double t_end,
+                       const ReferenceOptions& options, int repeats, const ReferenceEnd& reference, Sample& end) {
+  const auto integrate = method == erk_method ? integrate_explicitly : integrate_with_ida;
+  ReferenceRun run;
+  const auto once = [&] {
+    run = integrate(scene, t_end, options);
+    return run.ok() ? run.cpu_seconds : -1.0;
+  };
+  StudyRow row{.method = method, .rtol = options.rtol};
+  if (method == ida_method) row.formulation = name(options.formulation);
+  row.cpu_seconds = repeat(once, repeats);
+  row.steps = run.steps;
+  row.newton_iterations = run.newton_iterations;
+  row.residual_evaluations = run.residual_evaluations;
+  row.jacobian_evaluations = run.jacobian_evaluations;
+  if (run.ok())
+    judge(row, scene, run.end, reference);
+  else
+    row.status = run.failure;
+  end = std::move(run.end);
+  return row;
+}
+
+}  // namespace diracstep
