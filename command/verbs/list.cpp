@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <diracstep/command/interrupt.hpp>
 #include <diracstep/command/progress.hpp>
-#include <diracstep/command/verbs/verbs.hpp>
+#include <diracstep/command/verbs.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/reports/report.hpp>
 #include <diracstep/validation/studies/convergence_study.hpp>

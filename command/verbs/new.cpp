@@ -2,7 +2,7 @@
 
 #include <CLI/App.hpp>
 #include <cstdio>
-#include <diracstep/command/verbs/verbs.hpp>
+#include <diracstep/command/verbs.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/scene_format/loader/scene_template.hpp>
 #include <memory>

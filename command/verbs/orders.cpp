@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <diracstep/command/interrupt.hpp>
-#include <diracstep/command/verbs/verbs.hpp>
+#include <diracstep/command/verbs.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/validation/laws/order_table.hpp>
 #include <fstream>
