@@ -222,12 +222,12 @@ IdaBeside run_ida_beside(const StabilityCase& that, const ReferenceEnd& referenc
   return beside;
 }
 
-std::vector<IdaBeside> ida_ladder(const StabilityCase& that, double dearest) {
+std::vector<IdaBeside> ida_ladder(const StabilityCase& that, double most_seconds) {
   const ReferenceEnd reference = reference_of(that);
   std::vector<IdaBeside> runs;
   for (int decade = 3; decade <= 12; ++decade) {
     runs.push_back(run_ida_beside(that, reference, std::pow(10.0, -decade)));
-    if (!(runs.back().cpu_seconds <= std::max(dearest, ida_least_budget))) break;
+    if (!(runs.back().cpu_seconds <= std::max(most_seconds, ida_least_budget))) break;
   }
   return runs;
 }
@@ -250,17 +250,17 @@ StabilityResult run_case(const StabilityCase& that, const Registry& registry, co
                          const std::vector<StabilityMethod>& methods, bool with_ida,
                          const std::function<bool(const std::string&)>& look) {
   StabilityResult result{that, {}, {}};
-  double dearest = 0.0;
+  double most_seconds = 0.0;
   for (const StabilityMethod& method : methods) {
     const auto going_on = [&] { return look(that.name + ": " + method.name); };
     if (!going_on()) return result;
     StabilityRow row = run_stability_case(that, registry, solvers, method, going_on);
     if (!going_on()) return result;
     result.rows.push_back(std::move(row));
-    if (result.rows.back().cpu_seconds > dearest) dearest = result.rows.back().cpu_seconds;
+    if (result.rows.back().cpu_seconds > most_seconds) most_seconds = result.rows.back().cpu_seconds;
   }
   if (!with_ida || !look(that.name + ": IDA")) return result;
-  result.ida = ida_ladder(that, dearest);
+  result.ida = ida_ladder(that, most_seconds);
   for (StabilityRow& row : result.rows)
     if (std::isfinite(row.cpu_seconds)) row.ida = at_cost(result.ida, row.cpu_seconds);
   return result;
