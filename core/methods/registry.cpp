@@ -6,9 +6,9 @@
 #include <diracstep/core/methods/quadrature.hpp>
 #include <diracstep/core/methods/registry.hpp>
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/steps/gauss_lobatto/phase_space_step.hpp>
 #include <diracstep/core/steps/gauss_lobatto/step.hpp>
 #include <diracstep/core/steps/gauss_lobatto/tableau.hpp>
-#include <diracstep/core/steps/phase_space_step.hpp>
 
 namespace diracstep {
 

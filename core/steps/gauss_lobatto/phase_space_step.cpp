@@ -3,8 +3,8 @@
 #include <cmath>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/numerics/scales.hpp>
+#include <diracstep/core/steps/gauss_lobatto/phase_space_step.hpp>
 #include <diracstep/core/steps/gauss_lobatto/tableau.hpp>
-#include <diracstep/core/steps/phase_space_step.hpp>
 
 namespace diracstep {
 
