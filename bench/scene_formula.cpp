@@ -9,6 +9,7 @@
 #include <diracstep/scene_format/scene_catalogue.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
 #include <functional>
+#include <stdexcept>
 #include <vector>
 
 #include "timing.hpp"

@@ -3,6 +3,7 @@
 #include <charconv>
 #include <diracstep/command/arguments.hpp>
 #include <diracstep/core/numerics/errors.hpp>
+#include <system_error>
 
 namespace diracstep::command {
 

@@ -3,6 +3,7 @@
 #if __has_include(<link.h>)
 #include <link.h>
 
+#include <cstdint>
 #include <cstring>
 #include <fstream>
 

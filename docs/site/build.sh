@@ -18,7 +18,7 @@ done
 ln -s "$katex/katex.min.css" "$katex/katex.min.js" "$katex/contrib/auto-render.js" "$katex/fonts" \
   "$site/site.css" "$work/static"
 
-HEADERS="$SOURCES/core $SOURCES/constraints $SOURCES/solvers $SOURCES/scene_format/scene_catalogue.hpp $SOURCES/validation $SOURCES/reports $SOURCES/c_interface \
+HEADERS="$SOURCES/core $SOURCES/constraints $SOURCES/solvers $SOURCES/files $SOURCES/scene_format/scene_catalogue.hpp $SOURCES/validation $SOURCES/reports $SOURCES/c_interface \
   $SOURCES/plugins/diracstep_plugin.h $SOURCES/plugins/diracstep_scene.h $SOURCES/plugins/plugin.hpp \
   $SOURCES/plugins/loaded_plugin.hpp"
 READABLE_HEADER="$site/readable_header.py" OUTPUT="$work"

@@ -12,11 +12,11 @@ language = "en"
 
 extensions = ["myst_parser", "breathe"]
 root_doc = "docs/README"
-# A folder's README is for those who read the code; the page CONTRIBUTING has the same table.
-exclude_patterns = ["tests/**", "examples/**", "core/*/**"] + [
-    f"{room}/**/README.md" for room in ("validation", "scene_format", "command")] + [
-    f"{room}/README.md" for room in ("constraints", "solvers", "plugins", "c_interface", "files", "scene_format", "reports",
-                                     "command", "scenes", "bench", "packaging")]
+# The README of a folder with sources is for those who read the code.
+sources = pathlib.Path(os.environ["SOURCES"])
+exclude_patterns = ["tests/**", "examples/**"] + [
+    str(page.relative_to(sources)) for folder in sources.iterdir() if folder.name not in ("build", "docs")
+    for page in folder.glob("**/README.md") if page != sources / "core/README.md"]
 myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 4
 breathe_projects = {"DiracStep": os.environ["DIRACSTEP_XML"]}

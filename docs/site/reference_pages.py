@@ -13,7 +13,10 @@ FOLDERS = {
     "solvers": "SUNDIALS KINSOL behind the interface of a nonlinear solver.",
     "plugins": "The interface of plugins in C and C++, and what loads them.",
     "c_interface": "DiracStep for other languages.",
-    "validation": "Reference solutions, the catalogue, studies, and checks of methods and scenes.",
+    "scene_format": "Scenes from text files, and the catalogue.",
+    "validation": "Reference solutions, studies, and checks of methods and scenes.",
+    "reports": "Studies as tables, pictures and pages.",
+    "files": "Files that are written whole or not at all.",
 }
 INTRODUCTION = """\
 Every public header, by folder. Names are in the namespace ``diracstep``; include a header as

@@ -2,6 +2,7 @@
 
 #include <diracstep/scene_format/compiler/formula_graph.hpp>
 #include <diracstep/scene_format/compiler/formula_scanner.hpp>
+#include <functional>
 #include <map>
 #include <string>
 #include <string_view>

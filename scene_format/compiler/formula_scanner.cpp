@@ -5,6 +5,7 @@
 #include <charconv>
 #include <cmath>
 #include <diracstep/scene_format/compiler/formula_scanner.hpp>
+#include <system_error>
 
 namespace diracstep::scene_compiler {
 

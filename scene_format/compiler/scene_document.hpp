@@ -1,6 +1,7 @@
 #pragma once
 
 #include <diracstep/scene_format/compiler/formula_parser.hpp>
+#include <functional>
 #include <map>
 #include <optional>
 #include <string>

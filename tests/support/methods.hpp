@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cctype>
 #include <diracstep/core/methods/registry.hpp>
 #include <string>
 #include <vector>

@@ -6,6 +6,7 @@
 #include <diracstep/solvers/kinsol_solver.hpp>
 #include <diracstep/validation/studies/convergence_study.hpp>
 #include <nlohmann/json.hpp>
+#include <sstream>
 
 namespace diracstep {
 namespace {
