@@ -18,11 +18,11 @@ struct VariableSteps {
 StepControl step_control(const std::string& text);
 const char* name(StepControl control);
 
-/// A line on the control for a person, and one that warns where the guard acted too often (else empty).
+/// A line on the control for the user, and one that warns where the guard acted too often (else empty).
 std::string summary(const VariableSteps& steps);
 std::string warning(const VariableSteps& steps, long taken);
 
-/// The search for a step and its outcome, for a person.
+/// The search for a step and its outcome, for the user.
 std::string search_table(const ErrorControlReport& search);
 
 /// "max ω / min ω = 88 over 20 of 20 units of time": whether variable steps pay on a scene, or why that is

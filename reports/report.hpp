@@ -7,7 +7,7 @@
 
 namespace diracstep {
 
-/// A study as tables for a person: the rows, the measured orders, and the time to reach an error.
+/// A study as tables for a terminal: the rows, the measured orders, and the time to reach an error.
 std::string study_table(const Study& study);
 
 /// CPU time at the compared errors as a Markdown table with its heading: methods side by side, the fastest

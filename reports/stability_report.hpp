@@ -7,10 +7,10 @@
 
 namespace diracstep {
 
-/// Linear stability as a table for a person.
+/// Linear stability as a table for a terminal.
 std::string linear_stability_table(const std::vector<LinearStability>& linear);
 
-/// One case with every method, and IDA below, as a table for a person.
+/// One case with every method, and IDA below, as a table for a terminal.
 std::string stability_table(const StabilityResult& result);
 
 /// {"growth_tolerance": …, "linear": […], "cases": […]}; a number that does not apply or is not finite is

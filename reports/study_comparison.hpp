@@ -21,7 +21,7 @@ struct StudyChange {
 /// 1e-12, does. Throws Misuse for a text that is no study, and where the two share nothing.
 std::vector<StudyChange> compare_studies(const std::vector<Study>& now, const std::string& before_json);
 
-/// The changes as a table for a person, those within the noise counted only.
+/// The changes as a table for a terminal, those within the noise counted only.
 std::string comparison_table(const std::vector<StudyChange>& changes);
 
 }  // namespace diracstep

@@ -79,7 +79,7 @@ std::optional<double> median(std::vector<double> values) {
   return n % 2 == 1 ? values[n / 2] : std::sqrt(values[n / 2 - 1] * values[n / 2]);
 }
 
-/// How much faster, in the median of the scenes where both sides reach the error.
+/// The ratio of the CPU times, the median over the scenes where both sides reach the error.
 std::string tile(const std::vector<PageEntry>& entries, const std::string& baseline,
                  std::optional<double> AtError::*ratio) {
   std::vector<double> ratios;
@@ -160,7 +160,7 @@ std::string methods(const Study& study) {
   return table.rows.empty() ? "" : table.text();
 }
 
-/// The decisions of the plan; what is left out comes first and in the open.
+/// The decisions of the plan; what is left out comes first and is shown unfolded.
 std::string plan(const History& history) {
   if (history.plan.empty()) return {};
   PageFacts left_out, done;

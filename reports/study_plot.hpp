@@ -16,7 +16,7 @@ namespace diracstep {
 std::string draw_work_precision(const Study& study, const std::vector<SeriesStyle>& styles,
                                 const std::filesystem::path& directory);
 
-/// SCENE-history: what should stay over time, that is the change of energy and invariants and the violation
+/// SCENE-history: what should stay constant, that is the change of energy and invariants and the violation
 /// of the rows, on a logarithmic axis; SCENE-error: the error over time, both logarithmic; SCENE-motion.
 std::string draw_history(const History& history, const std::string& scene, const std::string& time_unit,
                          const std::vector<SeriesStyle>& styles, const std::filesystem::path& directory);
