@@ -21,7 +21,7 @@ namespace diracstep {
 ///   near a collision       Kepler started at a pericentre of 1e-2 … 1e-8
 ///   mass ratio             knife edge, torn masses, double pendulum with ratios 1e-12 … 1e12
 ///   rows scaled            rows multiplied by 1e-8, 1e8
-///   dependent rows         a row given twice: refused, and run with the second one dropped
+///   redundant constraints  a row given twice: refused, and run with the second one dropped
 ///   steps scaled           1e-12 … 1e2 times the natural step
 ///
 /// `full` adds cases in between, longer times and runs of 1e7 steps.
