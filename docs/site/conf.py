@@ -12,11 +12,9 @@ language = "en"
 
 extensions = ["myst_parser", "breathe"]
 root_doc = "docs/README"
-# A folder's README is for those who read the code; the page CONTRIBUTING has the same table.
-exclude_patterns = ["tests/**", "examples/**", "core/*/**"] + [
-    f"{room}/**/README.md" for room in ("validation", "scene_format", "command")] + [
-    f"{room}/README.md" for room in ("constraints", "solvers", "plugins", "c_interface", "files", "scene_format", "reports",
-                                     "command", "scenes", "bench", "packaging")]
+# The folders' own READMEs are for those who read the code; core's belongs to the mathematics.
+exclude_patterns = ["core/*/**"] + [f"{path.name}/**" for path in pathlib.Path(__file__).parents[2].iterdir()
+                                    if path.is_dir() and path.name not in ("core", "docs")]
 myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 4
 breathe_projects = {"DiracStep": os.environ["DIRACSTEP_XML"]}

@@ -50,7 +50,7 @@ double error_at_ten(const std::shared_ptr<const Scene>& scene, const std::string
 TEST(PhaseSpaceStep, JacobianAgreesWithDifferences) {
   const auto scene = completed(lotka_volterra<0>());
   for (const int s : {1, 2, 3}) {
-    const auto problem = Registry::with_built_ins().method(gl(s)).step(*scene, true);
+    const auto problem = Registry::with_built_ins().method(gl(s)).make_step(*scene, {true});
     Vector x = Vector::LinSpaced(problem->size(), -0.1, 0.15), p(2), lq(2);
     scene->lagrangian->gradient(0.0, scene->start.q, scene->start.v, lq, p);
     problem->begin({0.0, 0.2}, scene->start.q, p);
@@ -156,7 +156,7 @@ std::pair<double, double> energy_bands(const std::shared_ptr<const Scene>& scene
   Integrator integrator(scene, Registry::with_built_ins(), kinsol(), options);
   double first = 0.0, last = 0.0, start = std::nan("");
   long k = 0;
-  const RunReport report = run(integrator, steps, Momentum::projected, 10, [&](const Sample& sample) {
+  const RunReport report = run_steps(integrator, steps, Momentum::projected, 10, [&](const Sample& sample) {
     if (std::isnan(start)) start = sample.energy;
     const double change = std::abs(sample.energy - start);
     if (k < steps / 10) first = std::max(first, change);
