@@ -147,8 +147,44 @@ TEST_P(LawsOfTypesOneToThree, EveryStepIsAMemberOfTheDiscreteDiracStructure) {
       for (const Membership& m : memberships) {
         EXPECT_LT(m.constraint, 1e-14) << scene->name << " " << k;
         EXPECT_LT(m.annihilator, 5e-12) << scene->name << " " << k;
+        EXPECT_LE(m.annihilator_of_class, m.annihilator) << scene->name << " " << k;
       }
     }
+  }
+}
+
+/// Moved by an element of the annihilator at its far end, a (+) or (−) step is a member in the sense of
+/// (4.28) and (8.3), which look at momentum classes, and not in that of equal momenta; moved by another
+/// covector, in neither.
+TEST(DiscreteDiracStructure, ReadsTheBasePointAsAMomentumOrAsItsClass) {
+  const auto scene = testing::every_constraint_class().at(1);
+  ASSERT_GT(scene->rows(), 0);
+  const auto method = Registry::with_built_ins().method("type1/midpoint");
+  DiscreteDiracStructure structure(scene->constraints, scene->dimension(), method.info.constraint_rule);
+  const Trajectory t = trajectory_of(scene, {.method = "type1/midpoint", .step = h});
+  const auto s = method.generating_function(*scene);
+  const Interval step{0.0, h};
+  const auto row_at = [&](double time, const Vector& q) {
+    ConstraintsAtPoint rows(scene->constraints, scene->dimension());
+    rows.evaluate(time, q);
+    Vector covector = Vector::Zero(q.size());
+    rows.add_annihilator(Vector::Ones(scene->rows()), covector);
+    return covector;
+  };
+  const Vector other = Vector::LinSpaced(scene->dimension(), 1.0, 2.0);
+  const auto plus = [&](const Vector& change) {
+    return structure.plus(step, {t.q[0], t.plus[0]}, {t.q[1], t.plus[1] + change},
+                          differential(*s, t, 0, true));
+  };
+  const auto minus = [&](const Vector& change) {
+    return structure.minus(step, {t.q[0], t.minus[0] + change}, {t.q[1], t.minus[1]},
+                           differential(*s, t, 0, false));
+  };
+  for (const auto& [in_class, outside] : {std::pair(plus(row_at(step.end(), t.q[1])), plus(other)),
+                                          std::pair(minus(row_at(step.start, t.q[0])), minus(other))}) {
+    EXPECT_GT(in_class.annihilator, 0.1);
+    EXPECT_LT(in_class.annihilator_of_class, 5e-12);
+    EXPECT_GT(outside.annihilator_of_class, 0.1);
   }
 }
 
