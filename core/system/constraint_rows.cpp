@@ -1,5 +1,7 @@
+#include <algorithm>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/system/constraint_rows.hpp>
+#include <iterator>
 
 namespace diracstep {
 
@@ -20,6 +22,20 @@ int row_count(const ConstraintBlocks& blocks) {
   int rows = 0;
   for (const auto& block : blocks) rows += block->rows();
   return rows;
+}
+
+ConstraintBlocks only_holonomic(const ConstraintBlocks& blocks) {
+  ConstraintBlocks some;
+  std::ranges::copy_if(blocks, std::back_inserter(some),
+                       [](const auto& block) { return block->holonomic(); });
+  return some;
+}
+
+ConstraintBlocks only_nonholonomic(const ConstraintBlocks& blocks) {
+  ConstraintBlocks some;
+  std::ranges::copy_if(blocks, std::back_inserter(some),
+                       [](const auto& block) { return !block->holonomic(); });
+  return some;
 }
 
 }  // namespace diracstep

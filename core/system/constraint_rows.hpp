@@ -62,4 +62,8 @@ using ConstraintBlocks = std::vector<std::shared_ptr<const ConstraintRows>>;
 /// Number of rows in all blocks.
 int row_count(const ConstraintBlocks& blocks);
 
+/// Those blocks that are holonomic, or those that are not.
+ConstraintBlocks only_holonomic(const ConstraintBlocks& blocks);
+ConstraintBlocks only_nonholonomic(const ConstraintBlocks& blocks);
+
 }  // namespace diracstep

@@ -40,7 +40,7 @@ std::vector<std::string> Scene::row_names() const {
 }
 
 double Scene::energy(double t, ConstVectorRef q, ConstVectorRef v) const {
-  Vector lq(q.size()), lv(q.size());
+  Vector lq(v.size()), lv(v.size());
   lagrangian->gradient(t, q, v, lq, lv);
   return v.dot(lv) - lagrangian->value(t, q, v);
 }
@@ -90,7 +90,7 @@ std::shared_ptr<const Scene> completed(std::shared_ptr<const Scene> scene) {
   if (!scene->lagrangian) {
     const std::string prefix = "scene '" + scene->name + "': ";
     const Vector& p = scene->start.v.size() == 0 ? start.p : start.v;  // regularity is tested there
-    require_size(prefix + "the start q", start.q.size(), scene->dimension());
+    require_size(prefix + "the start q", start.q.size(), scene->storage_size());
     require_size(prefix + "the start v", p.size(), scene->dimension());
     complete->lagrangian = lagrangian_from(scene->hamiltonian, start.time, start.q, p);
   }
@@ -105,7 +105,7 @@ std::shared_ptr<const Hamiltonian> hamiltonian_of(const Scene& scene) {
 void require_consistent(const Scene& scene, const Start& given) {
   const std::string prefix = "scene '" + scene.name + "': ";
   const Start start = completed_start(scene, given);
-  require_size(prefix + "the start q", start.q.size(), scene.dimension());
+  require_size(prefix + "the start q", start.q.size(), scene.storage_size());
   require_size(prefix + "the start v", start.v.size(), scene.dimension());
   require_finite(scene, "q", start.q);
   require_finite(scene, "v", start.v);

@@ -26,15 +26,16 @@ class SingleStep {
 
   Result operator()(Interval step, const Vector& q0, const Vector& p0, const Vector& v0) {
     Result result{q0, p0, Vector(), Vector(problem_->size())};
-    problem_->begin(step, q0, p0);
+    problem_->begin(step, {q0, p0, v0}, {});
     problem_->guess(v0, result.unknowns);
     if (solver_ && !solver_->solve(result.unknowns).ok()) {
       result.q1.setConstant(std::nan(""));
       result.p1.setConstant(std::nan(""));
       return result;
     }
-    problem_->finish(result.unknowns, result.q1, result.p1, result.impulse);
-    return result;
+    StepEnd end;
+    problem_->finish(result.unknowns, end);
+    return {end.q, end.p, end.impulse, result.unknowns};
   }
 
  private:
