@@ -53,8 +53,19 @@ function(diracstep_install_library target component)
     DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/DiracStep)
 endfunction()
 
+# Installs the headers that <folder>/public_headers.txt lists; the others are of use to the library only.
+function(diracstep_install_headers folder)
+  set(list ${CMAKE_CURRENT_SOURCE_DIR}/public_headers.txt)
+  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${list})
+  file(STRINGS ${list} headers REGEX "^[^#]")
+  foreach(header IN LISTS headers)
+    get_filename_component(directory ${header} DIRECTORY)
+    install(FILES ${header} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/diracstep/${folder}/${directory})
+  endforeach()
+endfunction()
+
 # diracstep_library(<folder> SOURCES ... PUBLIC ... PRIVATE ...)
-# Makes diracstep_<folder>, alias DiracStep::<folder>, and installs it with its headers.
+# Makes diracstep_<folder>, alias DiracStep::<folder>, and installs it with its public headers.
 # A folder without sources becomes a header-only library.
 function(diracstep_library folder)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "SOURCES;PUBLIC;PRIVATE")
@@ -85,6 +96,5 @@ function(diracstep_library folder)
     $<BUILD_INTERFACE:${include_root}> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
 
   diracstep_install_library(${target} ${folder})
-  install(DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR}/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/diracstep/${folder}
-    FILES_MATCHING PATTERN *.hpp PATTERN *.h)
+  diracstep_install_headers(${folder})
 endfunction()

@@ -13,13 +13,6 @@ namespace diracstep {
 
 namespace {
 
-ConstraintBlocks holonomic_blocks(const Scene& scene) {
-  ConstraintBlocks blocks;
-  std::ranges::copy_if(scene.constraints, std::back_inserter(blocks),
-                       [](const auto& block) { return block->holonomic(); });
-  return blocks;
-}
-
 /// Unknowns (q, ν):   q − q̂ + Dφ(q)ᵀν = 0,   φ(t,q) = 0: the nearest point of the constraint, full matrices.
 class NearestPointProblem final : public NonlinearProblem {
  public:
@@ -216,11 +209,11 @@ ConsistentStart project_start(const Scene& given, const Start& given_start, cons
   const auto complete = completed(std::move(copy)), extended = with_hidden_rows(complete);
   const Scene& scene = *extended;
   const Start& start = complete->start;
-  require_size("the start q", start.q.size(), scene.dimension());
+  require_size("the start q", start.q.size(), scene.storage_size());
   require_size("the start v", start.v.size(), scene.dimension());
   ConsistentStart result{start, 0.0, 0.0};
   const Eigen::Index n = start.q.size();
-  const ConstraintBlocks holonomic = holonomic_blocks(scene);
+  const ConstraintBlocks holonomic = only_holonomic(scene.constraints);
   if (!holonomic.empty()) {
     NearestPointProblem problem(holonomic, start.time, start.q);
     Vector x = Vector::Zero(problem.size());

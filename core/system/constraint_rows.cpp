@@ -1,6 +1,7 @@
+#include <algorithm>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/system/constraint_rows.hpp>
-#include <stdexcept>
+#include <iterator>
 
 namespace diracstep {
 
@@ -14,13 +15,27 @@ ConstraintRows::ConstraintRows(bool holonomic, SparsityPattern pattern, Sparsity
 }
 
 void ConstraintRows::position(double, ConstVectorRef, VectorRef) const {
-  throw std::logic_error("these constraint rows have no position form φ(t,q)");
+  throw Misuse("these constraint rows have no position form φ(t,q)");
 }
 
 int row_count(const ConstraintBlocks& blocks) {
   int rows = 0;
   for (const auto& block : blocks) rows += block->rows();
   return rows;
+}
+
+ConstraintBlocks only_holonomic(const ConstraintBlocks& blocks) {
+  ConstraintBlocks some;
+  std::ranges::copy_if(blocks, std::back_inserter(some),
+                       [](const auto& block) { return block->holonomic(); });
+  return some;
+}
+
+ConstraintBlocks only_nonholonomic(const ConstraintBlocks& blocks) {
+  ConstraintBlocks some;
+  std::ranges::copy_if(blocks, std::back_inserter(some),
+                       [](const auto& block) { return !block->holonomic(); });
+  return some;
 }
 
 }  // namespace diracstep

@@ -33,7 +33,7 @@ class ConstraintRows {
   /// Whether A depends on neither t nor q, and b not on q; false where that is not known.
   virtual bool constant() const { return false; }
 
-  /// φ(t,q), m values.  Holonomic rows only; the default throws std::logic_error.
+  /// φ(t,q), m values.  Holonomic rows only; the default throws Misuse.
   virtual void position(double t, ConstVectorRef q, VectorRef phi) const;
 
   /// A(t,q) on pattern(), and b(t,q).
@@ -61,5 +61,9 @@ using ConstraintBlocks = std::vector<std::shared_ptr<const ConstraintRows>>;
 
 /// Number of rows in all blocks.
 int row_count(const ConstraintBlocks& blocks);
+
+/// Those blocks that are holonomic, or those that are not.
+ConstraintBlocks only_holonomic(const ConstraintBlocks& blocks);
+ConstraintBlocks only_nonholonomic(const ConstraintBlocks& blocks);
 
 }  // namespace diracstep

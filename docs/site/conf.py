@@ -12,11 +12,9 @@ language = "en"
 
 extensions = ["myst_parser", "breathe"]
 root_doc = "docs/README"
-# The README of a folder with sources is for those who read the code.
-sources = pathlib.Path(os.environ["SOURCES"])
-exclude_patterns = ["tests/**", "examples/**"] + [
-    str(page.relative_to(sources)) for folder in sources.iterdir() if folder.name not in ("build", "docs")
-    for page in folder.glob("**/README.md") if page != sources / "core/README.md"]
+# The folders' own READMEs are for those who read the code; core's belongs to the mathematics.
+exclude_patterns = ["core/*/**"] + [f"{path.name}/**" for path in pathlib.Path(__file__).parents[2].iterdir()
+                                    if path.is_dir() and path.name not in ("core", "docs")]
 myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 4
 breathe_projects = {"DiracStep": os.environ["DIRACSTEP_XML"]}

@@ -1,9 +1,9 @@
 #include <algorithm>
 #include <cmath>
+#include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/solvers/detail/linear_solver.hpp>
 #include <limits>
-#include <stdexcept>
 #include <vector>
 #ifdef DIRACSTEP_WITH_KLU
 #include <klu.h>
@@ -31,7 +31,7 @@ class Klu final : public LinearSolver {
     common_.ordering = 0;
     common_.tol = 0.1;
     symbolic_ = klu_analyze(pattern.rows(), starts(), rows(), &common_);
-    if (symbolic_ == nullptr) throw std::runtime_error("KLU could not analyse the pattern of the Jacobian");
+    if (symbolic_ == nullptr) throw Error("KLU could not analyse the pattern of the Jacobian");
   }
   Klu(const Klu&) = delete;
   Klu& operator=(const Klu&) = delete;
@@ -51,14 +51,14 @@ class Klu final : public LinearSolver {
 
   /// The pivots are those of the matrix that was last factored afresh.
   void save(Snapshot& to) const override {
-    to.put(numeric_ != nullptr ? 1.0 : 0.0);
-    if (numeric_ != nullptr) to.put(fresh_values_);
+    to.put("pivots chosen", numeric_ != nullptr);
+    if (numeric_ != nullptr) to.put("matrix of the pivots", fresh_values_);
   }
-  void restore(Snapshot& from) override {
+  void restore(SnapshotReader& from) override {
     reset();
-    if (from.whole_number(1) == 0) return;
+    if (!from.flag("pivots chosen")) return;
     Vector values(fresh_values_.size());
-    from.read(values);
+    from.read("matrix of the pivots", values);
     factor_afresh(values.data());
   }
 
