@@ -4,7 +4,7 @@
 set -eu
 tests="$(cd "$(dirname "$0")" && pwd)"
 table="${2:-$tests/rooms.txt}"
-folders="$(sed -n 's/^\([a-z_]*\)[/:].*/\1/p' "$table" | sort -u)"
+folders="$(find "$1" -mindepth 1 -maxdepth 1 -type d -exec basename {} ";" | grep -Ev "^([.].*|build|examples|tests|bench|docs)$")"
 cd "$1"
 for folder in tests bench; do [ ! -d "$folder" ] || others="${others:-} $folder"; done
 sources() { find "$@" '(' -name '*.[ch]' -o -name '*.[ch]pp' ')' -type f; }

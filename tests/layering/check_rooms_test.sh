@@ -55,6 +55,8 @@ echo '#include <diracstep/core/elsewhere/unit.hpp>' >"$work/core/dirac/planted.c
 refuses 'core/elsewhere/unit.hpp, which is in no room'
 echo '  #  include <kinsol/kinsol.h>' >"$work/solvers/planted.hpp"
 refuses 'solvers/planted.hpp: SUNDIALS is for sources and detail/ only'
+mkdir "$work/planted" && touch "$work/planted/unit.cpp"
+refuses 'planted: has sources and no line in the table'
 mkdir "$work/core/planted" && touch "$work/core/planted/unit.cpp"
 refuses 'core/planted: has sources and no line in the table'
 touch "$work/core/unit.hpp"
