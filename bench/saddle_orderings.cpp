@@ -43,7 +43,7 @@ struct Matrix {
     const CatalogueScene entry = make_scene(scene, {{"N", double(sites)}});
     Integrator integrator(entry.scene, Registry::with_built_ins(), kinsol(), {.method = method, .step = h});
     for (int k = 0; k < 5; ++k) (void)integrator.step();
-    const auto step = Registry::with_built_ins().method(method).step(integrator.scene(), false);
+    const auto step = Registry::with_built_ins().method(method).make_step(integrator.scene(), {});
     step->begin({integrator.time(), h}, integrator.position(), integrator.momentum());
     Vector x(step->size()), f(step->size());
     step->guess(integrator.velocity_estimate(), x);
