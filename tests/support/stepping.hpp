@@ -52,7 +52,7 @@ class SingleStep {
     }
     StepEnd end;
     problem_->finish(x, end);
-    return {end.q, end.p, end.impulse};
+    return {end.at.q, end.at.p, end.impulse};
   }
 
  private:

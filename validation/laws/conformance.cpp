@@ -169,7 +169,7 @@ double symplecticity_defect(const Registry& registry, const std::shared_ptr<cons
     if (solver && !solver->solve(x).ok()) return Vector::Constant(2 * n, std::nan(""));
     StepEnd end;
     problem->finish(x, end);
-    return join(end.q, end.p);
+    return join(end.at.q, end.at.p);
   };
   Vector lq(n), p(n);
   scene->lagrangian->gradient(scene->start.time, scene->start.q, scene->start.v, lq, p);

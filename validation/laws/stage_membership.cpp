@@ -114,8 +114,8 @@ double stage_membership_residual(const Registry& registry, const std::shared_ptr
     problem->guess(scene->start.v, x);
     if (!solver->solve(x).ok()) return std::nan("");
     problem->finish(x, end);
-    largest = std::max(largest, space.residual(step, x, start, {end.q, end.p}));
-    start = {end.q, end.p};
+    largest = std::max(largest, space.residual(step, x, start, {end.at.q, end.at.p}));
+    start = {end.at.q, end.at.p};
   }
   return largest;
 }

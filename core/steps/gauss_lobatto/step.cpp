@@ -143,18 +143,18 @@ class GaussLobattoStep final : public StepProblem {
     if (sums_) {
       sums_->end(step_size(), q0, p0_, velocities(x), momentum_.forces(), impulses_, end);
     } else {
-      end.q.resize(n_);
-      end.p.resize(n_);
-      if (m_ > 0) end.q = points_.lobatto.col(s_);
+      end.at.q.resize(n_);
+      end.at.p.resize(n_);
+      if (m_ > 0) end.at.q = points_.lobatto.col(s_);
       for_each_piece(n_, [&](int first, int rows) {
         if (m_ == 0)  // nothing else looks there
           combine_piece(first, rows, n_, s_, &weights.lobatto(0, s_), x.data(), points_.lobatto.data(),
-                        end.q.data());
+                        end.at.q.data());
         add_forces_and_impulses(first, rows, weights.end_force.data(), weights.table.lobatto_b.data(),
-                                p0_.data(), end.p.data());
+                                p0_.data(), end.at.p.data());
       });
     }
-    end.v = (end.q - q0) / step_size();
+    end.at.v = (end.at.q - q0) / step_size();
     // The impulse at q0 is that part of λ_0 which enters there.
     end.impulse = weights.table.lobatto_b[0] * x.segment(n_ * s_, m_);
     measure(x, end.memory);
