@@ -17,8 +17,6 @@ constexpr std::array<std::pair<const char*, StepControl>, 3> controls{
      {"in-step", StepControl::in_step},
      {"irreversible", StepControl::irreversible}}};
 
-constexpr long plan_survey_steps = 2000;
-
 std::string short_number(double value) { return std::isnan(value) ? "" : fmt::format("{:.2e}", value); }
 
 }  // namespace
@@ -72,7 +70,7 @@ PlanLine rate_line(const Scene& given, const SolverFactory& solvers, double end)
   const auto scene = completed(std::make_shared<const Scene>(given));
   if (!has_accelerations(*scene))
     return {"variable steps", "not offered", "L is linear in v: no accelerations to choose them by"};
-  const RateSurvey survey = survey_rate(*scene, solvers, end, plan_survey_steps);
+  const RateSurvey survey = survey_rate(*scene, solvers, end);
   if (!survey.failure.empty()) return {"variable steps", "not known", survey.failure};
   const std::string reason =
       fmt::format("max ω / min ω = {:.2g} over the first {:.3g} of {:.3g} units of time", survey.ratio(),

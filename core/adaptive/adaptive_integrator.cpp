@@ -15,7 +15,7 @@ namespace {
 constexpr double lowest_ratio = 0.8, highest_ratio = 1.25;  // of z to ω before the guard acts
 constexpr double size_tolerance = 1e-10;  // relative, of an equation in the step: below it is round-off
 constexpr int max_sizes = 30;             // tried for one step
-constexpr long survey_steps = 120;
+constexpr long scale_survey_steps = 120;
 
 /// The options of the integrator under the control: a step that solves for its size is no composition itself.
 IntegratorOptions inner_options(IntegratorOptions options, const Registry& registry, StepControl control) {
@@ -57,8 +57,8 @@ RateMeter make_meter(const Scene& scene, const SolverFactory& solvers, const Ada
   require_even(adaptive.monitor, scene.start);
   MonitorScales scales = adaptive.scales;
   if (!adaptive.monitor.rate && (scales.typical <= 0.0 || scales.lowest <= 0.0)) {
-    const RateSurvey survey =
-        survey_rate(scene, solvers, adaptive.end.value_or(scene.start.time + 100.0 * step), survey_steps);
+    const RateSurvey survey = survey_rate(
+        scene, solvers, adaptive.end.value_or(scene.start.time + 100.0 * step), scale_survey_steps);
     if (scales.typical <= 0.0) scales.typical = survey.scales.typical;
     if (scales.lowest <= 0.0) scales.lowest = survey.scales.lowest;
     accelerations = survey.accelerations;

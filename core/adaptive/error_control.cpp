@@ -10,7 +10,6 @@
 namespace diracstep {
 namespace {
 
-constexpr long survey_steps = 400;
 constexpr std::size_t max_runs = 24;
 constexpr int max_halvings = 12;  // while the coarse runs fail
 
@@ -217,7 +216,7 @@ ErrorControlReport solve_to_error(const std::shared_ptr<const Scene>& given, con
   choose_method(*scene, registry, options, report);
   RateSurvey survey;
   if (has_accelerations(*scene)) {
-    survey = survey_rate(*scene, solvers, end, survey_steps);
+    survey = survey_rate(*scene, solvers, end);
     report.adaptive = choose_adaptive(options, survey, report.reason);
   }
   const auto search = [&] {

@@ -24,8 +24,12 @@ struct RateSurvey {
   bool variable_steps_pay() const { return ratio() > 5.0; }
 };
 
+/// Steps that tell whether variable steps pay, and the scales to choose them by.
+inline constexpr long survey_steps = 400;
+
 /// Surveys from the start towards `end`, at most `max_steps` steps.  Throws Misuse for an end that is the
 /// start or not finite, and for a Lagrangian linear in v.
-RateSurvey survey_rate(const Scene& scene, const SolverFactory& solvers, double end, long max_steps);
+RateSurvey survey_rate(const Scene& scene, const SolverFactory& solvers, double end,
+                       long max_steps = survey_steps);
 
 }  // namespace diracstep

@@ -92,7 +92,7 @@ StepReport Integrator::retry(double h) {
   const Guess guess = *last_.retry;
   if (guess == Guess::last_solution) sequence_->withdraw_step();
   clock_ = last_.clock;
-  std::swap(state_, last_.start);
+  state_.swap(last_.start);
   --work_.steps;
   return take(h, guess);
 }
@@ -124,8 +124,8 @@ StepReport Integrator::take(double h, Guess guess) {
 
 void Integrator::accept_step(double h, int pieces) {
   last_.clock = clock_;
-  std::swap(last_.start, state_);
-  std::swap(state_, sequence_->end());
+  last_.start.swap(state_);
+  state_.swap(sequence_->end());
   sequence_->accept_step(pieces);
   last_.retry = pieces == 1 ? Guess::last_solution : Guess::plain;
   clock_.advance(h, options_.step);

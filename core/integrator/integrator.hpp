@@ -48,13 +48,13 @@ class Integrator {
   /// leaves the state there.  Throws Misuse where the last step failed or there is none, and after restore().
   StepReport retry(double h);
 
-  /// Goes on from another point of a motion: p is any momentum of its class, v a rough velocity that serves
-  /// as a guess.  That q fulfils the constraints is not checked.  The counts of work go on.
+  /// Goes on from another point of a motion: p is any momentum of its class, v an estimate of the velocity
+  /// that serves as a guess.  That q fulfils the constraints is not checked.  The counts of work go on.
   void restart(double time, ConstVectorRef q, ConstVectorRef p, ConstVectorRef v);
 
   double time() const { return clock_.time(options_.step); }
   const Vector& position() const { return state_.q; }
-  /// A momentum of the class at the current point, and a rough velocity there.
+  /// A momentum of the class at the current point, and an estimate of the velocity there.
   const Vector& momentum() const { return state_.p; }
   const Vector& velocity_estimate() const { return state_.v; }
   const Work& work() const { return work_; }

@@ -122,14 +122,14 @@ void Predictor::accept_step(ConstVectorRef solution) {
   known_before_ = known_;
   if (known_ >= 2 && (accepted_ < always_until || accepted_ % later_every == 0)) elect(solution);
   ++accepted_;
-  std::rotate(history_.begin(), history_.end() - 1, history_.end());
+  for (std::size_t k = longest; k > 0; --k) history_[k].swap(history_[k - 1]);
   history_.front() = solution;
   known_ = std::min(known_ + 1, longest);
 }
 
 void Predictor::withdraw_step(VectorRef x) {
   x = history_.front();
-  std::rotate(history_.begin(), history_.begin() + 1, history_.end());
+  for (std::size_t k = 0; k < longest; ++k) history_[k].swap(history_[k + 1]);
   best_ = best_before_;
   known_ = known_before_;
   --accepted_;

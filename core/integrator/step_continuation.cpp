@@ -38,9 +38,9 @@ void StepContinuation::begin(const Path& path, double part) {
 
 double StepContinuation::change(const Path& path, double h, ConstVectorRef x) {
   problem_.finish(x, end_);
-  const double floor = std::max(round_off * (max_norm(end_.v) + max_norm(path.v0)),
+  const double floor = std::max(round_off * (max_norm(end_.at.v) + max_norm(path.v0)),
                                 rounded_positions * max_norm(path.start.q) / std::abs(h));
-  other_ = end_.v - path.v0;
+  other_ = end_.at.v - path.v0;
   const double norm = max_norm(other_);
   return norm > floor ? norm : 0.0;
 }
@@ -124,10 +124,10 @@ bool StepContinuation::tends_to_start(const Path& path, VectorRef x, Result& wor
 
 double StepContinuation::distance(ConstVectorRef x, ConstVectorRef y) {
   problem_.finish(y, end_);
-  other_ = end_.v;
+  other_ = end_.at.v;
   problem_.finish(x, end_);
-  const double way = end_.v.lpNorm<Eigen::Infinity>();
-  other_ -= end_.v;
+  const double way = end_.at.v.lpNorm<Eigen::Infinity>();
+  other_ -= end_.at.v;
   const double apart = other_.lpNorm<Eigen::Infinity>();
   return apart > 0.0 ? apart / way : 0.0;
 }

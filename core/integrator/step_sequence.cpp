@@ -11,8 +11,7 @@ StepSequence::StepSequence(std::shared_ptr<const Scene> scene, StepDesign design
   end_ = {Vector::Zero(scene_->storage_size()), Vector::Zero(n), Vector::Zero(n)};
   for (std::size_t k = 0; k < design_.parts.size(); ++k) {
     parts_.push_back(make_part(k));
-    parts_.back().end().q = end_.q;  // of its size, so that no later step allocates it
-    parts_.back().end().p = parts_.back().end().v = end_.p;
+    parts_.back().end().at = end_;  // of its size, so that no later step allocates it
   }
   for (const auto& [fraction, part] : design_.stages) {
     const StepProblem& problem = parts_[part].problem();
@@ -43,10 +42,7 @@ StepSequence::Outcome StepSequence::solve(Interval step, const State& start, Gue
       const SolveReport report = part.solve(task(stage, {t, h}, *at, guess), stage.x, work);
       if (!report.ok()) return failed(report, stage, size);
       total.add(report);
-      std::swap(end_.q, part.end().q);
-      std::swap(end_.p, part.end().p);
-      std::swap(end_.v, part.end().v);
-      std::swap(end_.rest, part.end().rest);
+      end_.swap(part.end().at);
       at = &end_;
       t += h;
     }

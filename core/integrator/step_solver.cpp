@@ -46,7 +46,7 @@ SolveReport StepSolver::solve(const Task& task, Vector& x, Work& work) {
   if (!report.ok()) return report;
   problem_->finish(x, end_);
   if (predicted) prefer_smaller_turn(task, x, report, work);
-  if (!(all_finite(end_.q.data(), end_.q.size()) && all_finite(end_.p.data(), end_.p.size())))
+  if (!(all_finite(end_.at.q.data(), end_.at.q.size()) && all_finite(end_.at.p.data(), end_.at.p.size())))
     report.status = SolveStatus::not_finite;
   return report;
 }
@@ -135,7 +135,7 @@ SolveReport StepSolver::follow(const Task& task, Vector& x, SolveReport found, W
 StepSolver::Turn StepSolver::turn(const Vector& v0) const {
   Turn turn{0.0, 0.0};
   for (Eigen::Index i = 0; i < v0.size(); ++i) {
-    const double v = end_.v[i];
+    const double v = end_.at.v[i];
     turn.size = std::max(turn.size, std::abs(v - v0[i]));
     turn.speed = std::max(turn.speed, std::max(std::abs(v), std::abs(v0[i])));
   }

@@ -34,7 +34,7 @@ class StepSolver {
   double reached() const { return reached_; }
 
   /// Steps from now on judge round-off by the step last solved.
-  void accept_step() { std::swap(memory_, end_.memory); }
+  void accept_step() { memory_.swap(end_.memory); }
   /// No step was accepted before the next one, and nothing is kept.
   void clear_history();
   /// Drops what the solver keeps: pivots chosen for a matrix that led nowhere.

@@ -34,7 +34,7 @@ Order order_of(const MethodRequest& request, int size) {
   if (request.error > 0.0)
     return {order_for(request.error, size),
             "for an error of " + to_text(request.error, 3) + " with " + std::to_string(size) + " unknowns"};
-  return {usual_order, "near the least time for errors of 1e-3; order 8 for small ones"};
+  return {usual_order, "near the least time for errors of 1e-3, small ones take 8"};
 }
 
 }  // namespace

@@ -111,13 +111,13 @@ class ImplicitStep final : public StepProblem {
 
   void finish(ConstVectorRef x, StepEnd& end) override {
     evaluate(x);
-    end.q = q1_;
+    end.at.q = q1_;
     if (graph_.ends_at_position)
-      end.p = graph_.end_sign * gradient_.col(1);
+      end.at.p = graph_.end_sign * gradient_.col(1);
     else
-      end.p = y_.col(1);
-    if (force_) end.p += force_->plus();
-    end.v = (q1_ - data_.q0) / data_.step.size;
+      end.at.p = y_.col(1);
+    if (force_) end.at.p += force_->plus();
+    end.at.v = (q1_ - data_.q0) / data_.step.size;
     end.impulse = x.segment(n_, m_) / data_.step.size;
     end.memory.known = true;
     end.memory.scales = terms_;

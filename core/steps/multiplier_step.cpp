@@ -61,9 +61,9 @@ class MultiplierStep final : public StepProblem {
 
   void finish(ConstVectorRef x, StepEnd& end) override {
     evaluate(x);
-    end.q = q1_;
-    end.p = p1_;
-    end.v = (q1_ - data_.q0) / data_.step.size;
+    end.at.q = q1_;
+    end.at.p = p1_;
+    end.at.v = (q1_ - data_.q0) / data_.step.size;
     end.impulse = x / data_.step.size;
     end.memory.known = true;  // there is nothing to know
   }

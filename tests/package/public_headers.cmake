@@ -1,5 +1,6 @@
 # PREFIX holds the headers that the lists of SOURCES name and no others, and none of them includes one that is not
 # there: no header that is of use to a library only gets out.
+cmake_policy(VERSION 3.22)
 file(GLOB lists ${SOURCES}/*/public_headers.txt)
 set(expected diracstep/diracstep.hpp diracstep/version.h diracstep/c_interface/diracstep.h)
 foreach(list IN LISTS lists)

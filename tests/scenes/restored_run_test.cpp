@@ -120,7 +120,9 @@ void walk(const CatalogueScene& entry, const Way& way, Random& random, Met& met)
     if (call.kind != Call::minus) steps_back = done;
     if (!done) ++met.failures;
     const Snapshot after = whole->save();
-    if (call.kind == Call::minus) EXPECT_EQ(differences(before, after), 0) << "reading left a trace";
+    if (call.kind == Call::minus) {
+      EXPECT_EQ(differences(before, after), 0) << "reading left a trace";
+    }
     if (call.kind != Call::retry) {  // which a restored integrator refuses
       second->restore(long_before);
       (void)second->step(1.7 * way.options.step);

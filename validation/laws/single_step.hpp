@@ -35,7 +35,7 @@ class SingleStep {
     }
     StepEnd end;
     problem_->finish(result.unknowns, end);
-    return {end.q, end.p, end.impulse, result.unknowns};
+    return {end.at.q, end.at.p, end.impulse, result.unknowns};
   }
 
  private:

@@ -31,13 +31,13 @@ void CompensatedSums::end(double h, ConstVectorRef q0, const Vector& p0, ConstCo
                           ConstColumnsRef lq, ConstColumnsRef impulses, StepEnd& end) {
   add_stages(h, table.b, v);
   sum_ += start_.q;
-  round(q0, sum_, end.q, end.rest.q);
+  round(q0, sum_, end.at.q, end.at.rest.q);
   sum_ = start_.p;
   for (Eigen::Index j = 0; j < lq.cols(); ++j) {
     const long double factor = h * table.b[j], share = table.lobatto_b[j];
     for (Eigen::Index r = 0; r < lq.rows(); ++r) sum_[r] += factor * lq(r, j) + share * impulses(r, j);
   }
-  round(p0, sum_, end.p, end.rest.p);
+  round(p0, sum_, end.at.p, end.at.rest.p);
 }
 
 void CompensatedSums::round(ConstVectorRef from, const ExtendedVector& change, Vector& to,

@@ -118,9 +118,9 @@ class PhaseSpaceStep final : public StepProblem {
 
   void finish(ConstVectorRef x, StepEnd& end) override {
     evaluate(x);
-    end.q = q1_;
-    end.p = end_.v;  // θ(q1): equal to the projected p̃1 at a solution
-    end.v = (q1_ - q0_) / step_.size;
+    end.at.q = q1_;
+    end.at.p = end_.v;  // θ(q1): equal to the projected p̃1 at a solution
+    end.at.v = (q1_ - q0_) / step_.size;
     end.impulse.resize(0);
     end.memory.known = true;  // its scales are those of the start
   }

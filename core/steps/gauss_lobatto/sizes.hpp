@@ -26,7 +26,10 @@ struct StageSizes {
   void store(StepMemory& memory) const {
     memory.known = true;
     memory.scales.resize(stored);
-    memory.scales << force, curvature, row_curvature;
+    double* const scales = memory.scales.data();
+    scales[0] = force;
+    scales[1] = curvature;
+    scales[2] = row_curvature;
   }
 
   /// Of momenta, of what they lose to the round-off of positions, and of forces over |h|.

@@ -3,8 +3,13 @@
 
 namespace diracstep {
 
-StageSplitting::StageSplitting(const GaussLobattoTableau& table, int n, int m, bool holonomic)
-    : s_(static_cast<int>(table.c.size())), n_(n), m_(m), impulse_weights_(table.e.leftCols(s_)) {
+StageSplitting::StageSplitting(const GaussLobattoTableau& table, int m, bool holonomic,
+                               const Lagrangian& lagrangian)
+    : s_(static_cast<int>(table.c.size())),
+      n_(lagrangian.dimension()),
+      m_(m),
+      mass_constant_(lagrangian.structure().y_hessian_constant),
+      impulse_weights_(table.e.leftCols(s_)) {
   constraint_weights_.setIdentity(s_, s_);
   if (holonomic) constraint_weights_ = table.lobatto_a.bottomRows(s_);
   if (m_ > 0) unmix_ = (constraint_weights_ * impulse_weights_).inverse();
@@ -17,6 +22,19 @@ StageSplitting::StageSplitting(const GaussLobattoTableau& table, int n, int m, b
   for (Columns* stages : {&gaps_, &impulses_}) stages->setZero(m_, s_);
 }
 
+void StageSplitting::move_to(const StagePoints& at, StageMomentum& momentum,
+                             const std::vector<StageRows>& rows, ConstVectorRef x) {
+  const int middle = s_ / 2;
+  if (!mass_known_) {
+    momentum.second_derivatives(at, x, middle);
+    set_mass(momentum.pattern(), momentum.mass(middle));
+    mass_known_ = mass_constant_ && momentum.mass(middle).allFinite();
+  }
+  for (const StageRows& block : rows) set_rows(block.first(), block.rows().pattern(), block.lobatto(middle));
+  if (m_ > 0) factor_rows();
+}
+
+/// Puts values of M on its pattern in place and factors it.
 void StageSplitting::set_mass(const SparsityPattern& pattern, ConstVectorRef values) {
   Eigen::Index k = 0;
   const auto starts = pattern.column_starts();
@@ -31,6 +49,7 @@ void StageSplitting::set_mass(const SparsityPattern& pattern, ConstVectorRef val
     mass_factors_.compute(mass_);
 }
 
+/// Puts the values of some rows of A in place, `first` being the first of them.
 void StageSplitting::set_rows(int first, const SparsityPattern& pattern, ConstVectorRef values) {
   Eigen::Index k = 0;
   const auto starts = pattern.column_starts();
@@ -51,6 +70,7 @@ void StageSplitting::solve_mass(Columns& columns) {
   }
 }
 
+/// Factors A M⁻¹ Aᵀ once all rows are set.
 void StageSplitting::factor_rows() {
   through_mass_ = rows_.transpose();
   solve_mass(through_mass_);

@@ -3,6 +3,8 @@
 #include <Eigen/LU>
 #include <diracstep/core/numerics/sparsity_pattern.hpp>
 #include <diracstep/core/numerics/types.hpp>
+#include <diracstep/core/steps/gauss_lobatto/momentum.hpp>
+#include <diracstep/core/steps/gauss_lobatto/rows.hpp>
 #include <diracstep/core/steps/gauss_lobatto/tableau.hpp>
 #include <vector>
 
@@ -17,20 +19,23 @@ namespace diracstep {
 /// (C e ⊗ A M⁻¹ Aᵀ) δλ = g − C A M⁻¹ r, so only matrices of size n, m and s are factored.
 class StageSplitting {
  public:
-  StageSplitting(const GaussLobattoTableau& table, int n, int m, bool holonomic);
+  /// For m rows, all holonomic or none.
+  StageSplitting(const GaussLobattoTableau& table, int m, bool holonomic, const Lagrangian& lagrangian);
 
-  /// Puts values of M on its pattern in place and factors it.
-  void set_mass(const SparsityPattern& pattern, ConstVectorRef values);
-  /// Puts the values of some rows of A in place, `first` being the first of them.
-  void set_rows(int first, const SparsityPattern& pattern, ConstVectorRef values);
-  /// Factors A M⁻¹ Aᵀ once all rows are set.
-  void factor_rows();
+  /// Takes M and A in the middle of the step, at the stages that were evaluated last, with the unknowns x.
+  void move_to(const StagePoints& at, StageMomentum& momentum, const std::vector<StageRows>& rows,
+               ConstVectorRef x);
 
   /// f = (r, g), stage by stage, is replaced by (δV, δλ).
   void solve(VectorRef& f);
 
  private:
+  void set_mass(const SparsityPattern& pattern, ConstVectorRef values);
+  void set_rows(int first, const SparsityPattern& pattern, ConstVectorRef values);
+  void factor_rows();
+
   int s_, n_, m_;
+  bool mass_constant_, mass_known_ = false;
   Columns impulse_weights_;     ///< e_ij, s×s
   Columns constraint_weights_;  ///< C
   Columns unmix_;               ///< (C e)⁻¹

@@ -31,8 +31,7 @@ bool affine(const Scene& scene) {
 class GaussLobattoStep final : public StepProblem {
  public:
   GaussLobattoStep(int s, const Scene& scene, bool dense)
-      : mass_constant_(scene.lagrangian->structure().y_hessian_constant),
-        s_(s),
+      : s_(s),
         n_(scene.dimension()),
         m_(scene.rows()),
         points_(s, n_),
@@ -50,7 +49,7 @@ class GaussLobattoStep final : public StepProblem {
     const auto holonomic = [](const auto& block) { return block->holonomic(); };
     const auto kinds = std::ranges::count_if(scene.constraints, holonomic);
     if (n_ + m_ <= largest_split && (kinds == 0 || kinds == std::ssize(scene.constraints)))
-      splitting_.emplace(points_.weights.table, n_, m_, kinds > 0);
+      splitting_.emplace(points_.weights.table, m_, kinds > 0, *scene.lagrangian);
     momentum_.plan(layout_);
     for (StageRows& rows : rows_) rows.plan(layout_);
     pattern_ = layout_.assemble(dense);
@@ -83,7 +82,8 @@ class GaussLobattoStep final : public StepProblem {
 
   bool has_splitting() const override { return splitting_.has_value(); }
   void solve_splitting(VectorRef f) override {
-    if (!splitting_known_) move_splitting();
+    if (!splitting_known_) splitting_->move_to(points_, momentum_, rows_, last_x_);
+    splitting_known_ = true;
     splitting_->solve(f);
   }
   void begin(Interval step, const State& start, const StepMemory& memory) override {
@@ -143,18 +143,18 @@ class GaussLobattoStep final : public StepProblem {
     if (sums_) {
       sums_->end(step_size(), q0, p0_, velocities(x), momentum_.forces(), impulses_, end);
     } else {
-      end.q.resize(n_);
-      end.p.resize(n_);
-      if (m_ > 0) end.q = points_.lobatto.col(s_);
+      end.at.q.resize(n_);
+      end.at.p.resize(n_);
+      if (m_ > 0) end.at.q = points_.lobatto.col(s_);
       for_each_piece(n_, [&](int first, int rows) {
         if (m_ == 0)  // nothing else looks there
           combine_piece(first, rows, n_, s_, &weights.lobatto(0, s_), x.data(), points_.lobatto.data(),
-                        end.q.data());
+                        end.at.q.data());
         add_forces_and_impulses(first, rows, weights.end_force.data(), weights.table.lobatto_b.data(),
-                                p0_.data(), end.p.data());
+                                p0_.data(), end.at.p.data());
       });
     }
-    end.v = (end.q - q0) / step_size();
+    end.at.v = (end.at.q - q0) / step_size();
     // The impulse at q0 is that part of λ_0 which enters there.
     end.impulse = weights.table.lobatto_b[0] * x.segment(n_ * s_, m_);
     measure(x, end.memory);
@@ -229,20 +229,6 @@ class GaussLobattoStep final : public StepProblem {
     return largest_entry(momentum_.curvatures().data(), momentum_.curvatures().size());
   }
 
-  /// The splitting is taken in the middle of the step, at the stages that were evaluated last.
-  void move_splitting() {
-    const int middle = s_ / 2;
-    if (!mass_known_) {
-      momentum_.second_derivatives(points_, last_x_, middle);
-      splitting_->set_mass(momentum_.pattern(), momentum_.mass(middle));
-      mass_known_ = mass_constant_ && momentum_.mass(middle).allFinite();
-    }
-    for (const StageRows& rows : rows_)
-      splitting_->set_rows(rows.first(), rows.rows().pattern(), rows.lobatto(middle));
-    if (m_ > 0) splitting_->factor_rows();
-    splitting_known_ = true;
-  }
-
   /// Size of the impulses of such multipliers, and of what they lose to the round-off of positions.
   double impulse_scale(ConstVectorRef multipliers) const {
     double largest = 0.0;
@@ -275,7 +261,6 @@ class GaussLobattoStep final : public StepProblem {
       for (ResidualBlock& block : blocks_) block.scale *= last_bit;
   }
 
-  bool mass_constant_;
   int s_, n_, m_;
   StagePoints points_;
   StageMomentum momentum_;
@@ -291,7 +276,7 @@ class GaussLobattoStep final : public StepProblem {
   StageSizes sizes_;
   double last_impulse_ = 0.0;  ///< size of it with the multipliers of the step before, at this start
   std::optional<StageSplitting> splitting_;  ///< small scenes with rows of one kind
-  bool splitting_known_ = false, mass_known_ = false;
+  bool splitting_known_ = false;
   bool affine_;             ///< the residual is affine in the unknowns
   bool evaluated_ = false;  ///< at last_x_
 };

@@ -34,8 +34,7 @@ struct Stepper {
     return solver.solve({{t, h}, start, predictor, Guess::predicted, false}, x, work).ok();
   }
   void accept() {
-    StepEnd& end = solver.end();
-    start = {end.q, end.p, end.v, end.rest};
+    start = solver.end().at;
     solver.accept_step();
     predictor.accept_step(x);
   }
@@ -111,9 +110,9 @@ class CircleStep final : public StepProblem {
     values[0] = 1.0 + 0.25 * step_.size * step_.size * turned(0.5 * step_.size * x[0])[1];
   }
   void finish(ConstVectorRef x, StepEnd& end) override {
-    end.q = turned(step_.size * x[0]);
-    end.p = 2.0 * x - start_->p;
-    end.v = x;
+    end.at.q = turned(step_.size * x[0]);
+    end.at.p = 2.0 * x - start_->p;
+    end.at.v = x;
     end.impulse.resize(0);
     end.memory.known = true;
   }
@@ -148,7 +147,7 @@ TEST(StepSolver, TakesConfigurationsThatAreStoredInMoreNumbersThanTheyMoveIn) {
   Work work;
   for (int k = 0; k < 100; ++k) {
     ASSERT_TRUE(solver.solve({{0.1 * k, 0.1}, at, predictor, Guess::predicted, false}, x, work).ok());
-    at = {solver.end().q, solver.end().p, solver.end().v};
+    at = solver.end().at;
     solver.accept_step();
     predictor.accept_step(x);
     ASSERT_TRUE(in_the_angle.step().ok());
