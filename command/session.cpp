@@ -64,6 +64,11 @@ void add_set_option(CLI::App& verb, std::vector<std::string>& assignments) {
       ->allow_extra_args(false);
 }
 
+void add_redundancy_option(CLI::App& verb, Session& session) {
+  verb.add_flag("--drop-redundant", session.drop_redundant_rows,
+                "Leave out rows that depend on others, and say which, instead of refusing the scene");
+}
+
 void say(std::string_view message) { fmt::print(stderr, "diracstep: {}\n", message); }
 
 void print(std::string_view text) {

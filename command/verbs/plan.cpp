@@ -67,6 +67,7 @@ void add_plan(CLI::App& app, Session& session) {
   add_method_options(*verb, options->method);
   verb->add_flag("--adaptive", options->adaptive, "The plan of reversible steps of varying size");
   verb->add_option("--eps", options->eps, "Radians of a step of varying size")->capture_default_str();
+  add_redundancy_option(*verb, session);
   add_set_option(*verb, options->set);
   verb->add_flag("--json", options->json, "One JSON document on standard output");
   verb->footer("Example:  diracstep plan knife_edge --method type1/midpoint --order 4");

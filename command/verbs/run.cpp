@@ -269,6 +269,7 @@ void add_run(CLI::App& app, Session& session) {
           "Relative error at the end; the library chooses method and step,\nand repeats the run until its "
           "estimate is below")
       ->type_name("E");
+  add_redundancy_option(*verb, session);
   add_set_option(*verb, options->set);
   verb->add_flag("--json", options->json, "One JSON document on standard output");
   verb->footer(

@@ -8,6 +8,7 @@
 #include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/core/system/consistent_start.hpp>
 #include <diracstep/core/system/hidden_rows.hpp>
+#include <diracstep/core/system/redundant_rows.hpp>
 #include <sstream>
 
 namespace diracstep {
@@ -29,9 +30,16 @@ Integrator::Preparation Integrator::prepare(std::shared_ptr<const Scene> given,
   require_size("scene '" + scene->name + "': the start q", scene->start.q.size(), scene->dimension());
   if (scene->rows() > 0 && scene->start.q.allFinite()) {
     const std::vector<std::string> dependent = redundant_rows(*scene, scene->start);
+    if (!dependent.empty() && singular_at_start_only(*scene, scene->start))
+      throw Misuse("scene '" + scene->name +
+                   "': rows that depend on others at the start, but not at poses near "
+                   "it: " +
+                   joined(dependent) + "; the start is singular: move it");
     if (!dependent.empty() && !options.drop_redundant_rows)
-      throw Misuse("scene '" + scene->name + "': rows that depend on others at the start: " +
-                   joined(dependent) + "; remove them, or ask for dependent rows to be dropped");
+      throw Misuse("scene '" + scene->name +
+                   "': rows that depend on others at the start: " + joined(dependent) +
+                   "; remove them, or drop them: run --drop-redundant, redundant = \"drop\" "
+                   "in a scene file, IntegratorOptions::drop_redundant_rows");
     if (!dependent.empty()) {
       scene = without_rows(*scene, dependent);
       result.lines.push_back({"dropped rows", joined(dependent), "they depend on others at the start"});

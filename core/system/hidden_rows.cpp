@@ -1,19 +1,27 @@
 #include <Eigen/LU>
 #include <Eigen/SparseCholesky>
+#include <algorithm>
 #include <cmath>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/core/system/constraint_distribution.hpp>
 #include <diracstep/core/system/hidden_rows.hpp>
+#include <limits>
 #include <sstream>
+#include <string_view>
 
 namespace diracstep {
 
 namespace {
 
 constexpr int largest_full_matrix = 1500;
-constexpr double rank_tolerance = 1e-10;  // of a pivot, in relation to the largest
 constexpr double zero_tolerance = 1e-12;  // of an entry, in relation to the terms of its row
+
+/// What round-off leaves of a zero pivot, in relation to the largest: a mass ratio of 1e-13 is no degeneracy.
+double rank_tolerance(const Columns& matrix) {
+  return 16.0 * std::numeric_limits<double>::epsilon() *
+         static_cast<double>(std::max(matrix.rows(), matrix.cols()));
+}
 
 /// Where derivatives of the scene's functions are taken.
 struct Point {
@@ -65,7 +73,7 @@ bool positive_definite(const Lagrangian& lagrangian, const Start& start) {
 /// A basis of the kernel, without a column where there is none.
 Columns kernel(const Columns& matrix) {
   Eigen::FullPivLU<Columns> lu;
-  lu.setThreshold(rank_tolerance);
+  lu.setThreshold(rank_tolerance(matrix));
   lu.compute(matrix);
   if (lu.dimensionOfKernel() == 0) return Columns(matrix.cols(), 0);
   Columns basis = lu.kernel();
@@ -128,11 +136,19 @@ std::string motion(const Scene& scene, const Vector& w) {
                motions + " carries no momentum, and " + why);
 }
 
+constexpr std::string_view prefix = "hidden_";  // of the names of these rows
+
 /// The rows Wᵀ(∂L/∂q + f), each divided by the size of its coefficients at the start.
 class HiddenRows final : public ConstraintRows {
  public:
   HiddenRows(const Scene& scene, bool holonomic, const Columns& directions, const Vector& units)
       : HiddenRows(scene, holonomic, in_units(directions, units), directions, pattern_of(directions)) {}
+
+  std::string origin(int row) const override {
+    const std::string& name = names()[static_cast<std::size_t>(row)];
+    return "not in the file: the balance of forces along " + name.substr(prefix.size()) +
+           ", which carries no momentum";
+  }
 
   void position(double t, ConstVectorRef q, VectorRef phi) const override { force_along(t, q, phi); }
 
@@ -217,7 +233,8 @@ class HiddenRows final : public ConstraintRows {
   }
   static std::vector<std::string> names_of(const Scene& scene, const Columns& w) {
     std::vector<std::string> names;
-    for (Eigen::Index k = 0; k < w.cols(); ++k) names.push_back("hidden_" + motion(scene, w.col(k)));
+    for (Eigen::Index k = 0; k < w.cols(); ++k)
+      names.push_back(std::string(prefix) + motion(scene, w.col(k)));
     return names;
   }
 
@@ -269,7 +286,7 @@ struct Directions {
 Directions split(const Columns& w, const Columns& fv) {
   const Columns resistance = w.transpose() * fv * w;
   Eigen::FullPivLU<Columns> lu;
-  lu.setThreshold(rank_tolerance);
+  lu.setThreshold(rank_tolerance(resistance));
   lu.compute(resistance);
   Directions result{Columns(w.rows(), lu.rank()), w * kernel(resistance.transpose())};
   const auto& order = lu.permutationP().indices();
@@ -302,14 +319,20 @@ void require_described(const Scene& scene, const Columns& w, const Directions& s
     refuse(scene, w, "the force along it is not linear in v, which is not supported; add a small inertia");
 }
 
-/// W, or nothing where ∂²L/∂v² is regular along the rows at the start or near it.
+/// W, without a column where ∂²L/∂v² is regular along the rows at the start or near it: what is singular at
+/// the start alone is no degeneracy.
 Columns directions(const Scene& scene, const Point& start, const Derivatives& at_start, const Point& other,
                    const Derivatives& at_other) {
-  Columns w = kernel(stacked(scene, start, at_start));
-  if (w.cols() == 0) return w;
-  const Columns elsewhere = stacked(scene, other, at_other);
-  if (elsewhere.allFinite() && !vanishes(elsewhere * w, elsewhere)) return Columns(w.rows(), 0);
-  return w;
+  const Columns here = stacked(scene, start, at_start), elsewhere = stacked(scene, other, at_other);
+  const Columns w = kernel(here);
+  if (w.cols() == 0 || !elsewhere.allFinite()) return w;
+  Columns both(here.rows() + elsewhere.rows(), here.cols());
+  both << here, elsewhere;
+  const Columns constant = kernel(both);
+  if (kernel(elsewhere).cols() > constant.cols())
+    refuse(scene, w,
+           "elsewhere another motion does: a direction without momentum that moves is not supported");
+  return constant;
 }
 
 Columns hidden_matrix(const Directions& w, const Derivatives& d) {
@@ -358,7 +381,8 @@ std::shared_ptr<const Scene> with_hidden_rows(std::shared_ptr<const Scene> scene
   const Point start{scene->start.time, scene->start.q, scene->start.v};
   ConstraintsAtPoint hidden(blocks, scene->dimension());
   hidden.evaluate(start.t, start.q);
-  const Columns w = kernel(stacked(*scene, start, Derivatives(*scene, start)));
+  const Point other = near(scene->start);
+  const Columns w = directions(*scene, start, Derivatives(*scene, start), other, Derivatives(*scene, other));
   Vector off(hidden.rows());
   hidden.velocity_residual(start.v, off);
   const Columns response = hidden.pattern().full(hidden.coefficients()) * w;

@@ -21,12 +21,11 @@ void require_finite(const Scene& scene, const char* what, const Vector& column) 
     }
 }
 
-[[noreturn]] void throw_off_row(const Scene& scene, const ConstraintRows& block, int row, const char* what,
-                                double residual, double terms) {
+[[noreturn]] void throw_off_row(const Scene& scene, int row, const char* what, double residual,
+                                double terms) {
   std::ostringstream message;
-  message << "scene '" << scene.name << "': the start violates row '"
-          << block.names()[static_cast<std::size_t>(row)] << "': " << what << " = " << residual
-          << ", allowed " << start_tolerance * terms;
+  message << "scene '" << scene.name << "': the start violates " << row_label(scene.constraints, row) << ": "
+          << what << " = " << residual << ", allowed " << start_tolerance * terms;
   throw Misuse(message.str());
 }
 
@@ -101,6 +100,7 @@ void require_consistent(const Scene& scene, const Start& start) {
   require_finite(scene, "q", start.q);
   require_finite(scene, "v", start.v);
   if (!std::isfinite(start.time)) throw Misuse(prefix + "the start time is not finite");
+  int first = 0;
   for (const auto& block : scene.constraints) {
     const int m = block->rows();
     Vector a(block->pattern().nonzeros()), b(m), residual(m), terms(m), phi(m);
@@ -112,7 +112,7 @@ void require_consistent(const Scene& scene, const Start& start) {
                                     terms.data());
       for (int r = 0; r < m; ++r)
         if (!(std::abs(phi[r]) <= start_tolerance * terms[r]))
-          throw_off_row(scene, *block, r, "φ(q)", phi[r], terms[r]);
+          throw_off_row(scene, first + r, "φ(q)", phi[r], terms[r]);
     }
     residual = b;
     block->pattern().multiply_add(a.data(), start.v.data(), residual.data());
@@ -120,8 +120,9 @@ void require_consistent(const Scene& scene, const Start& start) {
     block->pattern().multiply_add(a.cwiseAbs().eval().data(), start.v.cwiseAbs().eval().data(), terms.data());
     for (int r = 0; r < m; ++r)
       if (!(std::abs(residual[r]) <= start_tolerance * terms[r]))
-        throw_off_row(scene, *block, r, "the velocity is off the distribution, A v + b", residual[r],
+        throw_off_row(scene, first + r, "the velocity is off the distribution, A v + b", residual[r],
                       terms[r]);
+    first += m;
   }
 }
 

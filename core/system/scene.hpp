@@ -2,6 +2,7 @@
 
 #include <diracstep/core/system/constraint_rows.hpp>
 #include <diracstep/core/system/force.hpp>
+#include <diracstep/core/system/kinks.hpp>
 #include <diracstep/core/system/phase_function.hpp>
 #include <memory>
 #include <string>
@@ -32,6 +33,7 @@ struct Scene {
   ConstraintBlocks constraints;
   std::shared_ptr<const Force> force;  ///< null where there is none
   Start start;
+  std::shared_ptr<const Kinks> kinks = {};  ///< null where nothing is known of any
 
   int dimension() const { return static_cast<int>(coordinates.size()); }
   int rows() const { return row_count(constraints); }

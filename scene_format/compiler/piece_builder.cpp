@@ -43,6 +43,15 @@ void PieceBuilder::add_value(SceneFunction& function, Piece piece) {
   function.pieces.push_back(std::move(piece));
 }
 
+void PieceBuilder::add_outputs(SceneFunction& function, Piece piece) {
+  find_slots(piece);
+  std::vector<Store> values;
+  for (std::size_t r = 0; r < piece.outputs.size(); ++r)
+    values.push_back({0, Table::slots, piece.layout.slot_count + static_cast<int>(r), piece.outputs[r]});
+  add_kernel(piece, std::move(values));
+  function.pieces.push_back(std::move(piece));
+}
+
 void PieceBuilder::add_phase(SceneFunction& function, Piece piece) {
   find_slots(piece);
   const std::size_t n = piece.slots.size();

@@ -16,6 +16,8 @@ class PieceBuilder {
   void add_force(SceneFunction& function, Piece piece);
   /// f alone, without derivatives.
   void add_value(SceneFunction& function, Piece piece);
+  /// The outputs alone, each in the place of its row.
+  void add_outputs(SceneFunction& function, Piece piece);
 
  private:
   using Matrix = std::vector<std::vector<Node>>;
