@@ -2,6 +2,7 @@
 
 #include <CLI/App.hpp>
 #include <cerrno>
+#include <cmath>
 #include <cstdio>
 #include <cstring>
 #include <diracstep/command/session.hpp>
@@ -50,6 +51,14 @@ void add_method_options(CLI::App& verb, MethodChoice& choice) {
   verb.add_option("--rule", choice.rule,
                   "Rule for nonholonomic rows: left, right, midpoint, trapezoidal or one of a plugin;\n"
                   "the method's own without it");
+}
+
+void take_recommendation(const CatalogueScene& entry, MethodChoice& choice, std::optional<double>& step) {
+  const Recommendation& advice = entry.recommended;
+  if (!advice.stated || choice.given || choice.order != 0) return;
+  choice.name = advice.method;
+  choice.order = advice.order;
+  if (!step) step = std::copysign(advice.step, entry.t_end - entry.scene->start.time);
 }
 
 IntegratorOptions integrator_options(const Session& session, const MethodChoice& choice) {

@@ -52,6 +52,10 @@ struct MethodChoice {
 };
 void add_method_options(CLI::App& verb, MethodChoice& choice);
 
+/// Where neither a method nor an order was asked for, those that the scene's file recommends, and where no
+/// step was asked for either, its step.
+void take_recommendation(const CatalogueScene& entry, MethodChoice& choice, std::optional<double>& step);
+
 /// The options of an integrator with this choice; the rule is looked up by name.
 IntegratorOptions integrator_options(const Session& session, const MethodChoice& choice);
 

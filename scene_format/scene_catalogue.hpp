@@ -52,8 +52,8 @@ struct Invariant {
 
 /// A method that suits the scene, and what it reaches.
 struct Recommendation {
-  std::string method = "type1/midpoint";
-  int order = 0;  ///< 0: the method's own
+  std::string method = "auto";  ///< as IntegratorOptions::method
+  int order = 0;                ///< 0: the method's own
   double step = 0.0;
   double end = 0.0;
   double tolerance = 0.0;  ///< error at `end`, relative to the largest component; 0 where none is stated

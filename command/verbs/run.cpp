@@ -209,6 +209,11 @@ void run(const Options& given, Session& session) {
   result.momentum = momentum(options.momentum);
   const double end =
       options.at.empty() ? options.end.value_or(entry.t_end) : numbers("--at", options.at).back();
+  if (!options.error && !options.adaptive) {
+    take_recommendation(entry, options.method, options.step);
+    if (!given.step && options.step)
+      options.step = std::copysign(*options.step, end - entry.scene->start.time);
+  }
   IntegratorOptions used = integrator_options(session, options.method);
   used.step = options.step.value_or(std::copysign(entry.natural_step, end - entry.scene->start.time));
   used.substeps = options.substeps;

@@ -88,8 +88,8 @@ class NearestPointProblem final : public NonlinearProblem {
   throw Misuse(message.str());
 }
 
-constexpr int largest_full = 100;         // rows that are looked through for dependent ones
-constexpr double rank_tolerance = 1e-10;  // of their independence
+constexpr int largest_full = 100;        // rows that are looked through for dependent ones
+constexpr double rank_tolerance = 1e-7;  // of their independence, at poses found to 1e-10
 
 /// Numbers of the components that are no guesses.
 std::vector<int> held(const std::vector<bool>& guesses) {
@@ -109,11 +109,13 @@ void require_met(const Scene& scene, const Start& start, const char* guessed) {
   }
 }
 
-/// The scene without the rows that depend on others at its start where only what is not held moves.
+/// The scene without the rows that depend on others, where only what is not held moves, at its start or at a
+/// pose near it.
 std::shared_ptr<const Scene> independent(std::shared_ptr<const Scene> scene, const std::vector<int>& held) {
   if (scene->rows() == 0 || scene->rows() > largest_full) return scene;
+  const Start& start = scene->start;
   ConstraintsAtPoint rows(scene->constraints, scene->dimension());
-  rows.evaluate(scene->start.time, scene->start.q);
+  rows.evaluate(start.time, pose_near(holonomic_blocks(*scene), start.time, start.q, held).value_or(start.q));
   const std::vector<std::string> names = scene->row_names();
   std::vector<std::string> left;
   for (const int r : dependent_columns(full_one_forms(rows, held), rank_tolerance))

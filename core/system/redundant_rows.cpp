@@ -120,32 +120,6 @@ std::vector<int> dependent_sparse_columns(const Eigen::SparseMatrix<double>& one
   return dependent;
 }
 
-/// A pose near `guess` on the holonomic rows, by Gauss and Newton's method; nothing where it is not found.
-std::optional<Vector> pose_near(const ConstraintBlocks& holonomic, double t, Vector q) {
-  constexpr int most = 30;
-  constexpr double small = 1e-10;
-  if (holonomic.empty()) return q;
-  ConstraintsAtPoint rows(holonomic, static_cast<int>(q.size()));
-  for (int iteration = 0; iteration < most; ++iteration) {
-    Vector phi(rows.rows());
-    int row = 0;
-    for (const auto& block : holonomic) {
-      block->position(t, q, phi.segment(row, block->rows()));
-      row += block->rows();
-    }
-    rows.evaluate(t, q);
-    const Columns a = rows.pattern().full(rows.coefficients());
-    if (!phi.allFinite() || !a.allFinite()) return std::nullopt;
-    Eigen::CompleteOrthogonalDecomposition<Columns> solver;
-    solver.setThreshold(small);
-    solver.compute(a);
-    const Vector change = solver.solve(phi);
-    q -= change;
-    if (change.norm() <= small * (1.0 + q.norm())) return q;
-  }
-  return std::nullopt;
-}
-
 /// One-forms at the start, and at poses around it that the rows allow.
 std::vector<Columns> one_forms_around(const Scene& scene, const Start& start) {
   ConstraintsAtPoint rows(scene.constraints, scene.dimension());
@@ -160,7 +134,7 @@ std::vector<Columns> one_forms_around(const Scene& scene, const Start& start) {
     Vector q = start.q;
     for (Eigen::Index i = 0; i < q.size(); ++i)
       q[i] += distance * size * std::sin(1.0 + 1.7 * static_cast<double>(i));
-    const auto pose = pose_near(holonomic, start.time, q);
+    const auto pose = pose_near(holonomic, start.time, q, {});
     if (!pose) continue;
     if (Columns there = at(*pose); there.allFinite()) all.push_back(std::move(there));
   }
@@ -203,6 +177,33 @@ ConstraintBlocks holonomic_blocks(const Scene& scene) {
   std::ranges::copy_if(scene.constraints, std::back_inserter(blocks),
                        [](const auto& block) { return block->holonomic(); });
   return blocks;
+}
+
+std::optional<Vector> pose_near(const ConstraintBlocks& holonomic, double t, Vector q,
+                                const std::vector<int>& held) {
+  constexpr int most = 50;
+  constexpr double small = 1e-10, dependent = 1e-6;
+  ConstraintsAtPoint rows(holonomic, static_cast<int>(q.size()));
+  for (int iteration = 0; rows.rows() > 0 && iteration < most; ++iteration) {
+    Vector phi(rows.rows());
+    int row = 0;
+    for (const auto& block : holonomic) {
+      block->position(t, q, phi.segment(row, block->rows()));
+      row += block->rows();
+    }
+    rows.evaluate(t, q);
+    Columns a = rows.pattern().full(rows.coefficients());
+    for (const int i : held) a.col(i).setZero();
+    if (!phi.allFinite() || !a.allFinite()) return std::nullopt;
+    Eigen::CompleteOrthogonalDecomposition<Columns> solver;
+    solver.setThreshold(dependent);
+    solver.compute(a);
+    const Vector change = solver.solve(phi);
+    q -= change;
+    if (change.norm() <= small * (1.0 + q.norm())) return q;
+    if (iteration + 1 == most) return std::nullopt;
+  }
+  return q;
 }
 
 Columns full_one_forms(const ConstraintsAtPoint& rows, const std::vector<int>& held) {

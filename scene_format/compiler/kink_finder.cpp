@@ -103,8 +103,18 @@ void KinkFinder::add_phase(Node argument, const Source& source) {
 }
 
 Node KinkFinder::rate_in_time(Node u) {
-  for (const Node node : graph_.reachable(std::span(&u, 1)))
-    if (graph_[node].op == Op::coordinate) return none;
+  for (auto k = dependence_.size(); k < graph_.size(); ++k) {  // arguments come before what holds them
+    const NodeData& data = graph_[static_cast<Node>(k)];
+    Dependence own{data.op == Op::time, data.op == Op::coordinate};
+    for (const auto& [argument, from] : {std::pair{data.a, 1}, std::pair{data.b, 2}}) {
+      if (arity(data.op) < from) continue;
+      const Dependence& other = dependence_[static_cast<std::size_t>(argument)];
+      own = {own.time || other.time, own.coordinates || other.coordinates};
+    }
+    dependence_.push_back(own);
+  }
+  const Dependence& depends = dependence_[static_cast<std::size_t>(u)];
+  if (!depends.time || depends.coordinates) return none;
   const Node rate = graph_.derivative(u, graph_.time());
   return graph_.is_number(rate, 0.0) ? none : rate;
 }

@@ -36,7 +36,12 @@ class KinkFinder {
   SceneProgram& program_;
   FormulaGraph& graph_;
   PieceBuilder& builder_;
+  struct Dependence {
+    bool time, coordinates;
+  };
+
   KinkProgram found_;
+  std::vector<Dependence> dependence_;  ///< of the graph's nodes, as far as was asked
   std::set<Node> seen_;
 };
 

@@ -33,6 +33,15 @@ PieceBuilder::Matrix PieceBuilder::gradients(const Piece& piece, const std::vect
   return rows;
 }
 
+/// Whether the second derivatives miss something: a jump of the first ones.
+bool PieceBuilder::has_kink(const Piece& piece) const {
+  return std::ranges::any_of(graph_.reachable(piece.outputs), [&](Node node) {
+    const Op op = graph_[node].op;
+    const bool kink = op == Op::abs || op == Op::sign || op == Op::min || op == Op::max || op == Op::where;
+    return kink && varies(node);
+  });
+}
+
 void PieceBuilder::add_kernel(Piece& piece, std::vector<Store> stores) {
   piece.kernels.emplace_back(graph_, std::move(stores), piece.layout, known_, piece.instance);
 }
@@ -80,6 +89,8 @@ void PieceBuilder::add_phase(SceneFunction& function, Piece piece) {
       if (!zero(fyy[k][l])) function.y_hessian_zero = false;
       if (varies(fxx[k][l]) || varies(fxy[k][l]) || varies(fyy[k][l])) function.quadratic = false;
     }
+
+  if (has_kink(piece)) function.quadratic = function.y_hessian_constant = false;
 
   std::vector<Store> gradient, rate, position_rate;
   const std::vector<Node> fyt = graph_.derivative(fy, graph_.time()),

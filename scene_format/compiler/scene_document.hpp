@@ -74,7 +74,7 @@ struct SceneDocument {
     Place place;
   };
   struct Recommended {
-    std::string method = "type1/midpoint";
+    std::string method = "auto";
     int order = 0;           ///< 0: the method's own
     double step = 0.0;       ///< 0: the span's
     double end = 0.0;        ///< 0: the last reference

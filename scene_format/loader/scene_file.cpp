@@ -289,8 +289,8 @@ CatalogueScene load(const std::string& file, const std::string& text, const Para
 
   CatalogueScene entry;
   entry.scene = std::make_shared<const Scene>(std::move(scene));
-  if (document.drop_redundant_rows) drop_redundant_rows(entry);
   project(*loaded, entry);
+  if (document.drop_redundant_rows) drop_redundant_rows(entry);
   entry.kind = document.kind;
   entry.description = document.description;
   entry.source = document.source;
