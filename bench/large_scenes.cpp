@@ -63,7 +63,8 @@ double resident_kilobytes() {
 struct BareStep {
   BareStep(const Integrator& at, const char* method)
       : problem(Registry::with_built_ins().method(method).step(at.scene(), false)), x(problem->size()) {
-    problem->begin({at.time(), at.options().step}, at.position(), at.momentum());
+    problem->begin({at.time(), at.options().step}, {at.position(), at.momentum(), at.velocity_estimate()},
+                   {});
     problem->guess(at.velocity_estimate(), x);
     other = x * (1.0 + 1e-9);
     f.setZero(x.size());

@@ -147,7 +147,7 @@ class Blade final : public ConstraintRows {
 
 class ChainMasses final : public Lagrangian {
  public:
-  explicit ChainMasses(int n) : Lagrangian(diagonal(2 * n), {true, true, true, true}), n_(n) {}
+  explicit ChainMasses(int n) : Lagrangian(SparsityPattern::diagonal(2 * n), {true, true, true, true}), n_(n) {}
   double value(double, ConstVectorRef q, ConstVectorRef v) const override {
     double sum = v.squaredNorm() / 2;
     for (int j = 0; j < n_; ++j) sum -= g_ * q[2 * j + 1];
@@ -169,11 +169,6 @@ class ChainMasses final : public Lagrangian {
   void gradient_rate(double, ConstVectorRef, ConstVectorRef, VectorRef fyt) const override { fyt.setZero(); }
 
  private:
-  static SparsityPattern diagonal(int n) {
-    std::vector<std::pair<int, int>> entries;
-    for (int i = 0; i < n; ++i) entries.emplace_back(i, i);
-    return {n, n, entries};
-  }
   static constexpr double g_ = 9.81;
   int n_;
 };

@@ -12,12 +12,6 @@ namespace {
 
 using Kind = Branch::Kind;
 
-SparsityPattern diagonal(int n) {
-  std::vector<std::pair<int, int>> entries(static_cast<std::size_t>(n));
-  for (int i = 0; i < n; ++i) entries[static_cast<std::size_t>(i)] = {i, i};
-  return {n, n, entries};
-}
-
 PhaseStructure structure_of(const std::vector<Branch>& branches) {
   const bool no_inductor =
       std::ranges::none_of(branches, [](const Branch& b) { return b.kind == Kind::inductor; });
@@ -28,7 +22,7 @@ PhaseStructure structure_of(const std::vector<Branch>& branches) {
 class CircuitLagrangian final : public Lagrangian {
  public:
   explicit CircuitLagrangian(const std::vector<Branch>& branches)
-      : Lagrangian(diagonal(static_cast<int>(branches.size())), structure_of(branches)),
+      : Lagrangian(SparsityPattern::diagonal(static_cast<int>(branches.size())), structure_of(branches)),
         inductance_(Vector::Zero(dimension())),
         elastance_(Vector::Zero(dimension())) {
     for (int i = 0; i < dimension(); ++i) {
@@ -70,7 +64,7 @@ class CircuitLagrangian final : public Lagrangian {
 class Resistance final : public Force {
  public:
   explicit Resistance(const std::vector<Branch>& branches)
-      : Force(diagonal(static_cast<int>(branches.size()))), r_(Vector::Zero(dimension())) {
+      : Force(SparsityPattern::diagonal(static_cast<int>(branches.size()))), r_(Vector::Zero(dimension())) {
     for (int i = 0; i < dimension(); ++i) {
       const Branch& branch = branches[static_cast<std::size_t>(i)];
       if (branch.kind == Kind::resistor) r_[i] = branch.value;

@@ -91,13 +91,16 @@ class KinsolSolver final : public NonlinearSolver {
   }
   void save(Snapshot& to) const override {
     factors_.save(to);
-    for (const int count : {judged_solves_, judged_iterations_, given_up_ ? 1 : 0}) to.put(count);
+    to.put("judged solves", judged_solves_);
+    to.put("judged iterations", judged_iterations_);
+    to.put("fixed-point iteration given up", given_up_);
   }
-  void restore(Snapshot& from) override {
+  void restore(SnapshotReader& from) override {
     factors_.restore(from);
-    judged_solves_ = static_cast<int>(from.whole_number(solves_to_judge));
-    judged_iterations_ = static_cast<int>(from.whole_number(std::numeric_limits<int>::max()));
-    given_up_ = from.whole_number(1) == 1;
+    judged_solves_ = static_cast<int>(from.whole_number("judged solves", solves_to_judge));
+    judged_iterations_ =
+        static_cast<int>(from.whole_number("judged iterations", std::numeric_limits<int>::max()));
+    given_up_ = from.flag("fixed-point iteration given up");
   }
 
   std::string description() const override { return std::string("KINSOL, ") + factors_.name(); }

@@ -16,7 +16,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr std::string_view magic = "diracstep checkpoint 1\n";
+constexpr std::string_view magic = "diracstep checkpoint 2\n";
 constexpr std::size_t sum_size = sizeof(std::uint64_t);
 
 [[noreturn]] void refuse(const std::string& path, const std::string& why) {
@@ -51,15 +51,13 @@ std::uint64_t check_sum(std::string_view bytes) {
 }
 
 std::string encoded(const Checkpoint& checkpoint) {
-  const std::vector<double>& numbers = checkpoint.state.numbers();
+  const std::string state = checkpoint.state.bytes();
   Json json{{"run", Json::object()}, {"points", checkpoint.points}, {"bytes", checkpoint.bytes}};
   for (const auto& [key, value] : checkpoint.run) json["run"][key] = value;
-  json["numbers"] = numbers.size();
+  json["state"] = state.size();
   std::string text(magic);
   text += json.dump(-1, ' ', false, Json::error_handler_t::replace) + '\n';
-  const std::size_t start = text.size();
-  text.resize(start + numbers.size() * sizeof(double));
-  if (!numbers.empty()) std::memcpy(text.data() + start, numbers.data(), numbers.size() * sizeof(double));
+  text += state;
   const std::uint64_t sum = check_sum(text);
   return text.append(reinterpret_cast<const char*>(&sum), sum_size);
 }
@@ -75,15 +73,15 @@ Checkpoint decoded(std::string_view bytes, const std::string& path) {
       checkpoint.run.emplace_back(key, value.get<std::string>());
     checkpoint.points = count(json, "points");
     checkpoint.bytes = count(json, "bytes");
-    const auto numbers = static_cast<std::size_t>(count(json, "numbers"));
-    if (rest.size() % sizeof(double) != 0 || numbers != rest.size() / sizeof(double))
-      refuse(path, fmt::format("{} numbers are announced, {} bytes follow", numbers, rest.size()));
-    std::vector<double> state(numbers);
-    if (numbers > 0) std::memcpy(state.data(), rest.data(), rest.size());
-    checkpoint.state = Snapshot(std::move(state));
+    const auto size = static_cast<std::size_t>(count(json, "state"));
+    if (size != rest.size())
+      refuse(path, fmt::format("{} bytes of state are announced, {} follow", size, rest.size()));
+    checkpoint.state = Snapshot::from_bytes(rest);
   } catch (const Json::exception& error) {
     refuse(path, error.what());
   } catch (const std::out_of_range& error) {
+    refuse(path, error.what());
+  } catch (const Misuse& error) {
     refuse(path, error.what());
   }
   return checkpoint;

@@ -18,8 +18,8 @@ struct Checkpoint {
   Snapshot state;   ///< of the integrator
 };
 
-/// As bytes: a line with name and version of the format, a line of JSON, the numbers of the state as they lie
-/// in memory, and a check sum of all that.
+/// As bytes: a line with name and version of the format, a line of JSON, the bytes of the state, and a check
+/// sum of all that.
 std::string encoded(const Checkpoint& checkpoint);
 
 /// Throws Misuse, naming `path` and what is wrong, for anything but what encoded() makes.

@@ -1,8 +1,7 @@
 #pragma once
 
-#include <Eigen/LU>
+#include <diracstep/core/integrator/point_reader.hpp>
 #include <diracstep/core/numerics/nonlinear_solver.hpp>
-#include <diracstep/core/system/saddle_point.hpp>
 #include <diracstep/core/system/scene.hpp>
 #include <functional>
 #include <memory>
@@ -21,14 +20,17 @@ struct Monitor {
 /// another velocity: names both values.
 void require_even(const Monitor& monitor, const Start& start);
 
-/// Velocities and accelerations of a scene at given points.  Owns what it needs; allocates nothing once made.
+/// Velocities and accelerations of a scene at given points, as the monitor takes them: counted, and for few
+/// unknowns by elimination.  Allocates nothing once made.
 class PointwiseMotion {
  public:
   /// Throws Misuse for a Lagrangian that is linear in v, which has no accelerations.
   PointwiseMotion(const Scene& scene, const SolverFactory& solvers, int dense_limit = 40);
 
   /// v ∈ Δ_Q(q) of the class of p, from a guess in v.
-  SolveReport velocity(double t, ConstVectorRef q, ConstVectorRef p, Vector& v);
+  SolveReport velocity(double t, ConstVectorRef q, ConstVectorRef p, Vector& v) {
+    return reader_.velocity(t, q, p, v);
+  }
 
   /// The acceleration a of the continuous system at (q, v).  Linear; dense systems are solved directly.
   SolveReport acceleration(double t, ConstVectorRef q, ConstVectorRef v, VectorRef a);
@@ -36,14 +38,9 @@ class PointwiseMotion {
   long accelerations() const { return accelerations_; }
 
  private:
-  bool dense_;
-  Eigen::Index n_;
-  std::unique_ptr<VelocityProblem> velocity_problem_;
-  std::unique_ptr<AccelerationProblem> acceleration_problem_;
-  std::unique_ptr<NonlinearSolver> velocity_solver_, acceleration_solver_;
-  Eigen::PartialPivLU<Eigen::MatrixXd> factors_;
-  Columns matrix_;
-  Vector velocity_unknowns_, unknowns_, right_hand_side_;
+  bool full_;
+  PointReader reader_;
+  Vector acceleration_, forces_;
   long accelerations_ = 0;
 };
 

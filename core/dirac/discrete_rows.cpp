@@ -4,7 +4,6 @@
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/core/system/constraint_distribution.hpp>
-#include <iterator>
 #include <sstream>
 
 namespace diracstep {
@@ -12,13 +11,6 @@ namespace diracstep {
 namespace {
 
 constexpr double tolerance = 1e-9, difference_tolerance = 1e-6;
-
-ConstraintBlocks nonholonomic(const ConstraintBlocks& all) {
-  ConstraintBlocks blocks;
-  std::copy_if(all.begin(), all.end(), std::back_inserter(blocks),
-               [](const auto& block) { return !block->holonomic(); });
-  return blocks;
-}
 
 Vector residual(const DiscreteRows& rows, Interval step, ConstVectorRef q0, ConstVectorRef q1) {
   Vector c(rows.rows());
@@ -71,7 +63,7 @@ double derivative_error(const DiscreteRows& rows, Interval step, const Vector& q
 void require_discretisation(const DiscreteRows& rows, const ConstraintBlocks& constraints, double t,
                             ConstVectorRef q) {
   const int n = static_cast<int>(q.size());
-  const ConstraintBlocks blocks = nonholonomic(constraints);
+  const ConstraintBlocks blocks = only_nonholonomic(constraints);
   require_size("the discrete constraint: its number of rows", rows.rows(), row_count(blocks));
   require_size("the discrete constraint: its number of coordinates", rows.pattern().columns(), n);
   ConstraintsAtPoint at(blocks, n);

@@ -3,21 +3,24 @@
 namespace diracstep {
 
 std::vector<PlanLine> Integrator::plan() const {
-  const Part& part = parts_.front();
-  const int m = scene_->rows(), size = part.problem->size();
+  const StepSolver& part = sequence_.part();
+  const StepProblem& problem = part.problem();
+  const NonlinearSolver* const solver = part.solver();
+  const int m = scene_->rows();
   std::vector<PlanLine> lines = preparation_;
   lines.push_back({"step", method_.info.name, method_.info.summary});
-  lines.push_back({"unknowns", part.problem->unknowns(),
-                   part.solver ? "one nonlinear system in each solve" : "the graph is solved for its end"});
-  if (part.solver)
-    lines.push_back({"nonlinear solver", part.solver->description(), part.solver->strategy()});
+  lines.push_back(
+      {"unknowns", problem.traits().unknowns,
+       solver != nullptr ? "one nonlinear system in each solve" : "the graph is solved for its end"});
+  if (solver != nullptr)
+    lines.push_back({"nonlinear solver", solver->description(), solver->strategy()});
   else
     lines.push_back({"nonlinear solver", "left out", "the step is explicit and no rows bind"});
-  if (part.solver) {
-    const int nonzeros = part.problem->pattern().nonzeros();
-    lines.push_back(
-        {"Jacobian", matrices_.full ? "full" : "sparse",
-         std::to_string(size) + " unknowns, " + std::to_string(nonzeros) + " entries: " + matrices_.reason});
+  if (solver != nullptr) {
+    const int nonzeros = problem.pattern().nonzeros();
+    lines.push_back({"Jacobian", matrices_.full ? "full" : "sparse",
+                     std::to_string(problem.size()) + " unknowns, " + std::to_string(nonzeros) +
+                         " entries: " + matrices_.reason});
   }
   if (m == 0) {
     lines.push_back({"multipliers", "left out", "the scene has no rows"});
@@ -33,7 +36,7 @@ std::vector<PlanLine> Integrator::plan() const {
         {"projection", "where the state is read", "p is defined up to the annihilator between steps"});
   }
   lines.push_back({"composition",
-                   stages_.size() == 1 ? "left out" : std::to_string(stages_.size()) + " stages",
+                   sequence_.stages() == 1 ? "left out" : std::to_string(sequence_.stages()) + " stages",
                    "order " + std::to_string(options_.order) + ", the method's own is " +
                        std::to_string(method_.info.order)});
   lines.push_back({"forces", scene_->force ? "two impulses a step" : "left out",

@@ -2,8 +2,10 @@
 #include <array>
 #include <cmath>
 #include <diracstep/core/integrator/predictor.hpp>
+#include <diracstep/core/numerics/combination.hpp>
 #include <diracstep/core/numerics/scales.hpp>
 #include <iterator>
+#include <utility>
 
 namespace diracstep {
 
@@ -22,14 +24,18 @@ constexpr long always_until = 12, later_every = 16;
 
 }  // namespace
 
-Predictor::Predictor(StepProblem& problem) : problem_(problem) {
+Predictor::Predictor(StepTraits traits, int unknowns) : traits_(std::move(traits)) {
   for (std::size_t terms = 2; terms <= longest; ++terms) rules_.push_back({false, terms});
-  const Vector zero = Vector::Zero(problem.size());
-  history_.assign(longest, zero);
-  Vector any = zero;
-  if (!problem.extrapolate_stages(zero, any)) return;
+  const Vector zero = Vector::Zero(unknowns);
+  history_.assign(longest + 1, zero);
+  if (traits_.stages.empty()) return;
   for (std::size_t terms = 1; terms < longest; ++terms) rules_.push_back({true, terms});
   candidate_ = missed_ = zero;
+}
+
+void Predictor::clear_history() {
+  best_ = known_ = best_before_ = known_before_ = 0;
+  accepted_ = 0;
 }
 
 /// x = Σ_k weights[k] x_{first + k}, newest first, of the entries from `begin` on; by fours, which the
@@ -51,6 +57,18 @@ void Predictor::combine_history(std::size_t first, std::size_t terms, const doub
   }
 }
 
+/// x = E last: the polynomials through the stages of `last`, taken into the next step.
+void Predictor::extrapolate_stages(const Vector& last, VectorRef x) const {
+  Eigen::Index first = 0;
+  for (const StageBlock& block : traits_.stages) {
+    const auto stages = static_cast<int>(block.weights.rows());
+    for (int i = 0; i < stages; ++i)
+      combine(block.rows, stages, &block.weights(0, i), last.data() + first, nullptr,
+              x.data() + first + static_cast<Eigen::Index>(block.rows) * i);
+    first += static_cast<Eigen::Index>(block.rows) * stages;
+  }
+}
+
 void Predictor::evaluate(const Rule& rule, VectorRef x) {
   if (!rule.through_stages) return combine_history(0, rule.terms, extrapolation[rule.terms].data(), x);
   // E x_1 + Σ_k w_k d_k with d_k = x_k − E x_{k+1}, the defects of the stage polynomials in the past.
@@ -58,7 +76,7 @@ void Predictor::evaluate(const Rule& rule, VectorRef x) {
   const double* const weights = extrapolation[defects].data();
   combine_history(1, defects, weights, missed_);
   missed_ = history_[0] - missed_;
-  problem_.extrapolate_stages(missed_, x);
+  extrapolate_stages(missed_, x);
   if (defects == 0) return;
   combine_history(0, defects, weights, missed_);
   x += missed_;
@@ -72,7 +90,7 @@ void Predictor::predict(VectorRef x) {
 /// Largest error of a rule among the leading unknowns; of a long column piece by piece, which takes no
 /// memory.
 double Predictor::error(const Rule& rule, ConstVectorRef solution) {
-  const Eigen::Index leading = problem_.leading_unknowns();
+  const Eigen::Index leading = traits_.leading_unknowns;
   if (rule.through_stages) {
     evaluate(rule, candidate_);
     return (candidate_ - solution).head(leading).lpNorm<Eigen::Infinity>();
@@ -99,26 +117,38 @@ void Predictor::elect(ConstVectorRef solution) {
   }
 }
 
-void Predictor::learn(ConstVectorRef solution) {
-  if (known_ >= 2 && (learned_ < always_until || learned_ % later_every == 0)) elect(solution);
-  ++learned_;
+void Predictor::accept_step(ConstVectorRef solution) {
+  best_before_ = best_;
+  known_before_ = known_;
+  if (known_ >= 2 && (accepted_ < always_until || accepted_ % later_every == 0)) elect(solution);
+  ++accepted_;
   std::rotate(history_.begin(), history_.end() - 1, history_.end());
   history_.front() = solution;
   known_ = std::min(known_ + 1, longest);
 }
 
-void Predictor::save(Snapshot& to) const {
-  to.put(static_cast<double>(learned_));
-  to.put(static_cast<double>(known_));
-  to.put(static_cast<double>(best_));
-  for (std::size_t k = 0; k < known_; ++k) to.put(history_[k]);
+void Predictor::withdraw_step(VectorRef x) {
+  x = history_.front();
+  std::rotate(history_.begin(), history_.begin() + 1, history_.end());
+  best_ = best_before_;
+  known_ = known_before_;
+  --accepted_;
 }
 
-void Predictor::restore(Snapshot& from) {
-  learned_ = from.whole_number(max_steps);
-  known_ = static_cast<std::size_t>(from.whole_number(longest));
-  best_ = static_cast<std::size_t>(from.whole_number(static_cast<long>(rules_.size()) - 1));
-  for (std::size_t k = 0; k < known_; ++k) from.read(history_[k]);
+void Predictor::save(Snapshot& to) const {
+  to.section("predictor");
+  to.put("steps accepted", static_cast<double>(accepted_));
+  to.put("solutions known", static_cast<double>(known_));
+  to.put("best rule", static_cast<double>(best_));
+  for (std::size_t k = 0; k < known_; ++k) to.put("solution", history_[k]);
+}
+
+void Predictor::restore(SnapshotReader& from) {
+  from.section("predictor");
+  accepted_ = from.whole_number("steps accepted", max_steps);
+  known_ = static_cast<std::size_t>(from.whole_number("solutions known", longest));
+  best_ = static_cast<std::size_t>(from.whole_number("best rule", static_cast<long>(rules_.size()) - 1));
+  for (std::size_t k = 0; k < known_; ++k) from.read("solution", history_[k]);
 }
 
 }  // namespace diracstep

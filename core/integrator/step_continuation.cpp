@@ -32,40 +32,41 @@ StepContinuation::StepContinuation(StepProblem& problem, NonlinearSolver& solver
   before_.x.setZero(problem.size());
 }
 
-double StepContinuation::change(double h, const Vector& q0, const Vector& v0, ConstVectorRef x) {
-  problem_.finish(x, q1_, p1_, impulse_);
-  q1_ = (q1_ - q0) / h;
-  const double floor =
-      std::max(round_off * (max_norm(q1_) + max_norm(v0)), rounded_positions * max_norm(q0) / std::abs(h));
-  q1_ -= v0;
-  const double norm = max_norm(q1_);
+void StepContinuation::begin(const Path& path, double part) {
+  problem_.begin({path.step.start, part * path.step.size}, path.start, path.memory);
+}
+
+double StepContinuation::change(const Path& path, double h, ConstVectorRef x) {
+  problem_.finish(x, end_);
+  const double floor = std::max(round_off * (max_norm(end_.v) + max_norm(path.v0)),
+                                rounded_positions * max_norm(path.start.q) / std::abs(h));
+  other_ = end_.v - path.v0;
+  const double norm = max_norm(other_);
   return norm > floor ? norm : 0.0;
 }
 
-/// Solves a step of size h, a part of the whole, from the guess in `point`.
-bool StepContinuation::solve(double h, const Vector& q0, const Vector& v0, Point& point, Result& work) {
+/// Solves the part of the step that has begun, from the guess in `point`.
+bool StepContinuation::solve(const Path& path, Point& point, Result& work) {
   const SolveReport report = solver_.solve(point.x);
   ++work.solves;
   work.report.add(report);
   if (!report.ok()) return false;
-  point.change = change(h, q0, v0, point.x);
+  point.change = change(path, point.part * path.step.size, point.x);
   work.reached = std::max(work.reached, point.part);
   return true;
 }
 
 /// Two points, one half as far as the other, from which on w tends to v0.
-bool StepContinuation::start(Interval step, const Vector& q0, const Vector& p0, const Vector& v0,
-                             Result& work) {
+bool StepContinuation::start(const Path& path, Result& work) {
   for (Point* point : {&last_, &next_}) point->x.resize(problem_.size());  // few scenes ever come here
   bool found = false;
   double part = first_part;
   for (int k = 0; k <= max_halvings; ++k, part /= 2.0) {
     next_.part = part;
-    problem_.begin({step.start, part * step.size}, q0, p0);
-    problem_.guess(v0, next_.x);
+    begin(path, part);
+    problem_.guess(path.v0, next_.x);
     const int before = work.report.iterations;
-    const bool solved = solve(next_.part * step.size, q0, v0, next_, work) &&
-                        work.report.iterations - before <= max_iterations;
+    const bool solved = solve(path, next_, work) && work.report.iterations - before <= max_iterations;
     if (solved && found && last_.change > 0.0 && next_.change <= largest_ratio * last_.change) {
       std::swap(before_, next_);
       return true;
@@ -76,19 +77,18 @@ bool StepContinuation::start(Interval step, const Vector& q0, const Vector& p0, 
   return false;
 }
 
-StepContinuation::Result StepContinuation::follow(Interval step, const Vector& q0, const Vector& p0,
-                                                  const Vector& v0, VectorRef x) {
+StepContinuation::Result StepContinuation::follow(const Path& path, VectorRef x) {
   Result work;
-  bool going = start(step, q0, p0, v0, work);
+  bool going = start(path, work);
   work.reached = going ? last_.part : 0.0;
   double stride = last_.part;
   while (going && last_.part < 1.0) {
     next_.part = std::min(1.0, last_.part + stride);
     const double ahead = (next_.part - last_.part) / (last_.part - before_.part);
     next_.x = last_.x + ahead * (last_.x - before_.x);
-    problem_.begin({step.start, next_.part * step.size}, q0, p0);
+    begin(path, next_.part);
     const int before = work.report.iterations;
-    const bool solved = solve(next_.part * step.size, q0, v0, next_, work);
+    const bool solved = solve(path, next_, work);
     const double missed = (next_.x - last_.x - ahead * (last_.x - before_.x)).lpNorm<Eigen::Infinity>();
     const double way = (next_.x - last_.x).lpNorm<Eigen::Infinity>();
     if (solved && (work.report.iterations - before <= max_iterations || missed <= near_guess * way)) {
@@ -100,35 +100,35 @@ StepContinuation::Result StepContinuation::follow(Interval step, const Vector& q
       going = stride >= shortest_stride * last_.part && work.solves < max_solves;
     }
   }
-  problem_.begin(step, q0, p0);
+  begin(path, 1.0);
   if (going) {
     x = last_.x;
     return work;
   }
   if (work.report.ok()) work.report.status = SolveStatus::no_convergence;
   const double expected = last_.change / last_.part;  // |w − v0| of the whole step, if it grew as it began to
-  if (work.reached > 0.0 && std::abs(change(step.size, q0, v0, x) - expected) <= expected / 2.0)
+  if (work.reached > 0.0 && std::abs(change(path, path.step.size, x) - expected) <= expected / 2.0)
     work.reached = 0.0;
   return work;
 }
 
-bool StepContinuation::tends_to_start(Interval step, const Vector& q0, const Vector& p0, const Vector& v0,
-                                      VectorRef x, Result& work) {
-  const double whole = change(step.size, q0, v0, x);
-  other_ = q1_;  // of that size, so that distance() allocates nothing
+bool StepContinuation::tends_to_start(const Path& path, VectorRef x, Result& work) {
+  const double whole = change(path, path.step.size, x);
   before_.part = 0.5;
-  problem_.begin({step.start, 0.5 * step.size}, q0, p0);
-  problem_.guess(v0, before_.x);
-  const bool solved = solve(0.5 * step.size, q0, v0, before_, work);
-  problem_.begin(step, q0, p0);
+  begin(path, before_.part);
+  problem_.guess(path.v0, before_.x);
+  const bool solved = solve(path, before_, work);
+  begin(path, 1.0);
   return solved && before_.change <= largest_ratio * whole;
 }
 
-double StepContinuation::distance(const Vector& q0, ConstVectorRef x, ConstVectorRef y) {
-  problem_.finish(y, other_, p1_, impulse_);
-  problem_.finish(x, q1_, p1_, impulse_);
-  const double way = (q1_ - q0).lpNorm<Eigen::Infinity>();
-  const double apart = (q1_ - other_).lpNorm<Eigen::Infinity>();
+double StepContinuation::distance(ConstVectorRef x, ConstVectorRef y) {
+  problem_.finish(y, end_);
+  other_ = end_.v;
+  problem_.finish(x, end_);
+  const double way = end_.v.lpNorm<Eigen::Infinity>();
+  other_ -= end_.v;
+  const double apart = other_.lpNorm<Eigen::Infinity>();
   return apart > 0.0 ? apart / way : 0.0;
 }
 

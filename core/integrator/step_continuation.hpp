@@ -14,6 +14,14 @@ class StepContinuation {
  public:
   StepContinuation(StepProblem& problem, NonlinearSolver& solver);
 
+  /// The step to be followed, and the velocity at its start.
+  struct Path {
+    Interval step;
+    const State& start;
+    const StepMemory& memory;
+    const Vector& v0;
+  };
+
   struct Result {
     SolveReport report;  ///< of all solves together; ok where the whole step was reached
     long solves = 0;
@@ -23,16 +31,15 @@ class StepContinuation {
 
   /// Follows the solution into x, which holds one found otherwise.  Where the path ends early but that one
   /// moves as the path began to, the path is taken to have ended for round-off: nothing is known.
-  Result follow(Interval step, const Vector& q0, const Vector& p0, const Vector& v0, VectorRef x);
+  Result follow(const Path& path, VectorRef x);
 
   /// Whether the mean velocity of a solution x and that of half the step tend to the velocity at the start.
   /// One solve; false also where that fails.
-  bool tends_to_start(Interval step, const Vector& q0, const Vector& p0, const Vector& v0, VectorRef x,
-                      Result& work);
+  bool tends_to_start(const Path& path, VectorRef x, Result& work);
 
-  /// How far the ends of the steps with unknowns x and y are apart, in units of the way from q0 to the end of
-  /// x.  The problem has begun.
-  double distance(const Vector& q0, ConstVectorRef x, ConstVectorRef y);
+  /// How far the ends of the steps with unknowns x and y are apart, in units of the way to the end of x.  The
+  /// problem has begun.
+  double distance(ConstVectorRef x, ConstVectorRef y);
 
  private:
   struct Point {
@@ -40,14 +47,16 @@ class StepContinuation {
     Vector x;
     double change = 0.0;  ///< |w − v0|
   };
-  bool solve(double h, const Vector& q0, const Vector& v0, Point& point, Result& work);
-  bool start(Interval step, const Vector& q0, const Vector& p0, const Vector& v0, Result& work);
-  double change(double h, const Vector& q0, const Vector& v0, ConstVectorRef x);
+  void begin(const Path& path, double part);
+  bool solve(const Path& path, Point& point, Result& work);
+  bool start(const Path& path, Result& work);
+  double change(const Path& path, double h, ConstVectorRef x);
 
   StepProblem& problem_;
   NonlinearSolver& solver_;
   Point last_, before_, next_;
-  Vector q1_, p1_, other_, impulse_;
+  StepEnd end_;
+  Vector other_;
 };
 
 }  // namespace diracstep

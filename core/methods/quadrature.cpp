@@ -12,7 +12,7 @@ class SeparableEnds final : public ExplicitGraph {
  public:
   SeparableEnds(const Lagrangian& lagrangian, std::span<const StepNode> nodes, const Vector& mass)
       : lagrangian_(lagrangian),
-        pattern_(diagonal(lagrangian.dimension())),
+        pattern_(SparsityPattern::diagonal(lagrangian.dimension())),
         inverse_mass_(mass.cwiseInverse()) {
     for (const StepNode& node : nodes) (node.c == 0.0 ? start_weight_ : end_weight_) += node.weight;
     const int n = lagrangian.dimension();
@@ -45,12 +45,6 @@ class SeparableEnds final : public ExplicitGraph {
   void mobility(Interval step, VectorRef values) override { values = step.size * inverse_mass_; }
 
  private:
-  static SparsityPattern diagonal(int n) {
-    std::vector<std::pair<int, int>> entries;
-    for (int i = 0; i < n; ++i) entries.emplace_back(i, i);
-    return {n, n, entries};
-  }
-
   const Lagrangian& lagrangian_;
   SparsityPattern pattern_;
   double start_weight_ = 0.0, end_weight_ = 0.0;

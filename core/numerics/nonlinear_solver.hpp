@@ -47,6 +47,7 @@ enum class SolveStatus {
   singular_jacobian,  ///< the linear solver met a zero pivot
   not_finite,         ///< a residual or Jacobian was NaN or infinite
   other_branch,       ///< solved, but smaller steps do not lead to this solution (step_continuation.hpp)
+  refused,            ///< not solved at all: the failure of the step says why
 };
 
 /// One line a person can read.
@@ -84,11 +85,11 @@ class NonlinearSolver {
  public:
   virtual ~NonlinearSolver() = default;
   virtual SolveReport solve(VectorRef x) = 0;
-  /// Forgets what it keeps between solves (pivots), so that a run repeats bit by bit.
+  /// Drops what it keeps between solves (pivots, old factors), so that a run repeats bit by bit.
   virtual void reset() {}
   /// Writes and reads what is kept between solves, so that those after `restore` repeat bit by bit.
   virtual void save(Snapshot& /*to*/) const {}
-  virtual void restore(Snapshot& /*from*/) {}
+  virtual void restore(SnapshotReader& /*from*/) {}
   /// What does the work, for plans and reports: "KINSOL, dense".
   virtual std::string description() const = 0;
   /// How it goes about it, for plans: "Newton's method, fresh Jacobian in each iteration".

@@ -5,6 +5,16 @@
 
 namespace diracstep {
 
+SparsityPattern SparsityPattern::diagonal(int n) {
+  SparsityPattern pattern;
+  pattern.rows_ = n;
+  pattern.column_starts_.resize(static_cast<std::size_t>(n) + 1);
+  pattern.row_indices_.resize(static_cast<std::size_t>(n));
+  std::iota(pattern.column_starts_.begin(), pattern.column_starts_.end(), 0);
+  std::iota(pattern.row_indices_.begin(), pattern.row_indices_.end(), 0);
+  return pattern;
+}
+
 SparsityPattern SparsityPattern::dense(int rows, int columns) {
   SparsityPattern pattern;
   pattern.rows_ = rows;

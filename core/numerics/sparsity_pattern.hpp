@@ -14,6 +14,8 @@ class SparsityPattern {
  public:
   SparsityPattern() : column_starts_{0} {}
   static SparsityPattern dense(int rows, int columns);
+  /// n×n.
+  static SparsityPattern diagonal(int n);
 
   /// From (row, column) pairs in any order; repeated pairs count once.
   SparsityPattern(int rows, int columns, const std::vector<std::pair<int, int>>& entries);

@@ -20,4 +20,7 @@ using Columns = Eigen::MatrixXd;
 using ConstColumnsRef = const Eigen::Ref<const Columns>&;
 using ColumnsRef = Eigen::Ref<Columns>;
 
+/// A column in extended precision, for what rounding drops from a Vector.
+using ExtendedVector = Eigen::Matrix<long double, Eigen::Dynamic, 1>;
+
 }  // namespace diracstep

@@ -30,18 +30,18 @@ class MultiplierStep final : public StepProblem {
   const SparsityPattern& pattern() const override { return pattern_; }
   std::span<const ResidualBlock> blocks() const override { return blocks_; }
 
-  std::string unknowns() const override {
-    return size() == 0 ? "none" : "multipliers (" + std::to_string(size()) + ")";
+  StepTraits traits() const override {
+    return {size() == 0 ? "none" : "multipliers (" + std::to_string(size()) + ")", size()};
   }
 
-  void begin(Interval step, const Vector& q0, const Vector& p0) override {
-    data_.freeze(step, q0, p0);
+  void begin(Interval step, const State& start, const StepMemory&) override {
+    data_.freeze(step, start);
     if (size() == 0) return;
     last_x_[0] = std::nan("");
     blocks_[0].scale = data_.constraint_scale();
   }
 
-  void guess(const Vector&, VectorRef x) override { x.setZero(); }
+  void guess(ConstVectorRef, VectorRef x) override { x.setZero(); }
 
   void residual(ConstVectorRef x, VectorRef f) override {
     evaluate(x);
@@ -59,11 +59,13 @@ class MultiplierStep final : public StepProblem {
     layout_.add_to(values.data(), 0, 1.0 / data_.step.size, response_values_.data());
   }
 
-  void finish(ConstVectorRef x, Vector& q1, Vector& p1, Vector& impulse) override {
+  void finish(ConstVectorRef x, StepEnd& end) override {
     evaluate(x);
-    q1 = q1_;
-    p1 = p1_;
-    impulse = x / data_.step.size;
+    end.q = q1_;
+    end.p = p1_;
+    end.v = (q1_ - data_.q0) / data_.step.size;
+    end.impulse = x / data_.step.size;
+    end.memory.known = true;  // there is nothing to know
   }
 
  private:

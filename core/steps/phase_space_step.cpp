@@ -2,22 +2,15 @@
 #include <algorithm>
 #include <cmath>
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/numerics/lu.hpp>
 #include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/core/steps/gauss_lobatto/tableau.hpp>
 #include <diracstep/core/steps/phase_space_step.hpp>
+#include <diracstep/core/system/lagrangian_derivatives.hpp>
 
 namespace diracstep {
 
 namespace {
-
-/// First and second derivatives of L at one point; L_vv vanishes.
-struct Derivatives {
-  explicit Derivatives(const Lagrangian& lagrangian) {
-    for (Vector* column : {&q, &v}) column->setZero(lagrangian.dimension());
-    for (Vector* values : {&qq, &qv, &vv}) values->setZero(lagrangian.pattern().nonzeros());
-  }
-  Vector q, v, qq, qv, vv;
-};
 
 class PhaseSpaceStep final : public StepProblem {
  public:
@@ -27,10 +20,9 @@ class PhaseSpaceStep final : public StepProblem {
         n_(scene.dimension()),
         sign_(s % 2 == 0 ? 1.0 : -1.0),
         table_(gauss_lobatto_tableau(s)),
-        next_velocities_(lagrange_basis(table_.c, table_.c.array() + 1.0)),
         mirror_(lagrangian_->pattern().transposed_positions()),
         zero_(Vector::Zero(n_)),
-        stages_(static_cast<std::size_t>(s), Derivatives(*lagrangian_)),
+        stages_(static_cast<std::size_t>(s), LagrangianDerivatives(*lagrangian_)),
         start_(*lagrangian_),
         start_along_(*lagrangian_),
         end_(*lagrangian_),
@@ -55,7 +47,6 @@ class PhaseSpaceStep final : public StepProblem {
   }
 
   int size() const override { return n_ * (s_ + 1); }
-  int leading_unknowns() const override { return n_ * s_; }
   const SparsityPattern& pattern() const override { return pattern_; }
 
   /// With B = Dθ − Dθᵀ at the middle of the step and the terms of higher order in h left out, the Jacobian is
@@ -65,40 +56,34 @@ class PhaseSpaceStep final : public StepProblem {
     if (!two_form_known_) factor_two_form();
     split_ = f.reshaped(n_, s_ + 1);
     mixed_ = split_.lazyProduct(unmix_);
-    split_.noalias() = two_form_factors_.permutationP() * mixed_;
-    two_form_factors_.matrixLU().triangularView<Eigen::UnitLower>().solveInPlace(split_);
-    two_form_factors_.matrixLU().triangularView<Eigen::Upper>().solveInPlace(split_);
+    solve_into(two_form_factors_, mixed_, split_);
     split_.leftCols(s_) /= step_.size;
     f = split_.reshaped();
   }
   std::span<const ResidualBlock> blocks() const override { return blocks_; }
-  std::string unknowns() const override {
-    return "stage velocities (" + std::to_string(n_ * s_) + "), projection (" + std::to_string(n_) + ")";
+  StepTraits traits() const override {
+    return {"stage velocities (" + std::to_string(n_ * s_) + "), projection (" + std::to_string(n_) + ")",
+            n_ * s_,
+            0,
+            0,
+            {{n_, lagrange_basis(table_.c, table_.c.array() + 1.0).transpose()}, {n_, Columns::Ones(1, 1)}}};
   }
 
-  void begin(Interval step, const Vector& q0, const Vector& p0) override {
+  void begin(Interval step, const State& start, const StepMemory&) override {
     step_ = step;
-    q0_ = q0;
-    p0_ = p0;
+    q0_ = start.q;
+    p0_ = start.p;
     last_x_[0] = std::nan("");
     two_form_known_ = false;
-    lagrangian_->hessian(step.start, q0_, zero_, start_.qq, start_.qv, start_.vv);
-    lagrangian_->gradient(step.start, q0_, zero_, start_.q, start_.v);
+    start_.take_second(*lagrangian_, step.start, q0_, zero_);
+    start_.take_first(*lagrangian_, step.start, q0_, zero_);
     const double size = std::max(max_norm(p0_), max_norm(start_.qv) * max_norm(q0_));
     blocks_[0].scale = blocks_[1].scale = usable_scale(size + std::abs(step.size) * max_norm(start_.q));
   }
 
-  void guess(const Vector& v0, VectorRef x) override {
+  void guess(ConstVectorRef v0, VectorRef x) override {
     for (int i = 0; i < s_; ++i) x.segment(n_ * i, n_) = v0;
     x.tail(n_).setZero();
-  }
-
-  bool extrapolate_stages(ConstVectorRef last, VectorRef x) const override {
-    x = last;
-    x.head(n_ * s_).setZero();
-    for (int i = 0; i < s_; ++i)
-      for (int k = 0; k < s_; ++k) x.segment(n_ * i, n_) += next_velocities_(i, k) * last.segment(n_ * k, n_);
-    return true;
   }
 
   void residual(ConstVectorRef x, VectorRef f) override {
@@ -115,11 +100,11 @@ class PhaseSpaceStep final : public StepProblem {
     evaluate(x);
     const auto nu = x.tail(n_);
     for (int i = 0; i < s_; ++i) {
-      Derivatives& d = stage(i);
-      lagrangian_->hessian(time(i), q_.col(i), x.segment(n_ * i, n_), d.qq, d.qv, d.vv);
+      LagrangianDerivatives& d = stage(i);
+      d.take_second(*lagrangian_, time(i), q_.col(i), x.segment(n_ * i, n_));
     }
-    lagrangian_->hessian(step_.end(), q1_, zero_, end_.qq, end_.qv, end_.vv);
-    lagrangian_->hessian(step_.end(), q1_, nu, end_along_.qq, end_along_.qv, end_along_.vv);
+    end_.take_second(*lagrangian_, step_.end(), q1_, zero_);
+    end_along_.take_second(*lagrangian_, step_.end(), q1_, nu);
     values.setZero();
     for (int row = 0; row < s_; ++row) {
       for (int k = 0; k < s_; ++k)
@@ -131,22 +116,24 @@ class PhaseSpaceStep final : public StepProblem {
     set_block(values, s_, s_, [&](Eigen::Index e) { return end_by_projection(e); });
   }
 
-  void finish(ConstVectorRef x, Vector& q1, Vector& p1, Vector& impulse) override {
+  void finish(ConstVectorRef x, StepEnd& end) override {
     evaluate(x);
-    q1 = q1_;
-    p1 = end_.v;  // θ(q1): equal to the projected p̃1 at a solution
-    impulse.resize(0);
+    end.q = q1_;
+    end.p = end_.v;  // θ(q1): equal to the projected p̃1 at a solution
+    end.v = (q1_ - q0_) / step_.size;
+    end.impulse.resize(0);
+    end.memory.known = true;  // its scales are those of the start
   }
 
  private:
-  Derivatives& stage(int i) { return stages_[static_cast<std::size_t>(i)]; }
-  const Derivatives& stage(int i) const { return stages_[static_cast<std::size_t>(i)]; }
+  LagrangianDerivatives& stage(int i) { return stages_[static_cast<std::size_t>(i)]; }
+  const LagrangianDerivatives& stage(int i) const { return stages_[static_cast<std::size_t>(i)]; }
   double time(int i) const { return step_.start + table_.c[i] * step_.size; }
 
   void factor_two_form() {
     const int middle = s_ / 2;
-    Derivatives& d = stage(middle);
-    lagrangian_->hessian(time(middle), q_.col(middle), last_x_.segment(n_ * middle, n_), d.qq, d.qv, d.vv);
+    LagrangianDerivatives& d = stage(middle);
+    d.take_second(*lagrangian_, time(middle), q_.col(middle), last_x_.segment(n_ * middle, n_));
     const auto starts = lagrangian_->pattern().column_starts();
     const auto rows = lagrangian_->pattern().row_indices();
     Eigen::Index e = 0;
@@ -163,19 +150,19 @@ class PhaseSpaceStep final : public StepProblem {
     const double h = step_.size;
     const auto v = x.head(n_ * s_).reshaped(n_, s_);
     const auto nu = x.tail(n_);
-    lagrangian_->gradient(step_.start, q0_, nu, start_along_.q, start_along_.v);
+    start_along_.take_first(*lagrangian_, step_.start, q0_, nu);
     p_start_ = p0_ + start_along_.q - start_.q;  // Dθ(q0)ᵀν, since L is linear in v
     p_end_ = p_start_;
     q1_ = q0_ + (1.0 + sign_) * nu;
     for (int i = 0; i < s_; ++i) {
       q_.col(i) = q0_ + nu;
       for (int k = 0; k < s_; ++k) q_.col(i) += h * table_.a(i, k) * v.col(k);
-      lagrangian_->gradient(time(i), q_.col(i), v.col(i), stage(i).q, stage(i).v);
+      stage(i).take_first(*lagrangian_, time(i), q_.col(i), v.col(i));
       p_end_ += h * table_.b[i] * stage(i).q;
       q1_ += h * table_.b[i] * v.col(i);
     }
-    lagrangian_->gradient(step_.end(), q1_, zero_, end_.q, end_.v);
-    lagrangian_->gradient(step_.end(), q1_, nu, end_along_.q, end_along_.v);
+    end_.take_first(*lagrangian_, step_.end(), q1_, zero_);
+    end_along_.take_first(*lagrangian_, step_.end(), q1_, nu);
   }
 
   template <class Entry>
@@ -185,7 +172,7 @@ class PhaseSpaceStep final : public StepProblem {
   }
 
   // Value e of the blocks; `theta` is Dθ = L_vq, the transpose of L_qv.
-  double theta(const Derivatives& d, Eigen::Index e) const {
+  double theta(const LagrangianDerivatives& d, Eigen::Index e) const {
     return d.qv[mirror_[static_cast<std::size_t>(e)]];
   }
   double stage_by_velocity(int i, int k, Eigen::Index e) const {
@@ -219,7 +206,6 @@ class PhaseSpaceStep final : public StepProblem {
   int s_, n_;
   double sign_;
   GaussLobattoTableau table_;
-  Columns next_velocities_;
   std::vector<int> mirror_;
   SparsityPattern pattern_;
   BlockPattern layout_{0, 0};
@@ -229,9 +215,9 @@ class PhaseSpaceStep final : public StepProblem {
   Vector zero_;
   Vector q0_, p0_, q1_, p_start_, p_end_, last_x_;
   Columns q_;
-  std::vector<Derivatives> stages_;
-  Derivatives start_, start_along_;  ///< at q0 with v = 0 and with v = ν
-  Derivatives end_, end_along_;      ///< at q1, likewise
+  std::vector<LagrangianDerivatives> stages_;
+  LagrangianDerivatives start_, start_along_;  ///< at q0 with v = 0 and with v = ν
+  LagrangianDerivatives end_, end_along_;      ///< at q1, likewise
   Columns unmix_, two_form_, split_, mixed_;
   Eigen::PartialPivLU<Columns> two_form_factors_;
   bool dense_ = false, two_form_known_ = false;
@@ -245,8 +231,8 @@ void require_regular_two_form(const Scene& scene) {
   const Lagrangian& l = *scene.lagrangian;
   const int n = scene.dimension();
   if (n > max_coordinates_to_test || scene.start.q.size() != n) return;
-  Derivatives at_start(l);
-  l.hessian(scene.start.time, scene.start.q, Vector::Zero(n), at_start.qq, at_start.qv, at_start.vv);
+  LagrangianDerivatives at_start(l);
+  at_start.take_second(l, scene.start.time, scene.start.q, Vector::Zero(n));
   const Columns transposed = l.pattern().full(at_start.qv);  // Dθᵀ
   if (!transposed.allFinite()) return;                       // the step says so itself
   const Eigen::FullPivLU<Columns> two_form(transposed - transposed.transpose());
@@ -274,39 +260,6 @@ std::unique_ptr<StepProblem> phase_space_step(int s, const Scene& scene, bool de
     throw Misuse(prefix + "rows and forces on a Lagrangian that is linear in v are not supported");
   require_regular_two_form(scene);
   return std::make_unique<PhaseSpaceStep>(s, scene, dense);
-}
-
-PhaseSpaceVelocityProblem::PhaseSpaceVelocityProblem(const Scene& scene, bool dense)
-    : lagrangian_(scene.lagrangian),
-      mirror_(lagrangian_->pattern().transposed_positions()),
-      layout_(lagrangian_->dimension(), lagrangian_->dimension()),
-      blocks_{{"two-form", lagrangian_->dimension()}} {
-  layout_.add(lagrangian_->pattern(), 0, 0);
-  pattern_ = layout_.assemble(dense);
-  for (Vector* column : {&q_, &lq_, &lv_}) column->setZero(lagrangian_->dimension());
-  for (Vector* values : {&lqq_, &lqv_, &lvv_}) values->setZero(lagrangian_->pattern().nonzeros());
-}
-
-void PhaseSpaceVelocityProblem::begin(double t, ConstVectorRef q) {
-  t_ = t;
-  q_ = q;
-  const Vector zero = Vector::Zero(q.size());
-  lagrangian_->hessian(t, q, zero, lqq_, lqv_, lvv_);
-  lagrangian_->gradient(t, q, zero, lq_, lv_);
-  blocks_[0].scale = usable_scale(max_norm(lq_));
-}
-
-void PhaseSpaceVelocityProblem::residual(ConstVectorRef v, VectorRef f) {
-  lagrangian_->gradient(t_, q_, v, lq_, lv_);
-  f = lq_;
-  lagrangian_->pattern().transposed_multiply_add(lqv_.data(), v.data(), f.data(), -1.0);
-}
-
-void PhaseSpaceVelocityProblem::jacobian(ConstVectorRef, VectorRef values) {
-  values.setZero();
-  const auto& places = layout_.positions(0);
-  for (std::size_t e = 0; e < places.size(); ++e)
-    values[places[e]] = lqv_[static_cast<Eigen::Index>(e)] - lqv_[mirror_[e]];
 }
 
 }  // namespace diracstep

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <diracstep/core/dirac/discrete_constraint.hpp>
 #include <diracstep/core/numerics/scales.hpp>
+#include <diracstep/core/steps/state.hpp>
 #include <diracstep/core/system/constraint_distribution.hpp>
 
 namespace diracstep {
@@ -18,10 +19,10 @@ struct StepData {
     end_derivative.setZero(discrete_constraint.pattern().nonzeros());
   }
 
-  void freeze(Interval interval, const Vector& q, const Vector& p) {
+  void freeze(Interval interval, const State& start) {
     step = interval;
-    q0 = q;
-    p0 = p;
+    q0 = start.q;
+    p0 = start.p;
     if (rows() > 0) start_rows.evaluate(step.start, q0);
   }
 

@@ -3,6 +3,7 @@
 #include <diracstep/core/dirac/discrete_constraint.hpp>
 #include <diracstep/core/dirac/generating_function.hpp>
 #include <diracstep/core/numerics/nonlinear_solver.hpp>
+#include <diracstep/core/steps/state.hpp>
 #include <diracstep/core/system/scene.hpp>
 #include <memory>
 #include <string>
@@ -10,47 +11,45 @@
 
 namespace diracstep {
 
+/// Unknowns of the same kind at the stages of a step, s columns of `rows` numbers, and the polynomial through
+/// them taken into the next step: stage i there is Σ_k weights(k, i) x_k.
+struct StageBlock {
+  int rows;
+  Columns weights;  ///< s×s
+};
+
+/// What does not change from step to step.
+struct StepTraits {
+  std::string unknowns;                 ///< for plans: "q1 (3), λ (1)"
+  int leading_unknowns;                 ///< how many come before the multipliers, whose guess hardly matters
+  int scales = 0, multipliers = 0;      ///< how many of each a StepMemory of the step holds
+  std::vector<StageBlock> stages = {};  ///< all unknowns in their order; empty for steps without stages
+};
+
 /// One discrete Dirac step as a nonlinear problem: the only thing a solver sees.
 ///
-/// A step from (q0,p0) is  begin → solve for the unknowns x → finish.  Its size may be zero: then there is
-/// nothing to solve, and finish does all.
+/// A step is  begin → guess → solve for the unknowns x → finish.  Which step is taken depends on the
+/// arguments of begin alone, not on those before it: what a step leaves to the next is a value, in StepEnd.
+/// The step alone moves configurations along tangent vectors; whoever sees only its ends compares their
+/// velocities. The size of a step may be zero: then there is nothing to solve, and finish does all.
 class StepProblem : public NonlinearProblem {
  public:
   /// Freezes the data of the step.
-  virtual void begin(Interval step, const Vector& q0, const Vector& p0) = 0;
+  virtual void begin(Interval step, const State& start, const StepMemory& memory) = 0;
 
-  /// A guess for the unknowns from a velocity at q0.
-  virtual void guess(const Vector& v0, VectorRef x) = 0;
+  /// A guess for the unknowns from a velocity at the start.
+  virtual void guess(ConstVectorRef v0, VectorRef x) = 0;
 
-  /// Once x solves the problem: the end point, and the impulse λ (momentum over the unit of a row) that
-  /// entered at q0 as A(q0)ᵀλ.
-  virtual void finish(ConstVectorRef x, Vector& q1, Vector& p1, Vector& impulse) = 0;
+  /// Once x solves the problem: its end.
+  virtual void finish(ConstVectorRef x, StepEnd& end) = 0;
 
-  /// For steps with several stages: x from the polynomials through the stages of the last step, taken into
-  /// this one; linear in `last`.  False where the step has no such polynomials.
-  virtual bool extrapolate_stages(ConstVectorRef /*last*/, VectorRef /*x*/) const { return false; }
+  virtual StepTraits traits() const = 0;
 
-  /// How many unknowns come before the multipliers, whose guess hardly matters.
-  virtual int leading_unknowns() const { return size(); }
-
-  /// Keeps what the next steps need of the one just finished: the sizes of terms that round-off is judged by.
-  /// Until then a step leaves no trace.
-  virtual void keep() {}
   /// From now on, sums over the stages in extended precision with coefficients to match, and q1, p1 with what
   /// rounding drops from them carried into the step that starts there (compensated addition).  Plain sums
   /// with rounded coefficients are a step that is not quite self-adjoint, whose energy drifts linearly by
   /// round-off (Hairer, McLachlan, Razakarivony, BIT 48, 2008).  False where the step has no such form.
   virtual bool compensate() { return false; }
-
-  /// Forgets all that earlier steps left behind, so that a run repeats bit by bit.
-  virtual void reset() {}
-
-  /// Writes and reads what was kept.
-  virtual void save(Snapshot& /*to*/) const {}
-  virtual void restore(Snapshot& /*from*/) {}
-
-  /// What the unknowns are, for plans: "q1 (3), λ (1)".
-  virtual std::string unknowns() const = 0;
 };
 
 /// The discrete Dirac step of a generating function S (Leok and Ohsawa (4.28), (4.35), (4.45), (4.52)):

@@ -115,7 +115,8 @@ std::shared_ptr<const Scene> independent(std::shared_ptr<const Scene> scene, con
   if (scene->rows() == 0 || scene->rows() > largest_full) return scene;
   const Start& start = scene->start;
   ConstraintsAtPoint rows(scene->constraints, scene->dimension());
-  rows.evaluate(start.time, pose_near(holonomic_blocks(*scene), start.time, start.q, held).value_or(start.q));
+  rows.evaluate(start.time,
+                pose_near(only_holonomic(scene->constraints), start.time, start.q, held).value_or(start.q));
   const std::vector<std::string> names = scene->row_names();
   std::vector<std::string> left;
   for (const int r : dependent_columns(full_one_forms(rows, held), rank_tolerance))
@@ -129,7 +130,7 @@ Vector nearest_position(const Scene& scene, const Start& start, const Guesses& g
                         const SolverFactory& solvers) {
   const std::vector<int> kept = held(guesses.q);
   auto all = std::make_shared<Scene>(scene);
-  all->constraints = holonomic_blocks(scene);
+  all->constraints = only_holonomic(scene.constraints);
   all->start = start;
   const auto solved = independent(all, kept);
   if (solved->rows() == 0) return start.q;
@@ -179,7 +180,7 @@ ConsistentStart project_start(const Scene& given, const Start& given_start, cons
   const auto complete = completed(std::move(copy)), extended = with_hidden_rows(complete);
   const Scene& scene = *extended;
   const Start& start = complete->start;
-  require_size("the start q", start.q.size(), scene.dimension());
+  require_size("the start q", start.q.size(), scene.storage_size());
   require_size("the start v", start.v.size(), scene.dimension());
   ConsistentStart result{start, 0.0, 0.0};
   const Eigen::Index n = start.q.size();

@@ -1,5 +1,7 @@
+#include <algorithm>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/system/constraint_rows.hpp>
+#include <iterator>
 #include <stdexcept>
 
 namespace diracstep {
@@ -35,6 +37,20 @@ std::string row_label(const ConstraintBlocks& blocks, int row) {
     row -= block->rows();
   }
   throw std::out_of_range("there is no such row");
+}
+
+ConstraintBlocks only_holonomic(const ConstraintBlocks& blocks) {
+  ConstraintBlocks some;
+  std::ranges::copy_if(blocks, std::back_inserter(some),
+                       [](const auto& block) { return block->holonomic(); });
+  return some;
+}
+
+ConstraintBlocks only_nonholonomic(const ConstraintBlocks& blocks) {
+  ConstraintBlocks some;
+  std::ranges::copy_if(blocks, std::back_inserter(some),
+                       [](const auto& block) { return !block->holonomic(); });
+  return some;
 }
 
 }  // namespace diracstep

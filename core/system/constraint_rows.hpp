@@ -69,4 +69,8 @@ int row_count(const ConstraintBlocks& blocks);
 /// blocks.
 std::string row_label(const ConstraintBlocks& blocks, int row);
 
+/// Those blocks that are holonomic, or those that are not.
+ConstraintBlocks only_holonomic(const ConstraintBlocks& blocks);
+ConstraintBlocks only_nonholonomic(const ConstraintBlocks& blocks);
+
 }  // namespace diracstep

@@ -6,9 +6,9 @@
 #include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/core/system/constraint_distribution.hpp>
 #include <diracstep/core/system/hidden_rows.hpp>
+#include <diracstep/core/system/lagrangian_derivatives.hpp>
+#include <diracstep/core/system/rows_along_motions.hpp>
 #include <limits>
-#include <sstream>
-#include <string_view>
 
 namespace diracstep {
 
@@ -30,16 +30,16 @@ struct Point {
 };
 
 /// The derivatives of L and f that decide, as full matrices.
-struct Derivatives {
-  Derivatives(const Scene& scene, const Point& at) {
+struct FullDerivatives {
+  FullDerivatives(const Scene& scene, const Point& at) {
     const Lagrangian& lagrangian = *scene.lagrangian;
     const SparsityPattern& pattern = lagrangian.pattern();
-    Vector qq(pattern.nonzeros()), qv = qq, vv = qq;
-    lagrangian.hessian(at.t, at.q, at.v, qq, qv, vv);
-    lqq = pattern.full(qq);
-    lqv = pattern.full(qv);
-    lvv = pattern.full(vv);
-    lvt.setZero(at.q.size());
+    LagrangianDerivatives l(lagrangian);
+    l.take_second(lagrangian, at.t, at.q, at.v);
+    lqq = pattern.full(l.qq);
+    lqv = pattern.full(l.qv);
+    lvv = pattern.full(l.vv);
+    lvt.setZero(at.v.size());
     lagrangian.gradient_rate(at.t, at.q, at.v, lvt);
     fq = fv = Columns::Zero(lqq.rows(), lqq.cols());
     if (!scene.force) return;
@@ -56,11 +56,11 @@ struct Derivatives {
 /// that nearly every scene passes.
 bool positive_definite(const Lagrangian& lagrangian, const Start& start) {
   const SparsityPattern& pattern = lagrangian.pattern();
-  Vector lqq(pattern.nonzeros()), lqv = lqq, lvv = lqq;
-  lagrangian.hessian(start.time, start.q, start.v, lqq, lqv, lvv);
+  LagrangianDerivatives l(lagrangian);
+  l.take_second(lagrangian, start.time, start.q, start.v);
   const int n = pattern.rows();
   const Eigen::Map<const Eigen::SparseMatrix<double>> mass(
-      n, n, pattern.nonzeros(), pattern.column_starts().data(), pattern.row_indices().data(), lvv.data());
+      n, n, pattern.nonzeros(), pattern.column_starts().data(), pattern.row_indices().data(), l.vv.data());
   Vector size(n);
   for (int i = 0; i < n; ++i) size[i] = mass.coeff(i, i);
   if (!(size.minCoeff() > 0.0)) return false;
@@ -93,7 +93,7 @@ Columns row_matrix(const Scene& scene, const Point& at) {
 }
 
 /// Rows of ∂²L/∂v² and A, each in its own units.
-Columns stacked(const Scene& scene, const Point& at, const Derivatives& d) {
+Columns stacked(const Scene& scene, const Point& at, const FullDerivatives& d) {
   Columns all(scene.dimension() + scene.rows(), scene.dimension());
   all.topRows(scene.dimension()) = d.lvv;
   if (scene.rows() > 0) all.bottomRows(scene.rows()) = row_matrix(scene, at);
@@ -116,167 +116,13 @@ Point near(const Start& start) {
   return point;
 }
 
-/// "qC1-qC3": a motion in words.
-std::string motion(const Scene& scene, const Vector& w) {
-  std::ostringstream text;
-  for (Eigen::Index i = 0; i < w.size(); ++i) {
-    if (w[i] == 0.0) continue;
-    text << (w[i] < 0.0 ? "-" : text.str().empty() ? "" : "+");
-    if (std::abs(w[i]) != 1.0) text << std::abs(w[i]) << "*";
-    text << scene.coordinates[static_cast<std::size_t>(i)];
-  }
-  return text.str();
-}
-
 [[noreturn]] void refuse(const Scene& scene, const Columns& w, const char* why) {
   std::string motions;
   for (Eigen::Index k = 0; k < w.cols(); ++k)
-    motions += (k == 0 ? "'" : ", '") + motion(scene, w.col(k)) + "'";
+    motions += (k == 0 ? "'" : ", '") + motion_along(scene, w.col(k)) + "'";
   throw Misuse("scene '" + scene.name + "': the Lagrangian is degenerate along the rows: a motion along " +
                motions + " carries no momentum, and " + why);
 }
-
-constexpr std::string_view prefix = "hidden_";  // of the names of these rows
-
-/// The rows Wᵀ(∂L/∂q + f), each divided by the size of its coefficients at the start.
-class HiddenRows final : public ConstraintRows {
- public:
-  HiddenRows(const Scene& scene, bool holonomic, const Columns& directions, const Vector& units)
-      : HiddenRows(scene, holonomic, in_units(directions, units), directions, pattern_of(directions)) {}
-
-  std::string origin(int row) const override {
-    const std::string& name = names()[static_cast<std::size_t>(row)];
-    return "not in the file: the balance of forces along " + name.substr(prefix.size()) +
-           ", which carries no momentum";
-  }
-
-  void position(double t, ConstVectorRef q, VectorRef phi) const override { force_along(t, q, phi); }
-
-  void coefficients(double t, ConstVectorRef q, VectorRef a, VectorRef b) const override {
-    const Vector rest = Vector::Zero(dimension());
-    if (holonomic()) {
-      by_position(t, q, rest, 1.0, a);
-      Vector lqt(dimension());
-      lagrangian_->position_gradient_rate(t, q, rest, lqt);
-      b = w_.transpose() * lqt;
-      return;
-    }
-    Vector fq(force_->pattern().nonzeros()), fv = fq;
-    force_->derivatives(t, q, rest, fq, fv);
-    a.setZero();
-    add(1, by_force_, fv, 1.0, a);
-    force_along(t, q, b);
-  }
-
-  /// For rows on velocities  ∂(f_v w + s (L_q + f))/∂q = f_q(w) + s L_qq + (s − 1) f_q(0).
-  void derivative(double t, ConstVectorRef q, ConstVectorRef w, double s, VectorRef d) const override {
-    d.setZero();
-    if (holonomic()) return;
-    by_position(t, q, w, s, d);
-    Vector fq(force_->pattern().nonzeros()), fv = fq;
-    force_->derivatives(t, q, Vector::Zero(dimension()), fq, fv);
-    add(1, by_force_, fq, s - 1.0, d);
-  }
-
-  void time_derivative(double t, ConstVectorRef q, ConstVectorRef v, VectorRef d) const override {
-    d.setZero();
-    if (holonomic()) return;
-    Vector lqt(dimension());
-    lagrangian_->position_gradient_rate(t, q, v, lqt);
-    d = w_.transpose() * lqt;
-  }
-
-  void annihilator_derivative(double, ConstVectorRef, ConstVectorRef, VectorRef d) const override {
-    d.setZero();
-  }
-
- private:
-  HiddenRows(const Scene& scene, bool holonomic, Columns w, const Columns& directions,
-             const SparsityPattern& places)
-      : HiddenRows(
-            scene, holonomic, std::move(w), directions, places,
-            PatternProduct(places, true, scene.lagrangian->pattern(), false),
-            scene.force ? PatternProduct(places, true, scene.force->pattern(), false) : PatternProduct()) {}
-
-  HiddenRows(const Scene& scene, bool holonomic, Columns w, const Columns& directions,
-             const SparsityPattern& places, PatternProduct by_lagrangian, PatternProduct by_force)
-      : ConstraintRows(holonomic, union_of(scene, directions, by_lagrangian, by_force, nullptr),
-                       SparsityPattern(scene.dimension(), scene.dimension(), {}),
-                       names_of(scene, directions)),
-        lagrangian_(scene.lagrangian),
-        force_(scene.force),
-        w_(std::move(w)),
-        by_lagrangian_(std::move(by_lagrangian)),
-        by_force_(std::move(by_force)),
-        layout_(static_cast<int>(w_.cols()), scene.dimension()) {
-    union_of(scene, directions, by_lagrangian_, by_force_, &layout_);
-    for (const auto& [i, k] : places.entries()) w_values_.push_back(w_(i, k));
-  }
-
-  static Columns in_units(const Columns& directions, const Vector& units) {
-    return directions * units.cwiseInverse().asDiagonal();
-  }
-  static SparsityPattern pattern_of(const Columns& w) {
-    std::vector<std::pair<int, int>> entries;
-    for (int k = 0; k < w.cols(); ++k)
-      for (int i = 0; i < w.rows(); ++i)
-        if (w(i, k) != 0.0) entries.emplace_back(i, k);
-    return {static_cast<int>(w.rows()), static_cast<int>(w.cols()), std::move(entries)};
-  }
-  static SparsityPattern union_of(const Scene& scene, const Columns& w, const PatternProduct& by_lagrangian,
-                                  const PatternProduct& by_force, BlockPattern* layout) {
-    BlockPattern own(static_cast<int>(w.cols()), scene.dimension());
-    BlockPattern& both = layout != nullptr ? *layout : own;
-    both.add(by_lagrangian.pattern(), 0, 0);
-    if (scene.force) both.add(by_force.pattern(), 0, 0);
-    return both.assemble(false);
-  }
-  static std::vector<std::string> names_of(const Scene& scene, const Columns& w) {
-    std::vector<std::string> names;
-    for (Eigen::Index k = 0; k < w.cols(); ++k)
-      names.push_back(std::string(prefix) + motion(scene, w.col(k)));
-    return names;
-  }
-
-  /// Wᵀ(∂L/∂q + f) at v = 0.
-  void force_along(double t, ConstVectorRef q, VectorRef out) const {
-    Vector rest = Vector::Zero(dimension()), lq(dimension()), other(dimension());
-    lagrangian_->gradient(t, q, rest, lq, other);
-    if (force_) {
-      force_->value(t, q, rest, other);
-      lq += other;
-    }
-    out = w_.transpose() * lq;
-  }
-
-  /// Wᵀ(s ∂²L/∂q² + ∂f/∂q) at (t, q, v).
-  void by_position(double t, ConstVectorRef q, ConstVectorRef v, double s, VectorRef out) const {
-    Vector lqq(lagrangian_->pattern().nonzeros()), lqv = lqq, lvv = lqq;
-    lagrangian_->hessian(t, q, v, lqq, lqv, lvv);
-    out.setZero();
-    add(0, by_lagrangian_, lqq, s, out);
-    if (!force_) return;
-    Vector fq(force_->pattern().nonzeros()), fv = fq;
-    force_->derivatives(t, q, v, fq, fv);
-    add(1, by_force_, fq, 1.0, out);
-  }
-
-  /// out += factor · Wᵀ M.
-  void add(int block, const PatternProduct& product, const Vector& m, double factor, VectorRef out) const {
-    Vector values = Vector::Zero(product.pattern().nonzeros());
-    product.multiply(w_values_.data(), m.data(), values.data());
-    const auto& places = layout_.positions(block);
-    for (std::size_t k = 0; k < places.size(); ++k)
-      out[places[k]] += factor * values[static_cast<Eigen::Index>(k)];
-  }
-
-  std::shared_ptr<const Lagrangian> lagrangian_;
-  std::shared_ptr<const Force> force_;  ///< may be null
-  Columns w_;                           ///< n×d, in the units of the rows
-  std::vector<double> w_values_;        ///< its entries other than zero
-  PatternProduct by_lagrangian_, by_force_;
-  BlockPattern layout_;
-};
 
 /// The directions W, those along which f resists apart from the others.
 struct Directions {
@@ -303,7 +149,7 @@ Vector force_of(const Scene& scene, const Point& at) {
 
 /// What the equations at the top of the header take for granted.
 void require_described(const Scene& scene, const Columns& w, const Directions& split, const Point& at,
-                       const Derivatives& d) {
+                       const FullDerivatives& d) {
   if (!vanishes(d.lqv * w, d.lqv) || !vanishes(w.transpose() * d.lvt, d.lvt))
     refuse(scene, w, "its momentum ∂L/∂v is not constant, which is not supported");
   if (!vanishes(w.transpose() * d.lqv, d.lqv) || !vanishes(split.free.transpose() * d.fv, d.fv))
@@ -321,8 +167,8 @@ void require_described(const Scene& scene, const Columns& w, const Directions& s
 
 /// W, without a column where ∂²L/∂v² is regular along the rows at the start or near it: what is singular at
 /// the start alone is no degeneracy.
-Columns directions(const Scene& scene, const Point& start, const Derivatives& at_start, const Point& other,
-                   const Derivatives& at_other) {
+Columns directions(const Scene& scene, const Point& start, const FullDerivatives& at_start,
+                   const Point& other, const FullDerivatives& at_other) {
   const Columns here = stacked(scene, start, at_start), elsewhere = stacked(scene, other, at_other);
   const Columns w = kernel(here);
   if (w.cols() == 0 || !elsewhere.allFinite()) return w;
@@ -335,7 +181,7 @@ Columns directions(const Scene& scene, const Point& start, const Derivatives& at
   return constant;
 }
 
-Columns hidden_matrix(const Directions& w, const Derivatives& d) {
+Columns hidden_matrix(const Directions& w, const FullDerivatives& d) {
   Columns matrix(w.resisted.cols() + w.free.cols(), d.lqq.cols());
   matrix << w.resisted.transpose() * d.fv, w.free.transpose() * (d.lqq + d.fq);
   return matrix;
@@ -352,12 +198,12 @@ Vector largest_of_rows(const Columns& matrix) {
 
 ConstraintBlocks hidden_rows(const Scene& scene) {
   const Start& start = scene.start;
-  const bool sized = start.q.size() == scene.dimension() && start.v.size() == scene.dimension();
+  const bool sized = start.q.size() == scene.storage_size() && start.v.size() == scene.dimension();
   if (!sized || !start.q.allFinite() || !start.v.allFinite()) return {};  // told by require_consistent
   if (scene.lagrangian->structure().phase_space() || positive_definite(*scene.lagrangian, start)) return {};
   if (scene.dimension() > largest_full_matrix) return {};
   const Point first{start.time, start.q, start.v}, other = near(start);
-  const Derivatives at_first(scene, first), at_other(scene, other);
+  const FullDerivatives at_first(scene, first), at_other(scene, other);
   const Columns w = directions(scene, first, at_first, other, at_other);
   if (w.cols() == 0) return {};
   const Directions parts = split(w, at_first.fv);
@@ -369,8 +215,8 @@ ConstraintBlocks hidden_rows(const Scene& scene) {
     refuse(scene, w * undetermined, "neither a potential nor a force determines it; is a term missing in L?");
   ConstraintBlocks blocks;
   const Eigen::Index r = parts.resisted.cols(), c = parts.free.cols();
-  if (r > 0) blocks.push_back(std::make_shared<HiddenRows>(scene, false, parts.resisted, units.head(r)));
-  if (c > 0) blocks.push_back(std::make_shared<HiddenRows>(scene, true, parts.free, units.tail(c)));
+  if (r > 0) blocks.push_back(rows_along_motions(scene, false, parts.resisted, units.head(r)));
+  if (c > 0) blocks.push_back(rows_along_motions(scene, true, parts.free, units.tail(c)));
   return blocks;
 }
 
@@ -382,7 +228,8 @@ std::shared_ptr<const Scene> with_hidden_rows(std::shared_ptr<const Scene> scene
   ConstraintsAtPoint hidden(blocks, scene->dimension());
   hidden.evaluate(start.t, start.q);
   const Point other = near(scene->start);
-  const Columns w = directions(*scene, start, Derivatives(*scene, start), other, Derivatives(*scene, other));
+  const Columns w =
+      directions(*scene, start, FullDerivatives(*scene, start), other, FullDerivatives(*scene, other));
   Vector off(hidden.rows());
   hidden.velocity_residual(start.v, off);
   const Columns response = hidden.pattern().full(hidden.coefficients()) * w;

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <diracstep/core/system/redundant_rows.hpp>
-#include <iterator>
 #include <optional>
 #include <set>
 
@@ -128,7 +127,7 @@ std::vector<Columns> one_forms_around(const Scene& scene, const Start& start) {
     return full_one_forms(rows);
   };
   std::vector<Columns> all{at(start.q)};
-  const ConstraintBlocks holonomic = holonomic_blocks(scene);
+  const ConstraintBlocks holonomic = only_holonomic(scene.constraints);
   const double size = std::max(start.q.lpNorm<Eigen::Infinity>(), 1e-2);
   for (const double distance : {-0.3, -0.1, 0.1, 0.3}) {
     Vector q = start.q;
@@ -171,13 +170,6 @@ std::vector<int> best_choice(std::vector<int> at_start, const std::vector<Column
 }
 
 }  // namespace
-
-ConstraintBlocks holonomic_blocks(const Scene& scene) {
-  ConstraintBlocks blocks;
-  std::ranges::copy_if(scene.constraints, std::back_inserter(blocks),
-                       [](const auto& block) { return block->holonomic(); });
-  return blocks;
-}
 
 std::optional<Vector> pose_near(const ConstraintBlocks& holonomic, double t, Vector q,
                                 const std::vector<int>& held) {

@@ -8,9 +8,6 @@
 
 namespace diracstep {
 
-/// The blocks of rows on positions.
-ConstraintBlocks holonomic_blocks(const Scene& scene);
-
 /// A point of the holonomic rows near q that differs from it in what is not `held`, by Gauss and Newton's
 /// method in least squares, so that the rows may depend on each other; nothing where it does not converge.
 std::optional<Vector> pose_near(const ConstraintBlocks& holonomic, double t, Vector q,

@@ -9,7 +9,7 @@ SaddlePointProblem::SaddlePointProblem(const Scene& scene, bool dense)
     : scene_(scene),
       n_(scene.dimension()),
       m_(scene.rows()),
-      q_(Vector::Zero(n_)),
+      q_(Vector::Zero(scene.storage_size())),
       rows_(scene.constraints, n_),
       lq_(Vector::Zero(n_)),
       lv_(Vector::Zero(n_)),

@@ -40,7 +40,7 @@ std::vector<std::string> Scene::row_names() const {
 }
 
 double Scene::energy(double t, ConstVectorRef q, ConstVectorRef v) const {
-  Vector lq(q.size()), lv(q.size());
+  Vector lq(v.size()), lv(v.size());
   lagrangian->gradient(t, q, v, lq, lv);
   return v.dot(lv) - lagrangian->value(t, q, v);
 }
@@ -73,12 +73,12 @@ std::shared_ptr<const Scene> completed(std::shared_ptr<const Scene> scene) {
   const bool from_momentum = start.v.size() == 0 && start.p.size() > 0;
   if (scene->lagrangian && !from_momentum) return scene;
   const std::string prefix = "scene '" + scene->name + "': ";
-  require_size(prefix + "the start q", start.q.size(), scene->dimension());
+  require_size(prefix + "the start q", start.q.size(), scene->storage_size());
   auto complete = std::make_shared<Scene>(*scene);
   if (from_momentum) {
     require_size(prefix + "the start p", start.p.size(), scene->dimension());
-    Vector hq(start.q.size());
-    complete->start.v.setZero(start.q.size());  // where the Lagrangian is tested for a Hamiltonian
+    Vector hq(start.p.size());
+    complete->start.v.setZero(start.p.size());  // where the Lagrangian is tested for a Hamiltonian
     hamiltonian_of(*complete)->gradient(start.time, start.q, start.p, hq, complete->start.v);
   }
   if (!scene->lagrangian) {
@@ -96,7 +96,7 @@ std::shared_ptr<const Hamiltonian> hamiltonian_of(const Scene& scene) {
 
 void require_consistent(const Scene& scene, const Start& start) {
   const std::string prefix = "scene '" + scene.name + "': ";
-  require_size(prefix + "the start q", start.q.size(), scene.dimension());
+  require_size(prefix + "the start q", start.q.size(), scene.storage_size());
   require_size(prefix + "the start v", start.v.size(), scene.dimension());
   require_finite(scene, "q", start.q);
   require_finite(scene, "v", start.v);

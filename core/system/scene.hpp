@@ -14,8 +14,8 @@ namespace diracstep {
 /// ∂H/∂p lies in it, with the scene's Hamiltonian or that of a regular Lagrangian.
 struct Start {
   double time = 0.0;
-  Vector q;
-  Vector v;
+  Vector q;       ///< Scene::storage_size() numbers
+  Vector v;       ///< Scene::dimension() numbers, like p
   Vector p = {};  ///< used where v is empty
 };
 
@@ -35,7 +35,12 @@ struct Scene {
   Start start;
   std::shared_ptr<const Kinks> kinks = {};  ///< null where nothing is known of any
 
+  /// Of the tangent spaces: how many numbers a velocity, a momentum, a row and the second derivatives of L
+  /// have.
   int dimension() const { return static_cast<int>(coordinates.size()); }
+  /// How many numbers a configuration is stored in.  In R^n, the one kind of space so far, the same n; a
+  /// rotation would take four for three.
+  int storage_size() const { return dimension(); }
   int rows() const { return row_count(constraints); }
   std::vector<std::string> row_names() const;
 

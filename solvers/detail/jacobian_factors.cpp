@@ -57,36 +57,38 @@ void JacobianFactors::reset() {
 
 void JacobianFactors::save(Snapshot& to) const {
   if (!keeps_factors()) return factors_.front().solver->save(to);
-  to.put(static_cast<double>(factors_.size()));
-  to.put(static_cast<double>(current_ - factors_.data()));
-  to.put(fresh_starts_);
+  to.put("factored Jacobians", static_cast<double>(factors_.size()));
+  to.put("number in use", static_cast<double>(current_ - factors_.data()));
+  to.put("solves to begin with a new one", fresh_starts_);
   for (const Factors& kept : factors_) {
     kept.solver->save(to);
-    to.put(kept.factored ? 1.0 : 0.0);
-    to.put(kept.usable ? 1.0 : 0.0);
+    to.put("factored", kept.factored);
+    to.put("usable", kept.usable);
     if (!kept.factored) continue;
-    to.put(kept.values);
-    if (constant_) to.put(kept.parameter);
+    to.put("Jacobian", kept.values);
+    if (constant_) to.put("parameter", kept.parameter);
   }
 }
 
-void JacobianFactors::restore(Snapshot& from) {
+void JacobianFactors::restore(SnapshotReader& from) {
   reset();
   if (!keeps_factors()) return factors_.front().solver->restore(from);
   const long most = max_parameters;
-  const long count = from.whole_number(most), current = from.whole_number(most);
+  const long count = from.whole_number("factored Jacobians", most);
+  const long current = from.whole_number("number in use", most);
   if (count < 1 || current >= count) throw Misuse("the snapshot has no factors of a Jacobian");
-  fresh_starts_ = static_cast<int>(from.whole_number(fresh_starts_after_failure));
+  fresh_starts_ =
+      static_cast<int>(from.whole_number("solves to begin with a new one", fresh_starts_after_failure));
   while (std::ssize(factors_) < count) add();
   current_ = factors_.data() + current;
   for (Factors& kept : factors_) {
     kept.solver->restore(from);
-    kept.factored = from.whole_number(1) == 1;
-    kept.usable = from.whole_number(1) == 1;
+    kept.factored = from.flag("factored");
+    kept.usable = from.flag("usable");
     if (!kept.factored) continue;
     kept.values.resize(problem_.pattern().nonzeros());
-    from.read(kept.values);
-    if (constant_) kept.parameter = from.number();
+    from.read("Jacobian", kept.values);
+    if (constant_) kept.parameter = from.number("parameter");
     if (!kept.solver->holds(kept.values.data())) (void)kept.solver->factor(kept.values.data());
   }
 }

@@ -28,11 +28,11 @@ class JacobianFactors {
   bool exact() const { return policy_ == JacobianPolicy::fresh || constant_; }
   /// Whether the last iteration took a Jacobian of its own point.
   bool current() const { return current_point_; }
-  /// Forgets every factor and pivot.
+  /// Drops every factor and pivot.
   void reset();
   /// Writes and reads all that the next solves depend on, old factors among it.
   void save(Snapshot& to) const;
-  void restore(Snapshot& from);
+  void restore(SnapshotReader& from);
 
   const char* name() const { return factors_.front().solver->name(); }
   std::string policy() const;

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <diracstep/core/numerics/lu.hpp>
 #include <diracstep/solvers/detail/linear_solver.hpp>
 #include <limits>
 #include <utility>
@@ -94,10 +95,10 @@ class SmallLu final : public LinearSolver {
 
 class DenseLu final : public LinearSolver {
  public:
-  explicit DenseLu(int size) : lu_(size), permuted_(size) {}
+  explicit DenseLu(int size) : lu_(size), solution_(size) {}
 
   bool factor(const double* values) override {
-    const Eigen::Map<const Eigen::MatrixXd> matrix(values, permuted_.size(), permuted_.size());
+    const Eigen::Map<const Eigen::MatrixXd> matrix(values, solution_.size(), solution_.size());
     lu_.compute(matrix);
     const auto pivots = lu_.matrixLU().diagonal();
     const double round_off = std::numeric_limits<double>::epsilon() * static_cast<double>(pivots.size());
@@ -107,18 +108,16 @@ class DenseLu final : public LinearSolver {
   }
 
   void solve(double* b) override {
-    Eigen::Map<Eigen::VectorXd> column(b, permuted_.size());
-    permuted_.noalias() = lu_.permutationP() * column;  // in place Eigen would allocate
-    lu_.matrixLU().triangularView<Eigen::UnitLower>().solveInPlace(permuted_);
-    lu_.matrixLU().triangularView<Eigen::Upper>().solveInPlace(permuted_);
-    column = permuted_;
+    Eigen::Map<Eigen::VectorXd> column(b, solution_.size());
+    solve_into(lu_, column, solution_);
+    column = solution_;
   }
 
   const char* name() const override { return "dense LU"; }
 
  private:
   Eigen::PartialPivLU<Eigen::MatrixXd> lu_;
-  Eigen::VectorXd permuted_;
+  Eigen::VectorXd solution_;
 };
 
 /// Up to this size plain loops are faster than Eigen's blocks.

@@ -14,12 +14,12 @@ class LinearSolver {
   virtual bool factor(const double* values) = 0;
   /// Replaces b by the solution.
   virtual void solve(double* b) = 0;
-  /// Forgets the pivots of earlier factorisations.
+  /// Drops the pivots of earlier factorisations.
   virtual void reset() {}
   /// Writes and reads what the next factorisation depends on; the factors themselves are made anew, see
   /// holds().
   virtual void save(Snapshot& /*to*/) const {}
-  virtual void restore(Snapshot& /*from*/) {}
+  virtual void restore(SnapshotReader& /*from*/) {}
   /// Whether restore() has made the factors of this matrix already, in the way the saved ones were made.
   virtual bool holds(const double* /*values*/) const { return false; }
   virtual const char* name() const = 0;

@@ -51,14 +51,14 @@ class Klu final : public LinearSolver {
 
   /// The pivots are those of the matrix that was last factored afresh.
   void save(Snapshot& to) const override {
-    to.put(numeric_ != nullptr ? 1.0 : 0.0);
-    if (numeric_ != nullptr) to.put(fresh_values_);
+    to.put("pivots chosen", numeric_ != nullptr);
+    if (numeric_ != nullptr) to.put("matrix of the pivots", fresh_values_);
   }
-  void restore(Snapshot& from) override {
+  void restore(SnapshotReader& from) override {
     reset();
-    if (from.whole_number(1) == 0) return;
+    if (!from.flag("pivots chosen")) return;
     Vector values(fresh_values_.size());
-    from.read(values);
+    from.read("matrix of the pivots", values);
     factor_afresh(values.data());
   }
 

@@ -19,10 +19,11 @@ namespace {
 using testing::expect_misuse;
 
 Checkpoint example() {
-  return {{{"scene", "knife_edge"}, {"step", "0.1"}},
-          12,
-          3456,
-          Snapshot({0.1, -0.0, std::nan(""), 1e-310, HUGE_VAL})};
+  Snapshot state;
+  state.put("position", Vector{{0.1, -0.0, std::nan("")}});
+  state.put("time", 1e-310);
+  state.put("size", HUGE_VAL);
+  return {{{"scene", "knife_edge"}, {"step", "0.1"}}, 12, 3456, state};
 }
 
 std::string contents(const std::filesystem::path& path) {

@@ -43,15 +43,16 @@ class SingleStep {
   Result operator()(Interval step, const Vector& q0, const Vector& p0, const Vector& v0) {
     Result result{q0, p0, Vector()};
     Vector x(problem_->size());
-    problem_->begin(step, q0, p0);
+    problem_->begin(step, {q0, p0, v0}, {});
     problem_->guess(v0, x);
     if (solver_ && !solver_->solve(x).ok()) {
       result.q1.setConstant(std::nan(""));
       result.p1.setConstant(std::nan(""));
       return result;
     }
-    problem_->finish(x, result.q1, result.p1, result.impulse);
-    return result;
+    StepEnd end;
+    problem_->finish(x, end);
+    return {end.q, end.p, end.impulse};
   }
 
  private:

@@ -163,12 +163,13 @@ double symplecticity_defect(const Registry& registry, const std::shared_ptr<cons
   const auto problem = registry.method(options.method).step(*scene, true);
   const auto solver = problem->size() > 0 ? kinsol()(*problem) : nullptr;
   const auto map = [&](const Vector& z) -> Vector {
-    Vector x(problem->size()), q1(n), p1(n), impulse;
-    problem->begin({scene->start.time, options.step}, z.head(n), z.tail(n));
+    Vector x(problem->size());
+    problem->begin({scene->start.time, options.step}, {z.head(n), z.tail(n), scene->start.v}, {});
     problem->guess(scene->start.v, x);
     if (solver && !solver->solve(x).ok()) return Vector::Constant(2 * n, std::nan(""));
-    problem->finish(x, q1, p1, impulse);
-    return join(q1, p1);
+    StepEnd end;
+    problem->finish(x, end);
+    return join(end.q, end.p);
   };
   Vector lq(n), p(n);
   scene->lagrangian->gradient(scene->start.time, scene->start.q, scene->start.v, lq, p);

@@ -104,18 +104,18 @@ double stage_membership_residual(const Registry& registry, const std::shared_ptr
   const auto solver = kinsol()(*problem);
   StageSpace space(*scene, method);
   PhasePoint start{scene->start.q, Vector::Zero(scene->dimension())};
-  Vector lq = start.p, x(problem->size()), impulse;
+  Vector lq = start.p, x(problem->size());
+  StepEnd end;
   scene->lagrangian->gradient(scene->start.time, start.q, scene->start.v, lq, start.p);
   double largest = 0.0;
   for (long k = 0; k < steps; ++k) {
     const Interval step{scene->start.time + static_cast<double>(k) * options.step, options.step};
-    problem->begin(step, start.q, start.p);
+    problem->begin(step, {start.q, start.p, scene->start.v}, {});
     problem->guess(scene->start.v, x);
     if (!solver->solve(x).ok()) return std::nan("");
-    PhasePoint end = start;
-    problem->finish(x, end.q, end.p, impulse);
-    largest = std::max(largest, space.residual(step, x, start, end));
-    start = end;
+    problem->finish(x, end);
+    largest = std::max(largest, space.residual(step, x, start, {end.q, end.p}));
+    start = {end.q, end.p};
   }
   return largest;
 }

@@ -31,13 +31,6 @@ int unknowns(const Scene& scene, DaeFormulation formulation) {
   return count;
 }
 
-SparsityPattern diagonal(int n) {
-  std::vector<std::pair<int, int>> entries;
-  entries.reserve(static_cast<std::size_t>(n));
-  for (int i = 0; i < n; ++i) entries.emplace_back(i, i);
-  return {n, n, std::move(entries)};
-}
-
 }  // namespace
 
 ImplicitLagrangianDae::ImplicitLagrangianDae(const Scene& scene, bool dense, DaeFormulation formulation)
@@ -47,7 +40,7 @@ ImplicitLagrangianDae::ImplicitLagrangianDae(const Scene& scene, bool dense, Dae
       n_(scene.dimension()),
       size_(unknowns(scene, formulation)),
       layout_(size_, size_),
-      diagonal_(diagonal(n_)),
+      diagonal_(SparsityPattern::diagonal(n_)),
       ones_(Vector::Ones(n_)),
       lq_(Vector::Zero(n_)),
       lv_(Vector::Zero(n_)),

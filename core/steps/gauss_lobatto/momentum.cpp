@@ -49,9 +49,12 @@ bool StageMomentum::second_derivatives(const StagePoints& at, ConstVectorRef x) 
   for (int i = 0; taken && i < s_; ++i) second_derivatives(at, x, i);
   for (int i = 0; force_ && i < s_; ++i)
     force_->derivatives(at.gauss_time(i), at.gauss.col(i), x.segment(n_ * i, n_), fq_.col(i), fv_.col(i));
-  hessians_known_ = lagrangian_->structure().quadratic;
+  if (taken) hessians_known_ = lagrangian_->structure().quadratic && all_finite();
   return taken;
 }
+
+/// Those of a quadratic L are kept for good, where they are numbers.
+bool StageMomentum::all_finite() const { return lqq_.allFinite() && lqv_.allFinite() && lvv_.allFinite(); }
 
 void StageMomentum::second_derivatives(const StagePoints& at, ConstVectorRef x, int stage) {
   lagrangian_->hessian(at.gauss_time(stage), at.gauss.col(stage), x.segment(n_ * stage, n_), lqq_.col(stage),
@@ -70,7 +73,7 @@ void StageMomentum::set_jacobian(const StagePoints& at, const BlockPattern& layo
       add_block(at, layout, i, k, values);
       if (force_) add_force_block(at, layout, i, k, values);
     }
-  if (!same_jacobian_) return;
+  if (!same_jacobian_ || !hessians_known_) return;
   jacobian_ = values;
   jacobian_step_ = at.step.size;
 }
@@ -99,16 +102,11 @@ void StageMomentum::add_force_block(const StagePoints& at, const BlockPattern& l
   layout.add_to(values.data(), s_ * s_ + i * s_ + k, 1.0, force_block_.data());
 }
 
-void StageMomentum::evaluate_start(const StagePoints& at, const Vector& v0) {
+void StageMomentum::evaluate_start(const StagePoints& at, ConstVectorRef v0) {
   const double t = at.step.start;
   const auto q0 = at.lobatto.col(0);
   lagrangian_->gradient(t, q0, v0, lq_.col(0), lv_.col(0));
   lagrangian_->hessian(t, q0, v0, lqq_.col(0), lqv_.col(0), lvv_.col(0));
-}
-
-void StageMomentum::reset() {
-  hessians_known_ = false;
-  jacobian_step_ = 0.0;
 }
 
 }  // namespace diracstep

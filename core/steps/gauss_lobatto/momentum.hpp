@@ -39,11 +39,10 @@ class StageMomentum {
   auto mass(int stage) const { return lvv_.col(stage); }                     ///< ∂²L/∂v², values
 
   /// ∂L/∂q and ∂²L/∂q² at the start of the step in place of the first node, to know their size.
-  void evaluate_start(const StagePoints& at, const Vector& v0);
-  /// Forgets what does not change during a run.
-  void reset();
+  void evaluate_start(const StagePoints& at, ConstVectorRef v0);
 
  private:
+  bool all_finite() const;
   void add_block(const StagePoints& at, const BlockPattern& layout, int i, int k, VectorRef& values);
   void add_force_block(const StagePoints& at, const BlockPattern& layout, int i, int k, VectorRef& values);
 

@@ -1,3 +1,4 @@
+#include <diracstep/core/numerics/lu.hpp>
 #include <diracstep/core/steps/gauss_lobatto/splitting.hpp>
 
 namespace diracstep {
@@ -8,7 +9,7 @@ StageSplitting::StageSplitting(const GaussLobattoTableau& table, int n, int m, b
   if (holonomic) constraint_weights_ = table.lobatto_a.bottomRows(s_);
   if (m_ > 0) unmix_ = (constraint_weights_ * impulse_weights_).inverse();
   mass_.setZero(n_, n_);
-  permuted_.setZero(n_);
+  solution_.setZero(n_);
   rows_.setZero(m_, n_);
   response_.setZero(m_, m_);
   through_mass_.setZero(n_, m_);
@@ -45,10 +46,8 @@ void StageSplitting::solve_mass(Columns& columns) {
     return;
   }
   for (Eigen::Index k = 0; k < columns.cols(); ++k) {
-    permuted_.noalias() = mass_factors_.permutationP() * columns.col(k);  // in place Eigen would allocate
-    mass_factors_.matrixLU().triangularView<Eigen::UnitLower>().solveInPlace(permuted_);
-    mass_factors_.matrixLU().triangularView<Eigen::Upper>().solveInPlace(permuted_);
-    columns.col(k) = permuted_;
+    solve_into(mass_factors_, columns.col(k), solution_);
+    columns.col(k) = solution_;
   }
 }
 
@@ -66,9 +65,7 @@ void StageSplitting::solve(VectorRef& f) {
     gaps_ = rows_.lazyProduct(velocities_);
     impulses_ = f.tail(m_ * s_).reshaped(m_, s_) - gaps_.lazyProduct(constraint_weights_.transpose());
     gaps_ = impulses_.lazyProduct(unmix_.transpose());
-    impulses_.noalias() = response_factors_.permutationP() * gaps_;
-    response_factors_.matrixLU().triangularView<Eigen::UnitLower>().solveInPlace(impulses_);
-    response_factors_.matrixLU().triangularView<Eigen::Upper>().solveInPlace(impulses_);
+    solve_into(response_factors_, gaps_, impulses_);
     f.tail(m_ * s_) = impulses_.reshaped();
     gaps_ = impulses_.lazyProduct(impulse_weights_.transpose());
     forces_ = through_mass_.lazyProduct(gaps_);

@@ -37,7 +37,7 @@ class StageSplitting {
   Columns mass_, rows_, response_;
   bool diagonal_ = false;
   Vector inverse_mass_;  ///< where M is diagonal
-  Vector permuted_;
+  Vector solution_;
   Eigen::PartialPivLU<Columns> mass_factors_, response_factors_;
   Columns through_mass_;  ///< M⁻¹ Aᵀ
   Columns velocities_, gaps_, impulses_, forces_;

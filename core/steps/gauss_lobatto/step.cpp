@@ -7,6 +7,7 @@
 #include <diracstep/core/steps/gauss_lobatto/momentum.hpp>
 #include <diracstep/core/steps/gauss_lobatto/points.hpp>
 #include <diracstep/core/steps/gauss_lobatto/rows.hpp>
+#include <diracstep/core/steps/gauss_lobatto/sizes.hpp>
 #include <diracstep/core/steps/gauss_lobatto/splitting.hpp>
 #include <diracstep/core/steps/gauss_lobatto/step.hpp>
 #include <optional>
@@ -21,96 +22,63 @@ constexpr double last_bit = 0.01;
 /// The splitting takes full matrices.
 constexpr int largest_split = 40;
 
+bool affine(const Scene& scene) {
+  const auto constant = [](const auto& block) { return block->constant(); };
+  return scene.lagrangian->structure().quadratic && !scene.force &&
+         std::ranges::all_of(scene.constraints, constant);
+}
+
 class GaussLobattoStep final : public StepProblem {
  public:
   GaussLobattoStep(int s, const Scene& scene, bool dense)
-      : structure_(scene.lagrangian->structure()),
+      : mass_constant_(scene.lagrangian->structure().y_hessian_constant),
         s_(s),
         n_(scene.dimension()),
         m_(scene.rows()),
         points_(s, n_),
-        momentum_(scene.lagrangian, scene.force, s, dense) {
-    const GaussLobattoTableau& table = points_.weights.table;
-    const Vector lobatto_c = table.lobatto_c.head(s);
-    next_velocities_ = lagrange_basis(table.c, table.c.array() + 1.0).transpose();
-    next_impulses_ = lagrange_basis(lobatto_c, lobatto_c.array() + 1.0).transpose();
-    impulses_.setZero(n_, s_);
+        momentum_(scene.lagrangian, scene.force, s, dense),
+        layout_(size(), size()),
+        affine_(affine(scene)) {
     int row = n_ * s_;
     for (const auto& block : scene.constraints) {
       rows_.emplace_back(block, s_, row, m_);
       row += block->rows();
     }
-    const auto constant = [](const auto& block) { return block->constant(); };
-    affine_ = structure_.quadratic && !scene.force && std::ranges::all_of(scene.constraints, constant);
     last_x_.setZero(size());
-    kept_.multipliers.setZero(m_ * s_);
+    impulses_.setZero(n_, s_);
     p0_.setZero(n_);
     const auto holonomic = [](const auto& block) { return block->holonomic(); };
     const auto kinds = std::ranges::count_if(scene.constraints, holonomic);
     if (n_ + m_ <= largest_split && (kinds == 0 || kinds == std::ssize(scene.constraints)))
-      splitting_.emplace(table, n_, m_, kinds > 0);
-    plan_jacobian(dense);
+      splitting_.emplace(points_.weights.table, n_, m_, kinds > 0);
+    momentum_.plan(layout_);
+    for (StageRows& rows : rows_) rows.plan(layout_);
+    pattern_ = layout_.assemble(dense);
     blocks_.push_back({"momentum", n_ * s_});
     if (m_ > 0) blocks_.push_back({"constraint", m_ * s_});
   }
 
   int size() const override { return s_ * (n_ + m_); }
-  int leading_unknowns() const override { return s_ * n_; }
+  const SparsityPattern& pattern() const override { return pattern_; }
+  std::span<const ResidualBlock> blocks() const override { return blocks_; }
 
-  bool extrapolate_stages(ConstVectorRef last, VectorRef x) const override {
-    if (s_ == 1) return false;
-    for (int i = 0; i < s_; ++i) {
-      combine(n_, s_, &next_velocities_(0, i), last.data(), nullptr, x.data() + n_ * i);
-      if (m_ > 0)
-        combine(m_, s_, &next_impulses_(0, i), last.data() + n_ * s_, nullptr, x.data() + row_of(i));
-    }
-    return true;
+  StepTraits traits() const override {
+    StepTraits traits{"stage velocities (" + std::to_string(s_ * n_) + ")", s_ * n_, StageSizes::stored,
+                      m_ * s_};
+    if (m_ > 0) traits.unknowns += ", multipliers (" + std::to_string(s_ * m_) + ")";
+    if (s_ == 1) return traits;  // one stage is no polynomial
+    const GaussLobattoTableau& table = points_.weights.table;
+    const Vector lobatto_c = table.lobatto_c.head(s_);
+    traits.stages.push_back({n_, lagrange_basis(table.c, table.c.array() + 1.0).transpose()});
+    if (m_ > 0) traits.stages.push_back({m_, lagrange_basis(lobatto_c, lobatto_c.array() + 1.0).transpose()});
+    return traits;
   }
 
   bool compensate() override {
     sums_.emplace(s_, n_);
-    q0_.setZero(n_);
     return true;
   }
 
-  void keep() override {
-    if (!kept_.known && curvature_ == 0.0) {  // solved without a Jacobian
-      (void)momentum_.second_derivatives(points_, last_x_);
-      measure_curvature();
-    }
-    kept_.known = true;
-    kept_.force = largest_entry(momentum_.forces().data(), momentum_.forces().size());
-    kept_.curvature = curvature_;
-    kept_.row_curvature = row_curvature_;
-    kept_.multipliers = last_x_.tail(m_ * s_);
-    if (sums_) sums_->keep();
-  }
-  void reset() override {
-    if (sums_) sums_->forget();
-    kept_ = {.multipliers = Vector::Zero(m_ * s_)};
-    mass_known_ = false;
-    momentum_.reset();
-  }
-  void save(Snapshot& to) const override {
-    to.put(kept_.known ? 1.0 : 0.0);
-    for (const double size : {kept_.force, kept_.curvature, kept_.row_curvature, curvature_, row_curvature_})
-      to.put(size);
-    to.put(kept_.multipliers);
-    if (!sums_) return;
-    to.put(q0_);
-    to.put(p0_);
-    sums_->save(to);
-  }
-  void restore(Snapshot& from) override {
-    kept_.known = from.whole_number(1) == 1;
-    for (double* size : {&kept_.force, &kept_.curvature, &kept_.row_curvature, &curvature_, &row_curvature_})
-      *size = from.number();
-    from.read(kept_.multipliers);
-    if (!sums_) return;
-    from.read(q0_);
-    from.read(p0_);
-    sums_->restore(from);
-  }
   double constant_jacobian_parameter() const override { return affine_ ? step_size() : std::nan(""); }
 
   bool has_splitting() const override { return splitting_.has_value(); }
@@ -118,38 +86,24 @@ class GaussLobattoStep final : public StepProblem {
     if (!splitting_known_) move_splitting();
     splitting_->solve(f);
   }
-  const SparsityPattern& pattern() const override { return pattern_; }
-  std::span<const ResidualBlock> blocks() const override { return blocks_; }
-
-  std::string unknowns() const override {
-    std::string text = "stage velocities (" + std::to_string(s_ * n_) + ")";
-    if (m_ > 0) text += ", multipliers (" + std::to_string(s_ * m_) + ")";
-    return text;
-  }
-
-  void begin(Interval step, const Vector& q0, const Vector& p0) override {
+  void begin(Interval step, const State& start, const StepMemory& memory) override {
     points_.step = step;
     points_.weights.scale_to(step.size);
-    if (sums_) {
-      sums_->begin(q0, p0, q0_, p0_);
-      q0_ = q0;
-    }
-    p0_ = p0;
-    points_.lobatto.col(0) = q0;
-    position_size_ = largest_entry(q0.data(), n_);
+    if (sums_) sums_->begin(start.rest);
+    p0_ = start.p;
+    points_.lobatto.col(0) = start.q;
     splitting_known_ = false;
-    force_size_ = kept_.force;
-    curvature_ = kept_.curvature;
-    row_curvature_ = kept_.row_curvature;
+    sizes_.begin(memory, largest_entry(start.q.data(), start.q.size()));
     for (StageRows& rows : rows_) rows.begin(points_);
+    last_impulse_ = memory.known && m_ > 0 ? impulse_scale(memory.multipliers) : 0.0;
     update_scales();
     evaluated_ = false;
   }
 
-  void guess(const Vector& v0, VectorRef x) override {
+  void guess(ConstVectorRef v0, VectorRef x) override {
     for (int i = 0; i < s_; ++i) x.segment(n_ * i, n_) = v0;
     x.tail(m_ * s_).setZero();
-    if (!kept_.known) sample_start(v0);
+    if (!sizes_.known) sample_start(v0);
   }
 
   void residual(ConstVectorRef x, VectorRef f) override {
@@ -158,7 +112,7 @@ class GaussLobattoStep final : public StepProblem {
     for (int i = 0; i < s_; ++i) {
       double* const momentum = f.data() + n_ * i;
       if (sums_) {
-        sums_->momentum_row(i, step_size(), momentum_.momenta().col(i), p0_, momentum_.forces(), impulses_,
+        sums_->momentum_row(i, step_size(), lv.col(i), p0_, momentum_.forces(), impulses_,
                             f.segment(n_ * i, n_));
         continue;
       }
@@ -173,34 +127,37 @@ class GaussLobattoStep final : public StepProblem {
 
   void jacobian(ConstVectorRef x, VectorRef values) override {
     evaluate(x);
-    if (momentum_.second_derivatives(points_, x)) measure_curvature();
+    if (momentum_.second_derivatives(points_, x)) sizes_.curvature = curvature_size();
     momentum_.set_jacobian(points_, layout_, values);
-    row_curvature_ = 0.0;
+    sizes_.row_curvature = 0.0;
     for (StageRows& rows : rows_) {
       rows.add_to_jacobian(points_, layout_, x, values);
-      row_curvature_ = std::max(row_curvature_, rows.curvature_size());
+      sizes_.row_curvature = std::max(sizes_.row_curvature, rows.curvature_size());
     }
   }
 
-  void finish(ConstVectorRef x, Vector& q1, Vector& p1, Vector& impulse) override {
+  void finish(ConstVectorRef x, StepEnd& end) override {
     evaluate(x);
     const StageWeights& weights = points_.weights;
+    const auto q0 = points_.lobatto.col(0);
     if (sums_) {
-      sums_->end(step_size(), q0_, p0_, velocities(x), momentum_.forces(), impulses_, q1, p1);
+      sums_->end(step_size(), q0, p0_, velocities(x), momentum_.forces(), impulses_, end);
     } else {
-      q1.resize(n_);
-      p1.resize(n_);
-      if (m_ > 0) q1 = points_.lobatto.col(s_);
+      end.q.resize(n_);
+      end.p.resize(n_);
+      if (m_ > 0) end.q = points_.lobatto.col(s_);
       for_each_piece(n_, [&](int first, int rows) {
         if (m_ == 0)  // nothing else looks there
           combine_piece(first, rows, n_, s_, &weights.lobatto(0, s_), x.data(), points_.lobatto.data(),
-                        q1.data());
+                        end.q.data());
         add_forces_and_impulses(first, rows, weights.end_force.data(), weights.table.lobatto_b.data(),
-                                p0_.data(), p1.data());
+                                p0_.data(), end.p.data());
       });
     }
+    end.v = (end.q - q0) / step_size();
     // The impulse at q0 is that part of λ_0 which enters there.
-    impulse = weights.table.lobatto_b[0] * x.segment(n_ * s_, m_);
+    end.impulse = weights.table.lobatto_b[0] * x.segment(n_ * s_, m_);
+    measure(x, end.memory);
   }
 
  private:
@@ -236,10 +193,11 @@ class GaussLobattoStep final : public StepProblem {
     if (sums_) {
       last_x_ = x;
       const ExtendedGaussLobattoTableau& table = sums_->table;
+      const auto start = points_.lobatto.col(0);
       for (int i = 0; i < s_; ++i)
-        sums_->position(step_size(), table.a.row(i), q0_, velocities(x), points_.gauss.col(i));
+        sums_->position(step_size(), table.a.row(i), start, velocities(x), points_.gauss.col(i));
       for (int j = first_lobatto; j <= s_; ++j)
-        sums_->position(step_size(), table.lobatto_a.row(j), q0_, velocities(x), points_.lobatto.col(j));
+        sums_->position(step_size(), table.lobatto_a.row(j), start, velocities(x), points_.lobatto.col(j));
       return;
     }
     const StageWeights& weights = points_.weights;
@@ -255,8 +213,20 @@ class GaussLobattoStep final : public StepProblem {
     last_x_.tail(m_ * s_) = x.tail(m_ * s_);
   }
 
-  void measure_curvature() {
-    curvature_ = largest_entry(momentum_.curvatures().data(), momentum_.curvatures().size());
+  /// Sizes at x, for the next step.
+  void measure(ConstVectorRef x, StepMemory& memory) {
+    StageSizes sizes = sizes_;
+    sizes.force = largest_entry(momentum_.forces().data(), momentum_.forces().size());
+    if (!sizes.known && sizes.curvature == 0.0) {  // solved without a Jacobian
+      (void)momentum_.second_derivatives(points_, last_x_);
+      sizes.curvature = curvature_size();
+    }
+    sizes.store(memory);
+    memory.multipliers = x.tail(m_ * s_);
+  }
+
+  double curvature_size() const {
+    return largest_entry(momentum_.curvatures().data(), momentum_.curvatures().size());
   }
 
   /// The splitting is taken in the middle of the step, at the stages that were evaluated last.
@@ -265,7 +235,7 @@ class GaussLobattoStep final : public StepProblem {
     if (!mass_known_) {
       momentum_.second_derivatives(points_, last_x_, middle);
       splitting_->set_mass(momentum_.pattern(), momentum_.mass(middle));
-      mass_known_ = structure_.y_hessian_constant;
+      mass_known_ = mass_constant_ && momentum_.mass(middle).allFinite();
     }
     for (const StageRows& rows : rows_)
       splitting_->set_rows(rows.first(), rows.rows().pattern(), rows.lobatto(middle));
@@ -273,27 +243,19 @@ class GaussLobattoStep final : public StepProblem {
     splitting_known_ = true;
   }
 
-  void plan_jacobian(bool dense) {
-    BlockPattern layout(size(), size());
-    momentum_.plan(layout);
-    for (StageRows& rows : rows_) rows.plan(layout);
-    pattern_ = layout.assemble(dense);
-    layout_ = std::move(layout);
-  }
-
   /// Size of the impulses of such multipliers, and of what they lose to the round-off of positions.
   double impulse_scale(ConstVectorRef multipliers) const {
     double largest = 0.0;
     for (const StageRows& rows : rows_) largest = std::max(largest, rows.impulse_size(multipliers));
-    return largest + row_curvature_ * position_size_;
+    return largest + sizes_.row_curvature * sizes_.position;
   }
 
   /// Before the first solve: the derivatives at the start, for the round-off scales.
-  void sample_start(const Vector& v0) {
+  void sample_start(ConstVectorRef v0) {
     momentum_.evaluate_start(points_, v0);
     const double before = blocks_[0].scale;  // of impulses nothing is known yet
-    force_size_ = largest_entry(momentum_.forces().data(), n_);
-    curvature_ = largest_entry(momentum_.curvatures().data(), momentum_.curvatures().rows());
+    sizes_.force = largest_entry(momentum_.forces().data(), n_);
+    sizes_.curvature = largest_entry(momentum_.curvatures().data(), momentum_.curvatures().rows());
     evaluated_ = false;
     update_scales();
     blocks_[0].scale = std::max(blocks_[0].scale, before);
@@ -302,10 +264,8 @@ class GaussLobattoStep final : public StepProblem {
   /// Terms of the momentum rows are momenta, those of the last step where this one is not solved yet; a
   /// velocity of size |q|/h loses ε|q|/h to round-off.
   void update_scales() {
-    const double h = std::abs(step_size()), velocity = position_size_ / h;
-    double momentum = largest_entry(p0_.data(), n_) + h * force_size_ + h * curvature_ * position_size_;
-    if (m_ > 0) momentum += impulse_scale(kept_.multipliers);
-    blocks_[0].scale = usable_scale(momentum);
+    const double h = std::abs(step_size()), velocity = sizes_.position / h;
+    blocks_[0].scale = usable_scale(sizes_.momentum(h, largest_entry(p0_.data(), n_)) + last_impulse_);
     double one_forms = 0.0;
     for (const StageRows& rows : rows_) one_forms = std::max(one_forms, rows.form_size());
     if (m_ > 0) blocks_[1].scale = usable_scale(one_forms * velocity);
@@ -315,33 +275,24 @@ class GaussLobattoStep final : public StepProblem {
       for (ResidualBlock& block : blocks_) block.scale *= last_bit;
   }
 
-  PhaseStructure structure_;
+  bool mass_constant_;
   int s_, n_, m_;
   StagePoints points_;
   StageMomentum momentum_;
-  Columns next_velocities_, next_impulses_;  ///< stages of the next step from those of this one, by columns
   std::vector<StageRows> rows_;
   SparsityPattern pattern_;
-  BlockPattern layout_{0, 0};
+  BlockPattern layout_;
   std::vector<ResidualBlock> blocks_;
 
   std::optional<CompensatedSums> sums_;
 
-  Vector q0_, p0_;  ///< q0_ for compensated sums alone; it is the first Lobatto point
-  Vector last_x_;
+  Vector p0_, last_x_;
   Columns impulses_;  ///< A(Q~_j)ᵀ λ_j
-  /// Sizes in the last step kept, by which the next one judges round-off.
-  struct Kept {
-    bool known = false;
-    double force = 0.0, curvature = 0.0, row_curvature = 0.0;
-    Vector multipliers = {};
-  };
-  Kept kept_;
-  double position_size_ = 0.0, row_curvature_ = 0.0;  ///< of q0 and of ∂(Aᵀλ)/∂q
-  double force_size_ = 0.0, curvature_ = 0.0;         ///< of ∂L/∂q and ∂²L/∂q²
-  std::optional<StageSplitting> splitting_;           ///< small scenes with rows of one kind
+  StageSizes sizes_;
+  double last_impulse_ = 0.0;  ///< size of it with the multipliers of the step before, at this start
+  std::optional<StageSplitting> splitting_;  ///< small scenes with rows of one kind
   bool splitting_known_ = false, mass_known_ = false;
-  bool affine_ = false;     ///< the residual is affine in the unknowns
+  bool affine_;             ///< the residual is affine in the unknowns
   bool evaluated_ = false;  ///< at last_x_
 };
 

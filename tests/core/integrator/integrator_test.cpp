@@ -111,7 +111,7 @@ TEST(Momentum, ProjectedIsThatOfAVelocityInTheDistributionAndInTheSameClass) {
     }
 }
 
-TEST(Integrator, ReadingDoesNotChangeTheTrajectoryByABitAndCostsNoSolveOfAStep) {
+TEST(Integrator, ReadingDoesNotChangeTheTrajectoryByABit) {
   for_every_combination([](const ScenePointer& scene, const IntegratorOptions& options) {
     for (const Momentum momentum : {Momentum::plus, Momentum::minus, Momentum::projected}) {
       Integrator read = integrator_for(scene, options), unread = integrator_for(scene, options);
@@ -127,6 +127,41 @@ TEST(Integrator, ReadingDoesNotChangeTheTrajectoryByABitAndCostsNoSolveOfAStep) 
       EXPECT_EQ(read.work().solves, unread.work().solves);
       EXPECT_EQ(read.work().iterations, unread.work().iterations);
       EXPECT_EQ(read.work().residual_evaluations, unread.work().residual_evaluations);
+    }
+  });
+}
+
+TEST(Integrator, ReadingIsNotNoticedByStepsOfAnotherSizeRetriesAndSnapshots) {
+  for_every_combination([](const ScenePointer& scene, const IntegratorOptions& options) {
+    Integrator read = integrator_for(scene, options), unread = integrator_for(scene, options);
+    const auto same = [&] {
+      Sample sample;
+      EXPECT_TRUE(read.sample(Momentum::minus, sample).ok());
+      EXPECT_TRUE(read.save().bytes() == unread.save().bytes());
+    };
+    for (const double h : {0.05, 0.03, 0.06, 0.05, 0.05}) {
+      for (Integrator* integrator : {&read, &unread}) ASSERT_TRUE(integrator->step(h).ok());
+      same();
+      for (Integrator* integrator : {&read, &unread}) ASSERT_TRUE(integrator->retry(0.9 * h).ok());
+      same();
+    }
+  });
+}
+
+TEST(Integrator, TheMinusMomentumIsThatOfTheStepTakenNext) {
+  for_every_combination([](const ScenePointer& scene, const IntegratorOptions& options) {
+    if (scene->rows() == 0 || options.order > 0) return;  // a composition solves its first stage alone
+    Integrator integrator = integrator_for(scene, options);
+    const Method method = Registry::with_built_ins().method(options.method);
+    Sample minus;
+    for (int k = 0; k < 8; ++k) {
+      ASSERT_TRUE(integrator.sample(Momentum::minus, minus).ok());
+      const testing::SingleStep::Result step =
+          testing::SingleStep(method, *scene)({integrator.time(), options.step}, integrator.position(),
+                                              integrator.momentum(), integrator.velocity_estimate());
+      EXPECT_LT(distance(minus.impulse, step.impulse), 1e-11);
+      ASSERT_TRUE(integrator.step().ok());
+      EXPECT_LT(distance(integrator.position(), step.q1), 1e-11);
     }
   });
 }

@@ -23,7 +23,7 @@ std::vector<Sample> steps_of(Integrator& integrator, int count, Momentum momentu
   return samples;
 }
 
-TEST(Snapshot, RestoredIntegratorsGoOnWithTheSameBits) {
+TEST(RestoredIntegrator, GoesOnWithTheSameBits) {
   for_every_combination([](const ScenePointer& scene, const IntegratorOptions& options) {
     for (const Momentum momentum : {Momentum::projected, Momentum::minus})
       for (const int before : {0, 1, 3, 14}) {
@@ -41,7 +41,7 @@ TEST(Snapshot, RestoredIntegratorsGoOnWithTheSameBits) {
   });
 }
 
-TEST(Snapshot, PivotsOfAnEarlierMatrixAreKept) {
+TEST(RestoredIntegrator, PivotsOfAnEarlierMatrixAreKept) {
   // The mass of x grows by 1e12 within a step of the start, so that pivots chosen now differ from those then.
   Scene scene = testing::particle("growing mass");
   scene.lagrangian = lagrangian<3>([](const auto& q, const auto& v, const auto& t) {
@@ -57,7 +57,7 @@ TEST(Snapshot, PivotsOfAnEarlierMatrixAreKept) {
   EXPECT_TRUE(same_bits(steps_of(second, 50, Momentum::plus), steps_of(whole, 50, Momentum::plus)));
 }
 
-TEST(Snapshot, OldFactorsAndWhatRoundingDroppedAreKept) {
+TEST(RestoredIntegrator, OldFactorsAndWhatRoundingDroppedAreKept) {
   for (const auto& scene : testing::every_constraint_class())
     for (const char* method : {"type1/midpoint", "type1/gl:3"})
       for (const bool compensated : {false, true})
@@ -85,7 +85,7 @@ TEST(Snapshot, OldFactorsAndWhatRoundingDroppedAreKept) {
             }
 }
 
-TEST(Snapshot, ConstantJacobiansOfEachStepSizeAreKept) {
+TEST(RestoredIntegrator, ConstantJacobiansOfEachStepSizeAreKept) {
   // A chain of springs: the Jacobian of GL depends on the step size alone, and a composition has several.
   Scene scene = testing::particle("springs");
   scene.lagrangian = lagrangian<3>([](const auto& q, const auto& v) {
@@ -103,7 +103,7 @@ TEST(Snapshot, ConstantJacobiansOfEachStepSizeAreKept) {
   }
 }
 
-TEST(Snapshot, CoversStepsOfVariableSize) {
+TEST(RestoredIntegrator, CoversStepsOfVariableSize) {
   const auto scene = testing::mixed();
   const IntegratorOptions options{.method = "type1/gl:2", .step = 0.05};
   Integrator whole = integrator_for(scene, options), second = integrator_for(scene, options);
@@ -119,31 +119,34 @@ TEST(Snapshot, CoversStepsOfVariableSize) {
   }
 }
 
-TEST(Snapshot, ThatDoesNotFitIsRefusedAndTheIntegratorStandsAtItsStart) {
+TEST(RestoredIntegrator, RefusesASnapshotThatDoesNotFitByNameAndStandsAtItsStart) {
   const auto scene = testing::mixed();
   Integrator one = integrator_for(scene, {.method = "type1/gl:2", .step = 0.05});
   (void)steps_of(one, 5, Momentum::plus);
   const Snapshot snapshot = one.save();
-  const auto refused = [&](Integrator& integrator, const Snapshot& bad, const char* why) {
+  const auto refused = [&](const IntegratorOptions& options, const Snapshot& bad,
+                           std::initializer_list<std::string> parts) {
+    Integrator integrator = integrator_for(scene, options);
     (void)steps_of(integrator, 3, Momentum::plus);
-    expect_misuse([&] { integrator.restore(bad); }, {why});
+    expect_misuse([&] { integrator.restore(bad); }, parts);
     EXPECT_EQ(integrator.position(), scene->start.q);
     EXPECT_EQ(integrator.work().steps, 0);
     EXPECT_TRUE(integrator.step().ok());
   };
-  Integrator other = integrator_for(scene, {.method = "type1/gl:3", .step = 0.05});
-  refused(other, snapshot, "of another scene, method or version");
-  Integrator same = integrator_for(scene, {.method = "type1/gl:2", .step = 0.05});
-  std::vector<double> numbers = snapshot.numbers();
-  numbers.push_back(0.0);
-  refused(same, Snapshot(numbers), "goes on after the last number");
-  numbers.resize(numbers.size() - 3);
-  refused(same, Snapshot(numbers), "the snapshot ends after");
-  refused(same, Snapshot(), "the snapshot ends after 0 numbers");
+  const IntegratorOptions same{.method = "type1/gl:2", .step = 0.05};
+  refused({.method = "type1/gl:3", .step = 0.05}, snapshot, {"'solution'", "another scene, method"});
+  refused({.method = "type1/gl:2", .order = 6, .step = 0.05}, snapshot, {"'step'", "'predictor' is needed"});
+  IntegratorOptions compensated = same;
+  compensated.compensated_sums = true;
+  refused(compensated, snapshot, {"0 numbers for 'position rest'"});
+  refused(same, Snapshot(), {"ends before 'integrator'"});
+  Snapshot longer = snapshot;
+  longer.put("one more", 0.0);
+  refused(same, longer, {"goes on with 'one more'"});
   for (const double value : {-1.0, 0.5, 1e300, std::nan("")}) {
-    numbers = snapshot.numbers();
-    numbers[1] = value;  // the count of steps
-    refused(same, Snapshot(numbers), "a whole number from 0");
+    Snapshot changed = snapshot;
+    changed.numbers()[0] = value;
+    refused(same, changed, {"for 'steps'", "a whole number from 0"});
   }
 }
 

@@ -26,13 +26,13 @@ Vector start_momentum(const Scene& scene) {
 /// End of one step of a problem.
 PhasePoint end_of(StepProblem& problem, const PhasePoint& start, const Vector& v0) {
   const auto solver = kinsol()(problem);
-  Vector x(problem.size()), impulse;
-  problem.begin({0.0, h}, start.q, start.p);
+  Vector x(problem.size());
+  problem.begin({0.0, h}, {start.q, start.p, v0}, {});
   problem.guess(v0, x);
   EXPECT_TRUE(solver->solve(x).ok());
-  PhasePoint end = start;
-  problem.finish(x, end.q, end.p, impulse);
-  return end;
+  StepEnd end;
+  problem.finish(x, end);
+  return {end.q, end.p};
 }
 
 TEST(GaussLobattoFunction, TheStepOfEveryTypeIsTheGaussLobattoStep) {

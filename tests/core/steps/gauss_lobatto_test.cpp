@@ -55,7 +55,7 @@ TEST(GaussLobattoStep, JacobianAgreesWithDifferences) {
           const auto problem = Registry::with_built_ins().method(gl(s)).step(*scene, dense);
           Vector p(3), lq(3), x(problem->size());
           scene->lagrangian->gradient(0.0, scene->start.q, scene->start.v, lq, p);
-          problem->begin({0.0, 0.2}, scene->start.q, p);
+          problem->begin({0.0, 0.2}, {scene->start.q, p, scene->start.v}, {});
           problem->guess(scene->start.v, x);
           x += 0.2 * Vector::LinSpaced(x.size(), -1.0, 1.3);
           EXPECT_LT(testing::jacobian_error(*problem, x), 2e-8) << scene->name << " s = " << s;

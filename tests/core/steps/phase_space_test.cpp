@@ -53,7 +53,7 @@ TEST(PhaseSpaceStep, JacobianAgreesWithDifferences) {
     const auto problem = Registry::with_built_ins().method(gl(s)).step(*scene, true);
     Vector x = Vector::LinSpaced(problem->size(), -0.1, 0.15), p(2), lq(2);
     scene->lagrangian->gradient(0.0, scene->start.q, scene->start.v, lq, p);
-    problem->begin({0.0, 0.2}, scene->start.q, p);
+    problem->begin({0.0, 0.2}, {scene->start.q, p, scene->start.v}, {});
     EXPECT_LT(testing::jacobian_error(*problem, x), 1e-8) << s;
   }
 }

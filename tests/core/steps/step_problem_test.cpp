@@ -25,7 +25,7 @@ TEST_P(StepJacobian, AgreesWithDifferencesForEveryConstraintClass) {
       if (problem->size() == 0) continue;
       Vector p(3), lq(3), x(problem->size());
       scene->lagrangian->gradient(0.0, scene->start.q, scene->start.v, lq, p);
-      problem->begin({0.0, 0.2}, scene->start.q, p);
+      problem->begin({0.0, 0.2}, {scene->start.q, p, scene->start.v}, {});
       problem->guess(scene->start.v, x);
       x += 0.05 * Vector::LinSpaced(x.size(), -1.0, 1.3);
       EXPECT_LT(testing::jacobian_error(*problem, x), 2e-7) << scene->name << (dense ? ", full" : ", sparse");
@@ -49,7 +49,7 @@ TEST(StepProblem, ExplicitGraphsLeaveOnlyMultipliers) {
     const auto constrained = method.step(scene, true);
     EXPECT_EQ(constrained->size(), 1) << name;
     Vector x = Vector::Constant(1, 0.1);
-    constrained->begin({0.0, 0.2}, scene.start.q, scene.start.v);
+    constrained->begin({0.0, 0.2}, {scene.start.q, scene.start.v, scene.start.v}, {});
     EXPECT_LT(testing::jacobian_error(*constrained, x), 1e-8) << name;
   }
   const Method midpoint = registry.method("type1/midpoint");

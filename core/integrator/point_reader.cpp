@@ -1,0 +1,102 @@
+#include <diracstep/core/integrator/point_reader.hpp>
+#include <diracstep/core/numerics/lu.hpp>
+#include <utility>
+
+namespace diracstep {
+
+struct PointReader::Elimination {
+  explicit Elimination(int size)
+      : matrix(Columns::Zero(size, size)), factors(size), right(Vector::Zero(size)), solution(right) {}
+  Columns matrix;
+  Eigen::PartialPivLU<Columns> factors;
+  Vector right, solution;
+};
+
+PointReader::PointReader(std::shared_ptr<const Scene> scene, SolverFactory solvers, bool full)
+    : scene_(std::move(scene)), solvers_(std::move(solvers)), full_(full) {
+  if (scene_->lagrangian->structure().phase_space()) {
+    phase_space_velocity_ = std::make_unique<PhaseSpaceVelocityProblem>(*scene_, full);
+    velocity_solver_ = solvers_(*phase_space_velocity_);
+  } else {
+    velocity_ = std::make_unique<VelocityProblem>(*scene_, full);
+    velocity_solver_ = solvers_(*velocity_);
+  }
+  unknowns_.setZero(scene_->dimension() + scene_->rows());
+  lq_.setZero(scene_->dimension());
+}
+
+PointReader::~PointReader() = default;
+
+/// A run that is not read in between does without.
+AccelerationProblem& PointReader::acceleration_problem() {
+  if (!acceleration_) acceleration_ = std::make_unique<AccelerationProblem>(*scene_, full_);
+  return *acceleration_;
+}
+
+SolveReport PointReader::velocity(double t, ConstVectorRef q, ConstVectorRef p, Vector& v) {
+  velocity_solver_->reset();
+  if (phase_space_velocity_) {
+    phase_space_velocity_->begin(t, q);
+    return velocity_solver_->solve(v);
+  }
+  const Eigen::Index n = scene_->dimension();
+  velocity_->begin(t, q, p);
+  unknowns_.head(n) = v;
+  unknowns_.tail(unknowns_.size() - n).setZero();
+  const SolveReport report = velocity_solver_->solve(unknowns_);
+  velocity_solver_->reset();  // factors of a large scene take much memory
+  if (report.ok()) v = unknowns_.head(n);
+  return report;
+}
+
+SolveReport PointReader::acceleration(double t, ConstVectorRef q, ConstVectorRef v, Vector& a,
+                                      Vector& lambda) {
+  const Eigen::Index n = scene_->dimension(), m = scene_->rows();
+  if (phase_space_velocity_) {
+    a.resize(0);
+    lambda.resize(0);
+    return {};
+  }
+  acceleration_problem().begin(t, q, v);
+  if (!acceleration_solver_) acceleration_solver_ = solvers_(*acceleration_);
+  unknowns_.setZero();
+  acceleration_solver_->reset();
+  const SolveReport report = acceleration_solver_->solve(unknowns_);
+  a = unknowns_.head(n);
+  lambda = unknowns_.tail(m);
+  return report;
+}
+
+SolveReport PointReader::acceleration_by_elimination(double t, ConstVectorRef q, ConstVectorRef v,
+                                                     VectorRef a) {
+  AccelerationProblem& problem = acceleration_problem();
+  if (!elimination_) elimination_ = std::make_unique<Elimination>(problem.size());
+  Elimination& system = *elimination_;
+  problem.begin(t, q, v);
+  system.solution.setZero();
+  problem.residual(system.solution, system.right);
+  problem.jacobian(system.solution, system.matrix.reshaped());
+  system.factors.compute(system.matrix);
+  system.right = -system.right;
+  solve_into(system.factors, system.right, system.solution);
+  SolveReport report;
+  if (!system.solution.allFinite()) report.status = SolveStatus::singular_jacobian;
+  a = system.solution.head(a.size());
+  return report;
+}
+
+SolveReport PointReader::read(double t, const State& at, Momentum momentum, Sample& sample) {
+  sample.v = at.v;
+  SolveReport report = velocity(t, at.q, at.p, sample.v);
+  if (report.ok()) report = acceleration(t, at.q, sample.v, a_, sample.lambda);
+  if (!report.ok()) return report;
+  sample.time = t;
+  sample.q = at.q;
+  sample.p = at.p;
+  sample.impulse.resize(0);
+  sample.energy = scene_->energy(t, at.q, sample.v);
+  if (momentum == Momentum::projected) scene_->lagrangian->gradient(t, at.q, sample.v, lq_, sample.p);
+  return report;
+}
+
+}  // namespace diracstep

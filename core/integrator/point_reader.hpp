@@ -1,0 +1,50 @@
+#pragma once
+
+#include <diracstep/core/integrator/sample.hpp>
+#include <diracstep/core/steps/state.hpp>
+#include <diracstep/core/system/phase_space_velocity.hpp>
+#include <diracstep/core/system/saddle_point.hpp>
+#include <diracstep/core/system/scene.hpp>
+#include <memory>
+
+namespace diracstep {
+
+/// Velocities, accelerations and forces of the rows at points of a motion.  Owns the two systems that they
+/// solve, and their solvers: what is read leaves no trace, neither in the steps nor in later readings.
+class PointReader {
+ public:
+  /// Full matrices, or sparse ones.
+  PointReader(std::shared_ptr<const Scene> scene, SolverFactory solvers, bool full);
+  ~PointReader();
+
+  /// v ∈ Δ_Q(q) of the class of p, from a guess in v.  For a phase-space Lagrangian, whose p is a function of
+  /// q, the one velocity at q.
+  SolveReport velocity(double t, ConstVectorRef q, ConstVectorRef p, Vector& v);
+
+  /// a = dv/dt and the forces Λ of the rows at (q, v).  For a phase-space Lagrangian, which has neither, both
+  /// are left empty.
+  SolveReport acceleration(double t, ConstVectorRef q, ConstVectorRef v, Vector& a, Vector& lambda);
+
+  /// a alone, by one elimination without the solver: quicker for few unknowns, and with another round-off.
+  /// For readers with full matrices only, and not for phase-space Lagrangians.
+  SolveReport acceleration_by_elimination(double t, ConstVectorRef q, ConstVectorRef v, VectorRef a);
+
+  /// All of a sample but its impulse: p is the one given, or the one projected.
+  SolveReport read(double t, const State& at, Momentum momentum, Sample& sample);
+
+ private:
+  struct Elimination;
+  AccelerationProblem& acceleration_problem();
+
+  std::shared_ptr<const Scene> scene_;
+  SolverFactory solvers_;
+  bool full_;
+  std::unique_ptr<VelocityProblem> velocity_;  ///< one of the two
+  std::unique_ptr<PhaseSpaceVelocityProblem> phase_space_velocity_;
+  std::unique_ptr<AccelerationProblem> acceleration_;  ///< made when it is needed first
+  std::unique_ptr<NonlinearSolver> velocity_solver_, acceleration_solver_;
+  std::unique_ptr<Elimination> elimination_;
+  Vector unknowns_, a_, lq_;
+};
+
+}  // namespace diracstep

@@ -1,0 +1,62 @@
+#include <diracstep/core/integrator/prepared_scene.hpp>
+#include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/system/consistent_start.hpp>
+#include <diracstep/core/system/hidden_rows.hpp>
+#include <diracstep/core/system/redundant_rows.hpp>
+#include <sstream>
+#include <utility>
+
+namespace diracstep {
+
+namespace {
+
+std::string joined(const std::vector<std::string>& names) {
+  std::string list;
+  for (const std::string& name : names) list += (list.empty() ? "'" : ", '") + name + "'";
+  return list;
+}
+
+}  // namespace
+
+PreparedScene prepared(std::shared_ptr<const Scene> given, const IntegratorOptions& options,
+                       const SolverFactory& solvers) {
+  PreparedScene result{completed(std::move(given)), {}};
+  auto& scene = result.scene;
+  require_size("scene '" + scene->name + "': the start q", scene->start.q.size(), scene->storage_size());
+  if (scene->rows() > 0 && scene->start.q.allFinite()) {
+    const std::vector<std::string> dependent = redundant_rows(*scene, scene->start);
+    if (!dependent.empty() && singular_at_start_only(*scene, scene->start))
+      throw Misuse("scene '" + scene->name + "': rows that depend on others at the start, but not near it: " +
+                   joined(dependent) + "; the start is singular: move it");
+    if (!dependent.empty() && !options.drop_redundant_rows)
+      throw Misuse("scene '" + scene->name +
+                   "': rows that depend on others at the start: " + joined(dependent) +
+                   "; remove them, or drop them: --drop-redundant, redundant = \"drop\" in a scene file, or "
+                   "IntegratorOptions::drop_redundant_rows");
+    if (!dependent.empty()) {
+      scene = without_rows(*scene, dependent);
+      result.lines.push_back({"dropped rows", joined(dependent), "they depend on others at the start"});
+    }
+  }
+  const int own_rows = scene->rows();
+  scene = with_hidden_rows(scene);
+  if (scene->rows() > own_rows) {
+    std::vector<std::string> names = scene->row_names();
+    names.erase(names.begin(), names.begin() + own_rows);
+    result.lines.push_back(
+        {"hidden rows", joined(names), "motions without momentum; these rows determine them"});
+  }
+  if (options.project_start) {
+    const ConsistentStart moved = project_start(*scene, scene->start, solvers);
+    auto copy = std::make_shared<Scene>(*scene);
+    copy->start = moved.start;
+    scene = copy;
+    std::ostringstream text;
+    text << "q moved by " << moved.position_moved << ", v by " << moved.velocity_moved;
+    result.lines.push_back({"start", "projected", text.str()});
+  }
+  require_consistent(*scene, scene->start);
+  return result;
+}
+
+}  // namespace diracstep

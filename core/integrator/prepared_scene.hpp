@@ -1,0 +1,23 @@
+#pragma once
+
+#include <diracstep/core/integrator/integrator_options.hpp>
+#include <diracstep/core/numerics/nonlinear_solver.hpp>
+#include <diracstep/core/system/scene.hpp>
+#include <memory>
+#include <vector>
+
+namespace diracstep {
+
+/// A scene as it is stepped, and what was done to it.
+struct PreparedScene {
+  std::shared_ptr<const Scene> scene;
+  std::vector<PlanLine> lines;
+};
+
+/// Completes the scene, adds the rows that a degenerate Lagrangian hides, and, where the options ask for it,
+/// drops redundant rows and moves the start onto the constraints.  Throws Misuse for a bad scene, and for
+/// redundant rows or an inconsistent start unless the options say otherwise.
+PreparedScene prepared(std::shared_ptr<const Scene> given, const IntegratorOptions& options,
+                       const SolverFactory& solvers);
+
+}  // namespace diracstep

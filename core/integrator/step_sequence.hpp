@@ -1,0 +1,84 @@
+#pragma once
+
+#include <diracstep/core/integrator/step_solver.hpp>
+#include <functional>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace diracstep {
+
+/// What a step is made of.
+struct StepDesign {
+  /// Fractions of the step, one after the other, and the part that takes each.
+  std::vector<std::pair<double, std::size_t>> stages;
+  /// The step of the method, and that of its adjoint where a composition takes both.
+  std::vector<std::function<std::unique_ptr<StepProblem>()>> parts;
+};
+
+/// A step as its method or a composition of it takes it, whole or in equal pieces.
+///
+/// All that a step depends on beside the point where it starts: solutions to guess from, and what the parts
+/// keep.  A solve leaves no trace until accept_step().
+class StepSequence {
+ public:
+  /// Where steps go on from when there is no history.
+  enum class Origin {
+    start,  ///< a start: the first solution is compared with that of half the step
+    motion  ///< a point of a motion under way, whose velocity is near that of the next step
+  };
+
+  /// The reader outlives the sequence.
+  StepSequence(std::shared_ptr<const Scene> scene, StepDesign design, SolverFactory solvers,
+               PointReader& reader);
+
+  struct Outcome {
+    SolveReport solve;
+    std::string failure;  ///< empty, or what went wrong, with the residual of each block
+    bool ok() const { return solve.ok(); }
+  };
+  /// A step from `start`, in so many pieces; afterwards end() is where it ends.
+  Outcome solve(Interval step, const State& start, Guess guess, int pieces, Work& work);
+  State& end() { return end_; }
+
+  /// The step last solved is one of the motion: the next ones are guessed from it and judged by it.
+  void accept_step(int pieces);
+  /// Takes the step accepted last out of the history, where it was a whole one; its solution stands in the
+  /// unknowns.
+  void withdraw_step();
+  void clear_history(Origin origin);
+
+  /// The impulse λ that enters at the start of the next step, by solving its first stage on a copy.
+  SolveReport impulse_ahead(Interval step, const State& start, Vector& impulse);
+
+  std::size_t stages() const { return stages_.size(); }
+  const StepSolver& part() const { return parts_.front(); }
+
+  void save(Snapshot& to) const;
+  void restore(SnapshotReader& from);
+
+ private:
+  struct Stage {
+    double fraction;
+    std::size_t part;
+    Predictor predictor;
+    Vector x;  ///< the unknowns in the current step
+  };
+
+  StepSolver make_part(std::size_t number) const;
+  StepSolver::Task task(Stage& stage, Interval step, const State& start, Guess guess);
+  Outcome failed(const SolveReport& report, Stage& stage, double step_size);
+
+  std::shared_ptr<const Scene> scene_;
+  StepDesign design_;
+  SolverFactory solvers_;
+  PointReader* reader_;
+  std::vector<StepSolver> parts_;
+  std::vector<Stage> stages_;
+  std::optional<StepSolver> ahead_;  ///< the copy for impulse_ahead(), made when it is needed first
+  Origin origin_ = Origin::start;
+  State end_;
+};
+
+}  // namespace diracstep

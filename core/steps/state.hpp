@@ -1,0 +1,40 @@
+#pragma once
+
+#include <diracstep/core/numerics/types.hpp>
+
+namespace diracstep {
+
+/// What rounding has dropped from q and p at a point; empty where sums are not compensated.
+struct Remainder {
+  ExtendedVector q, p;
+};
+
+/// A point of a motion, all that the step which starts there depends on but its interval and StepMemory.
+///
+/// q is stored in Scene::storage_size() numbers; p, v and all else of a step have as many as the tangent
+/// space has dimensions, Scene::dimension().  In R^n both are n.
+struct State {
+  Vector q;  ///< configuration
+  Vector p;  ///< a momentum of the class [p] ∈ T*Q/Δ°_Q
+  Vector v;  ///< an estimate of the velocity; a guess only
+  Remainder rest = {};
+};
+
+/// What a step leaves to the next one beside the point: the sizes that round-off in its equations is judged
+/// by.  Unknown before the first step.
+struct StepMemory {
+  bool known = false;
+  Vector scales;       ///< sizes of terms, which ones is for the step to say
+  Vector multipliers;  ///< the unknown multipliers of the step
+};
+
+/// Where a step ends.  A value: nothing of it counts before it is accepted.
+struct StepEnd {
+  Vector q, p;
+  Vector v;        ///< mean velocity of the step, (q1 − q0)/h in R^n
+  Vector impulse;  ///< λ (momentum over the unit of a row) that entered at q0 as A(q0)ᵀλ
+  Remainder rest;
+  StepMemory memory;
+};
+
+}  // namespace diracstep

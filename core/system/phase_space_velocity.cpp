@@ -1,0 +1,39 @@
+#include <diracstep/core/numerics/scales.hpp>
+#include <diracstep/core/system/phase_space_velocity.hpp>
+
+namespace diracstep {
+
+PhaseSpaceVelocityProblem::PhaseSpaceVelocityProblem(const Scene& scene, bool dense)
+    : lagrangian_(scene.lagrangian),
+      mirror_(lagrangian_->pattern().transposed_positions()),
+      layout_(lagrangian_->dimension(), lagrangian_->dimension()),
+      blocks_{{"two-form", lagrangian_->dimension()}} {
+  layout_.add(lagrangian_->pattern(), 0, 0);
+  pattern_ = layout_.assemble(dense);
+  for (Vector* column : {&q_, &lq_, &lv_}) column->setZero(lagrangian_->dimension());
+  for (Vector* values : {&lqq_, &lqv_, &lvv_}) values->setZero(lagrangian_->pattern().nonzeros());
+}
+
+void PhaseSpaceVelocityProblem::begin(double t, ConstVectorRef q) {
+  t_ = t;
+  q_ = q;
+  const Vector zero = Vector::Zero(q.size());
+  lagrangian_->hessian(t, q, zero, lqq_, lqv_, lvv_);
+  lagrangian_->gradient(t, q, zero, lq_, lv_);
+  blocks_[0].scale = usable_scale(max_norm(lq_));
+}
+
+void PhaseSpaceVelocityProblem::residual(ConstVectorRef v, VectorRef f) {
+  lagrangian_->gradient(t_, q_, v, lq_, lv_);
+  f = lq_;
+  lagrangian_->pattern().transposed_multiply_add(lqv_.data(), v.data(), f.data(), -1.0);
+}
+
+void PhaseSpaceVelocityProblem::jacobian(ConstVectorRef, VectorRef values) {
+  values.setZero();
+  const auto& places = layout_.positions(0);
+  for (std::size_t e = 0; e < places.size(); ++e)
+    values[places[e]] = lqv_[static_cast<Eigen::Index>(e)] - lqv_[mirror_[e]];
+}
+
+}  // namespace diracstep

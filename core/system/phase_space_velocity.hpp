@@ -1,0 +1,34 @@
+#pragma once
+
+#include <diracstep/core/numerics/nonlinear_solver.hpp>
+#include <diracstep/core/system/scene.hpp>
+#include <memory>
+#include <vector>
+
+namespace diracstep {
+
+/// Unknown v, linear:   ∂L/∂q(q,v) = Dθ(q) v,  that is (Dθᵀ − Dθ) v = ∂H/∂q: the velocity of a phase-space
+/// Lagrangian. Regular where the two-form dθ is.
+class PhaseSpaceVelocityProblem final : public NonlinearProblem {
+ public:
+  PhaseSpaceVelocityProblem(const Scene& scene, bool dense);
+
+  int size() const override { return lagrangian_->dimension(); }
+  const SparsityPattern& pattern() const override { return pattern_; }
+  std::span<const ResidualBlock> blocks() const override { return blocks_; }
+
+  void begin(double t, ConstVectorRef q);
+  void residual(ConstVectorRef v, VectorRef f) override;
+  void jacobian(ConstVectorRef v, VectorRef values) override;
+
+ private:
+  std::shared_ptr<const Lagrangian> lagrangian_;
+  std::vector<int> mirror_;
+  SparsityPattern pattern_;
+  BlockPattern layout_;
+  std::vector<ResidualBlock> blocks_;
+  double t_ = 0.0;
+  Vector q_, lq_, lv_, lqq_, lqv_, lvv_;
+};
+
+}  // namespace diracstep

@@ -1,0 +1,18 @@
+#pragma once
+
+#include <diracstep/core/system/scene.hpp>
+#include <memory>
+#include <string>
+
+namespace diracstep {
+
+/// The rows Wᵀ(∂L/∂q + f) = 0 for the columns of W in `directions`, each divided by the size of its
+/// coefficients at the start, which is in `units`: rows on positions where `holonomic`, else on velocities,
+/// in which f is affine (hidden_rows.hpp).
+std::shared_ptr<const ConstraintRows> rows_along_motions(const Scene& scene, bool holonomic,
+                                                         const Columns& directions, const Vector& units);
+
+/// "qC1-qC3": a motion in words.
+std::string motion_along(const Scene& scene, const Vector& w);
+
+}  // namespace diracstep
