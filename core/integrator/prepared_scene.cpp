@@ -16,6 +16,17 @@ std::string joined(const std::vector<std::string>& names) {
   return list;
 }
 
+void require_start(const Scene& scene) {
+  try {
+    require_consistent(scene, scene.start);
+  } catch (const InconsistentStart& off) {
+    throw InconsistentStart(
+        std::string(off.what()) +
+        "; to move it there name what may move, guess = [\"…\"] in [start] of a scene file, or "
+        "set IntegratorOptions::project_start");
+  }
+}
+
 }  // namespace
 
 PreparedScene prepared(std::shared_ptr<const Scene> given, const IntegratorOptions& options,
@@ -55,7 +66,7 @@ PreparedScene prepared(std::shared_ptr<const Scene> given, const IntegratorOptio
     text << "q moved by " << moved.position_moved << ", v by " << moved.velocity_moved;
     result.lines.push_back({"start", "projected", text.str()});
   }
-  require_consistent(*scene, scene->start);
+  require_start(*scene);
   return result;
 }
 

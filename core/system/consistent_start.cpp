@@ -103,8 +103,8 @@ std::vector<int> held(const std::vector<bool>& guesses) {
 void require_met(const Scene& scene, const Start& start, const char* guessed) {
   try {
     require_consistent(scene, start);
-  } catch (const Misuse& misuse) {
-    throw Misuse(std::string(misuse.what()) + "; the guesses of " + guessed +
+  } catch (const InconsistentStart& start_off) {
+    throw Misuse(std::string(start_off.what()) + "; the guesses of " + guessed +
                  " cannot meet it while what is given stays");
   }
 }

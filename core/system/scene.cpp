@@ -25,9 +25,8 @@ void require_finite(const Scene& scene, const char* what, const Vector& column) 
                                 double terms) {
   std::ostringstream message;
   message << "scene '" << scene.name << "': the start violates " << row_label(scene.constraints, row) << ": "
-          << what << " = " << residual << ", allowed " << start_tolerance * terms
-          << "; guess = [\"…\"] in the [start] of a scene file, or project_start(), moves it there";
-  throw Misuse(message.str());
+          << what << " = " << residual << ", allowed " << start_tolerance * terms;
+  throw InconsistentStart(message.str());
 }
 
 }  // namespace

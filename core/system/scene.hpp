@@ -1,5 +1,6 @@
 #pragma once
 
+#include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/system/constraint_rows.hpp>
 #include <diracstep/core/system/force.hpp>
 #include <diracstep/core/system/kinks.hpp>
@@ -58,9 +59,14 @@ std::shared_ptr<const Scene> completed(std::shared_ptr<const Scene> scene);
 /// The scene's Hamiltonian, or the one derived from its Lagrangian.  Throws Misuse where that is degenerate.
 std::shared_ptr<const Hamiltonian> hamiltonian_of(const Scene& scene);
 
-/// Throws Misuse where the start is of the wrong size, is not finite, violates φ(q) = 0, or has a velocity
-/// off the distribution; names the coordinate or the row, and the amount.  A row counts as violated when its
-/// residual exceeds 1e-10 of the terms that cancel in it.
+/// A start that violates a row.
+class InconsistentStart : public Misuse {
+  using Misuse::Misuse;
+};
+
+/// Throws Misuse where the start is of the wrong size or not finite, InconsistentStart where it violates φ(q)
+/// = 0 or has a velocity off the distribution; names the coordinate or the row, and the amount.  A row counts
+/// as violated when its residual exceeds 1e-10 of the terms that cancel in it.
 void require_consistent(const Scene& scene, const Start& start);
 
 }  // namespace diracstep

@@ -271,9 +271,9 @@ step = 0.1
   q << 1e200, 1e200;
   entry.scene->force->derivatives(0.0, q, v, fq, fv);
   const auto full = entry.scene->force->pattern().full(fq);
-  EXPECT_NEAR(full(0, 0), 2e-200, 1e-214);   // 1/x each
-  EXPECT_NEAR(full(1, 1), 5e-201, 1e-215);   // x/(x² + y²)
-  EXPECT_NEAR(full(1, 0), -5e-201, 1e-215);  // −y/(x² + y²)
+  EXPECT_NEAR(full(0, 0), 2e-200, 2e-214);   // 1/x each
+  EXPECT_NEAR(full(1, 1), 5e-201, 1e-214);   // x/(x² + y²)
+  EXPECT_NEAR(full(1, 0), -5e-201, 1e-214);  // −y/(x² + y²)
 }
 
 /// Forty definitions, each with the one before twice: 2^40 addends, were they written out.

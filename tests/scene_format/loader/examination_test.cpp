@@ -58,7 +58,7 @@ step = 0.01
 TEST(Examination, StartsOnAKinkAreDifferencedFromOneSide) {
   EXPECT_EQ(failures(examined(R"toml(
 name = "on_the_kink"
-lagrangian = "v_x^2/2 + v_y^2/2 - abs(x) - max(0, -y)^1.5 - 0.01*abs(x - y)"
+lagrangian = "v_x^2/2 + v_y^2/2 - abs(x) - max(0, -y)^2.5 - 0.01*abs(x - y)"
 [coordinates]
 x = {}
 y = {}

@@ -32,7 +32,7 @@ TEST(Kinks, SwitchingFunctionsChangeSignWhereDerivativesJump) {
   EXPECT_EQ(g[0], 0.25);
   EXPECT_EQ(g[1], 0.5);
   EXPECT_NEAR(g[2], 1.25e9, 1.0);
-  EXPECT_EQ(kinks->names()[0], "abs in line 12");
+  EXPECT_EQ(kinks->names()[0], "abs in line 11");
   EXPECT_TRUE(kinks->instants(0.0, 10.0).empty()) << "where these lie depends on the motion";
 }
 
@@ -86,10 +86,11 @@ step = 0.1
   ASSERT_EQ(kinks->count(), 6) << "one for each element, and one that they share";
   Vector y = Vector::LinSpaced(5, -1.0, 1.0), g(6);
   kinks->evaluate(0.25, y, y, g);
-  EXPECT_EQ((g.array() == -0.75).count(), 1);
-  EXPECT_EQ((g.array() > 0.0).count(), 2);
-  ASSERT_EQ(kinks->instants(0.0, 2.0).size(),
-            1u + 1u);  // t = 0, of no consequence, is that of the power below
+  EXPECT_EQ((g.array() == 0.75).count(), 1);
+  EXPECT_EQ((g.array() > 0.0).count(), 3);
+  const auto instants = kinks->instants(0.0, 2.0);
+  ASSERT_EQ(instants.size(), 1u);
+  EXPECT_NEAR(instants[0].time, 1.0, 1e-14);
 }
 
 }  // namespace
