@@ -38,8 +38,8 @@ void examine(const std::string& name, Tally& tally) {
   const Registry registry = Registry::with_built_ins();
   const CatalogueScene scene = make_scene(name);
   const ReferenceEnd reference = reference_of(scene, registry);
-  std::printf("\n%s, t = %g; reference %s, known to %.0e\n", name.c_str(), scene.t_end, reference.kind.c_str(),
-              reference.self_error);
+  std::printf("\n%s, t = %g; reference %s, known to %.0e\n", name.c_str(), scene.t_end,
+              reference.kind.c_str(), reference.self_error);
   for (int k = 3; k <= 11; ++k) {
     const double error = std::pow(10.0, -k);
     if (error < reference.self_error) continue;  // nothing could be judged

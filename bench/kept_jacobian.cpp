@@ -43,7 +43,7 @@ void compare(const Case& of, const char* method) {
   const auto ns = fewest_nanoseconds({run(*fresh), run(*kept)}, steps, rounds);
   const Scene& scene = fresh->scene();
   const bool full = matrix_form(scene, as_measured).full;
-  const auto problem = Registry::with_built_ins().method(method).step(scene, full);
+  const auto problem = Registry::with_built_ins().method(method).make_step(scene, {.dense = full});
   const auto iterations = [](const Integrator& of_run) { return double(of_run.work().iterations) / steps; };
   std::printf("%-20s%-16s%9d%9d%10.0f%6.2f%10.0f%6.2f%12.2f\n", of.scene, method, problem->size(),
               problem->pattern().nonzeros(), ns[0], iterations(*fresh), ns[1], iterations(*kept),

@@ -62,7 +62,7 @@ double resident_kilobytes() {
 /// The step of `method` on its own, at the end of a run.
 struct BareStep {
   BareStep(const Integrator& at, const char* method)
-      : problem(Registry::with_built_ins().method(method).step(at.scene(), false)), x(problem->size()) {
+      : problem(Registry::with_built_ins().method(method).make_step(at.scene(), {})), x(problem->size()) {
     problem->begin({at.time(), at.options().step}, {at.position(), at.momentum(), at.velocity_estimate()},
                    {});
     problem->guess(at.velocity_estimate(), x);

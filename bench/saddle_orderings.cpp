@@ -43,8 +43,9 @@ struct Matrix {
     const CatalogueScene entry = make_scene(scene, {{"N", double(sites)}});
     Integrator integrator(entry.scene, Registry::with_built_ins(), kinsol(), {.method = method, .step = h});
     for (int k = 0; k < 5; ++k) (void)integrator.step();
-    const auto step = Registry::with_built_ins().method(method).step(integrator.scene(), false);
-    step->begin({integrator.time(), h}, integrator.position(), integrator.momentum());
+    const auto step = Registry::with_built_ins().method(method).make_step(integrator.scene(), {});
+    step->begin({integrator.time(), h},
+                {integrator.position(), integrator.momentum(), integrator.velocity_estimate()}, {});
     Vector x(step->size()), f(step->size());
     step->guess(integrator.velocity_estimate(), x);
     values.setZero(step->pattern().nonzeros());

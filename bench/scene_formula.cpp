@@ -147,7 +147,8 @@ class Blade final : public ConstraintRows {
 
 class ChainMasses final : public Lagrangian {
  public:
-  explicit ChainMasses(int n) : Lagrangian(SparsityPattern::diagonal(2 * n), {true, true, true, true}), n_(n) {}
+  explicit ChainMasses(int n)
+      : Lagrangian(SparsityPattern::diagonal(2 * n), {true, true, true, true}), n_(n) {}
   double value(double, ConstVectorRef q, ConstVectorRef v) const override {
     double sum = v.squaredNorm() / 2;
     for (int j = 0; j < n_; ++j) sum -= g_ * q[2 * j + 1];

@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 #include <diracstep/command/variable_steps.hpp>
+#include <diracstep/core/adaptive/rate_survey.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/reports/report.hpp>
 #include <utility>
@@ -17,7 +18,6 @@ constexpr std::array<std::pair<const char*, StepControl>, 3> controls{
      {"irreversible", StepControl::irreversible}}};
 
 constexpr long plan_survey_steps = 2000;
-constexpr double pays = 5.0;
 constexpr double few = 20.0;  // times the steps of the scene's own size that variable ones may take
 
 std::string short_number(double value) { return std::isnan(value) ? "" : fmt::format("{:.2e}", value); }
@@ -62,13 +62,16 @@ std::string search_table(const ErrorControlReport& search) {
                     short_number(run.difference), short_number(run.estimate),
                     std::isnan(run.observed_order) ? "" : fmt::format("{:.1f}", run.observed_order),
                     run.failure});
-  return fmt::format("{} steps with {}, order {}: {}\n{}", search.adaptive ? "variable" : "fixed",
-                     search.method, search.order, search.reason, aligned(rows));
+  std::string head = fmt::format("{} steps with {}, order {}", search.adaptive ? "variable" : "fixed",
+                                 search.method, search.order);
+  for (const std::string& reason : {search.method_reason, search.reason})
+    if (!reason.empty()) head += "; " + reason;
+  return fmt::format("{}\n{}", head, aligned(rows));
 }
 
 PlanLine rate_line(const Scene& given, const SolverFactory& solvers, double end, double step) {
   const auto scene = completed(std::make_shared<const Scene>(given));
-  if (scene->lagrangian->structure().y_hessian_zero)
+  if (!has_accelerations(*scene))
     return {"variable steps", "not offered", "L is linear in v: no accelerations to choose them by"};
   const RateSurvey survey = survey_rate(*scene, solvers, end, plan_survey_steps);
   if (!survey.failure.empty()) return {"variable steps", "not known", survey.failure};
@@ -83,7 +86,7 @@ PlanLine rate_line(const Scene& given, const SolverFactory& solvers, double end,
         "variable steps", "left out",
         fmt::format("they would take about {:.1g} steps, {:.1g} of the scene's own size lead to the end; {}",
                     wanted, span / std::abs(step), reason)};
-  if (survey.ratio() > pays) return {"variable steps", "pay: --adaptive", reason};
+  if (survey.variable_steps_pay()) return {"variable steps", "pay: --adaptive", reason};
   return {"variable steps", "left out", reason + ", they pay above 5"};
 }
 

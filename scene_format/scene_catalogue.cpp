@@ -1,8 +1,8 @@
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/system/redundant_rows.hpp>
-#include <diracstep/scene_format/loader/scene_file.hpp>
 #include <diracstep/scene_format/loader/shipped_scenes.hpp>
 #include <diracstep/scene_format/scene_catalogue.hpp>
+#include <diracstep/scene_format/scene_file.hpp>
 
 namespace diracstep {
 

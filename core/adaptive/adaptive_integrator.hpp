@@ -1,11 +1,8 @@
 #pragma once
 
 #include <diracstep/core/adaptive/rate_monitor.hpp>
-#include <diracstep/core/adaptive/rate_survey.hpp>
 #include <diracstep/core/integrator/integrator.hpp>
-#include <diracstep/core/runs/run.hpp>
 #include <optional>
-#include <span>
 #include <string>
 #include <vector>
 
@@ -110,14 +107,5 @@ class AdaptiveIntegrator {
   };
   std::vector<Sizes> last_sizes_;  ///< of each part
 };
-
-/// Steps to `end` and shows the start, every `every`-th node and the end itself, which a side step reaches.
-RunReport run(AdaptiveIntegrator& integrator, double end, Momentum momentum, long every,
-              const Observer& observer);
-
-/// Shows the motion at the given times, which must run from the start in the direction of the motion, by side
-/// steps.  Throws Misuse for times out of order.
-RunReport run_at(AdaptiveIntegrator& integrator, std::span<const double> times, Momentum momentum,
-                 const Observer& observer);
 
 }  // namespace diracstep

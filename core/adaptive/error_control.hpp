@@ -3,6 +3,7 @@
 #include <diracstep/core/adaptive/adaptive_integrator.hpp>
 #include <functional>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -11,15 +12,15 @@ namespace diracstep {
 
 /// The error asked for, and how far the search may go.
 struct ErrorControlOptions {
-  double error = 0.0;       ///< asked for at the end of the motion, see ErrorControlReport::estimate
-  std::string method = {};  ///< empty: chosen by the size of the scene and the error
-  int order = 0;            ///< composes a given method to this order
+  double error = 0.0;  ///< asked for at the end of the motion, see ErrorControlReport::estimate
+  std::string method = automatic_method;  ///< "auto": default_method() for this error
+  int order = 0;  ///< as in IntegratorOptions; without a method, the one of default_method()
   std::optional<bool> adaptive = {};          ///< empty: where a survey finds max ω > 5 min ω
   Monitor monitor = {};                       ///< for variable steps; empty: the generic one
   double first_step = 0.0;                    ///< of a fixed step, without sign; 0: from the survey
   std::optional<bool> compensated_sums = {};  ///< empty: where the library chooses the method and the error
                                               ///< is below 1e-8
-  long max_solves = 3'000'000;               ///< nonlinear systems in all
+  long max_solves = 3'000'000;                ///< nonlinear systems in all, or explicit steps
   std::function<bool()> go_on = {};           ///< asked after each run; false ends the search
 };
 
@@ -39,9 +40,10 @@ struct ErrorControlReport {
   std::string refusal;  ///< empty, or why the error asked for was not reached
   std::string warning;  ///< empty, or why the estimate deserves less trust
   std::string method;
+  std::string method_reason;  ///< of default_method(), empty where a method was given
   int order = 0;
   bool adaptive = false;
-  std::string reason;  ///< of these choices
+  std::string reason;  ///< why steps vary or do not
   double step = 0.0;   ///< of the accepted run, with its sign; eps for variable steps
   bool compensated_sums = false;
   Sample end;  ///< of the accepted run, or of the last good one; p projected
@@ -68,9 +70,5 @@ struct ErrorControlReport {
 ErrorControlReport solve_to_error(const std::shared_ptr<const Scene>& scene, const Registry& registry,
                                   const SolverFactory& solvers, double end,
                                   const ErrorControlOptions& options);
-
-/// The method that solve_to_error chooses for a scene: GL(s), with s falling as the systems grow and rising
-/// with the accuracy.
-std::string method_for(const Scene& scene, double error);
 
 }  // namespace diracstep

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <diracstep/core/adaptive/pointwise_motion.hpp>
 #include <diracstep/core/adaptive/rate_monitor.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <sstream>
@@ -24,6 +25,8 @@ Vector probing_velocity(const Vector& v) {
 
 }  // namespace
 
+bool has_accelerations(const Scene& scene) { return !scene.lagrangian->structure().y_hessian_zero; }
+
 void require_even(const Monitor& monitor, const Start& start) {
   if (!monitor.rate) return;
   const double at_start = monitor.rate(start.time, start.q, start.v);
@@ -42,30 +45,15 @@ void require_even(const Monitor& monitor, const Start& start) {
   }
 }
 
-PointwiseMotion::PointwiseMotion(const Scene& scene, const SolverFactory& solvers, int dense_limit)
-    : full_(scene.dimension() + scene.rows() <= dense_limit),
-      reader_(std::make_shared<const Scene>(scene), solvers, full_) {
-  if (scene.lagrangian->structure().y_hessian_zero)
-    throw Misuse(
-        "scene '" + scene.name +
-        "': its Lagrangian is linear in v, so there are no accelerations to choose variable steps by; use a "
-        "fixed step");
-}
-
-SolveReport PointwiseMotion::acceleration(double t, ConstVectorRef q, ConstVectorRef v, VectorRef a) {
-  ++accelerations_;
-  if (full_) return reader_.acceleration_by_elimination(t, q, v, a);
-  const SolveReport report = reader_.acceleration(t, q, v, acceleration_, forces_);
-  a = acceleration_;
-  return report;
-}
-
 RateMeter::RateMeter(const Scene& scene, const SolverFactory& solvers, Monitor monitor, MonitorScales scales)
     : monitor_(std::move(monitor)), scales_(scales), a_(Columns::Zero(scene.dimension(), 5)) {
   q_.setZero(scene.dimension());
   v_ = q_;
   motion_ = std::make_unique<PointwiseMotion>(scene, solvers);
 }
+
+RateMeter::RateMeter(RateMeter&&) noexcept = default;
+RateMeter::~RateMeter() = default;
 
 bool RateMeter::accelerations(double t, ConstVectorRef q, ConstVectorRef v, double delta, int reach) {
   last_ = motion_->acceleration(t, q, v, a_.col(2));

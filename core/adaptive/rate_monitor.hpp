@@ -1,6 +1,5 @@
 #pragma once
 
-#include <diracstep/core/integrator/point_reader.hpp>
 #include <diracstep/core/numerics/nonlinear_solver.hpp>
 #include <diracstep/core/system/scene.hpp>
 #include <functional>
@@ -16,33 +15,14 @@ struct Monitor {
   bool depends_on_velocity = true;  ///< false saves finding accelerations
 };
 
+/// Whether a scene has accelerations to choose variable steps by: not where its Lagrangian is linear in v.
+bool has_accelerations(const Scene& scene);
+
 /// Throws Misuse where the monitor is not positive and finite at the start, or not even in v there and at
 /// another velocity: names both values.
 void require_even(const Monitor& monitor, const Start& start);
 
-/// Velocities and accelerations of a scene at given points, as the monitor takes them: counted, and for few
-/// unknowns by elimination.  Allocates nothing once made.
-class PointwiseMotion {
- public:
-  /// Throws Misuse for a Lagrangian that is linear in v, which has no accelerations.
-  PointwiseMotion(const Scene& scene, const SolverFactory& solvers, int dense_limit = 40);
-
-  /// v ∈ Δ_Q(q) of the class of p, from a guess in v.
-  SolveReport velocity(double t, ConstVectorRef q, ConstVectorRef p, Vector& v) {
-    return reader_.velocity(t, q, p, v);
-  }
-
-  /// The acceleration a of the continuous system at (q, v).  Linear; dense systems are solved directly.
-  SolveReport acceleration(double t, ConstVectorRef q, ConstVectorRef v, VectorRef a);
-
-  long accelerations() const { return accelerations_; }
-
- private:
-  bool full_;
-  PointReader reader_;
-  Vector acceleration_, forces_;
-  long accelerations_ = 0;
-};
+class PointwiseMotion;
 
 /// ω and its change along the motion.
 struct Rate {
@@ -69,6 +49,8 @@ struct MonitorScales {
 class RateMeter {
  public:
   RateMeter(const Scene& scene, const SolverFactory& solvers, Monitor monitor, MonitorScales scales);
+  RateMeter(RateMeter&&) noexcept;
+  ~RateMeter();
 
   /// ω alone; `step` sets the width of the differences.
   Rate rate(double t, ConstVectorRef q, ConstVectorRef v, double step);

@@ -18,8 +18,10 @@ struct RateSurvey {
   long accelerations = 0;
   std::string failure = {};  ///< empty, or why the survey ended early
 
-  /// max ω / min ω: above 5 variable steps pay.
+  /// max ω / min ω.
   double ratio() const { return fastest / std::max(slowest, scales.lowest); }
+  /// Above a ratio of 5 they take less time than fixed ones (bench/adaptive_steps).
+  bool variable_steps_pay() const { return ratio() > 5.0; }
 };
 
 /// Surveys from the start towards `end`, at most `max_steps` steps.  Throws Misuse for an end that is the

@@ -1,6 +1,9 @@
 #include <cmath>
 #include <diracstep/core/integrator/integrator.hpp>
+#include <diracstep/core/integrator/point_reader.hpp>
+#include <diracstep/core/integrator/prepared_scene.hpp>
 #include <diracstep/core/integrator/step_design.hpp>
+#include <diracstep/core/integrator/step_sequence.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <sstream>
 #include <utility>
@@ -42,19 +45,25 @@ Integrator::Integrator(PreparedScene prepared, const Registry& registry, const S
       method_(chosen_method(*scene_, registry, options_, preparation_)),
       matrices_(matrix_form(*scene_, options_.dense_limit)),
       reader_(std::make_unique<PointReader>(scene_, solvers, matrices_.full)),
-      sequence_(scene_, design_step(scene_, registry, method_, options_, matrices_.full), solvers, *reader_) {
+      sequence_(std::make_unique<StepSequence>(
+          scene_, design_step(scene_, registry, method_, options_, matrices_.full), solvers, *reader_)) {
   reset(scene_->start);
 }
 
+Integrator::Integrator(Integrator&&) noexcept = default;
+Integrator& Integrator::operator=(Integrator&&) noexcept = default;
+Integrator::~Integrator() = default;
+
 void Integrator::reset() { reset(scene_->start); }
 
-void Integrator::reset(const Start& start) {
+void Integrator::reset(const Start& given) {
+  const Start start = completed_start(*scene_, given);
   require_consistent(*scene_, start);
   Vector lq(start.v.size()), p(start.v.size());
   scene_->lagrangian->gradient(start.time, start.q, start.v, lq, p);
   if (!p.allFinite())
     throw Misuse("scene '" + scene_->name + "': the momentum ∂L/∂v is not finite at the start");
-  go_on_from(start.time, start.q, p, start.v, StepSequence::Origin::start);
+  go_on_from(start.time, start.q, p, start.v, Origin::start);
   last_.size = options_.step;
   last_.start = state_;  // of its sizes, so that no later step allocates it
   work_ = {};
@@ -66,12 +75,12 @@ void Integrator::restart(double time, ConstVectorRef q, ConstVectorRef p, ConstV
   require_size("restart: v", v.size(), scene_->dimension());
   if (!std::isfinite(time) || !q.allFinite() || !p.allFinite() || !v.allFinite())
     throw Misuse("restart: the time, q, p or v is not finite");
-  go_on_from(time, q, p, v, StepSequence::Origin::motion);
+  go_on_from(time, q, p, v, Origin::motion);
 }
 
 /// Nothing of the steps so far shows in the next ones.
 void Integrator::go_on_from(double time, ConstVectorRef q, ConstVectorRef p, ConstVectorRef v,
-                            StepSequence::Origin origin) {
+                            Origin origin) {
   clock_ = {time, 0.0, 0};
   state_.q = q;
   state_.p = p;
@@ -81,7 +90,7 @@ void Integrator::go_on_from(double time, ConstVectorRef q, ConstVectorRef p, Con
     state_.rest.p.setZero(p.size());
   }
   last_.retry.reset();
-  sequence_.clear_history(origin);
+  sequence_->clear_history(origin);
 }
 
 StepReport Integrator::step(double h) {
@@ -93,7 +102,7 @@ StepReport Integrator::retry(double h) {
   require_step(h);
   if (!last_.retry) throw Misuse("retry: no step was taken just before");
   const Guess guess = *last_.retry;
-  if (guess == Guess::last_solution) sequence_.withdraw_step();
+  if (guess == Guess::last_solution) sequence_->withdraw_step();
   clock_ = last_.clock;
   std::swap(state_, last_.start);
   --work_.steps;
@@ -108,9 +117,9 @@ StepReport Integrator::take(double h, Guess guess) {
   int pieces = 1;
   if (const std::string fault = fault_of_own_rows(options_, *scene_, step.start, state_.q); !fault.empty())
     return failed({.status = SolveStatus::refused}, step.start, fault);
-  StepSequence::Outcome outcome = sequence_.solve(step, state_, guess, pieces, work_);
+  StepSequence::Outcome outcome = sequence_->solve(step, state_, guess, pieces, work_);
   for (int more = 2; !outcome.ok() && more <= options_.substeps; more *= 2) {
-    StepSequence::Outcome divided = sequence_.solve(step, state_, Guess::plain, more, work_);
+    StepSequence::Outcome divided = sequence_->solve(step, state_, Guess::plain, more, work_);
     if (!divided.ok()) continue;
     ++work_.retries.divided_steps;
     outcome = std::move(divided);
@@ -131,8 +140,8 @@ StepReport Integrator::failed(const SolveReport& solve, double time, const std::
 void Integrator::accept_step(double h, int pieces) {
   last_.clock = clock_;
   std::swap(last_.start, state_);
-  std::swap(state_, sequence_.end());
-  sequence_.accept_step(pieces);
+  std::swap(state_, sequence_->end());
+  sequence_->accept_step(pieces);
   last_.retry = pieces == 1 ? Guess::last_solution : Guess::plain;
   clock_.advance(h, options_.step);
   ++work_.steps;
@@ -141,7 +150,7 @@ void Integrator::accept_step(double h, int pieces) {
 SolveReport Integrator::sample(Momentum momentum, Sample& sample) {
   SolveReport report = reader_->read(time(), state_, momentum, sample);
   if (!report.ok() || momentum != Momentum::minus || scene_->rows() == 0) return report;
-  report = sequence_.impulse_ahead({time(), last_.size}, state_, sample.impulse);
+  report = sequence_->impulse_ahead({time(), last_.size}, state_, sample.impulse);
   if (!report.ok()) return report;
   ConstraintsAtPoint rows(scene_->constraints, scene_->dimension());
   rows.evaluate(time(), state_.q);

@@ -1,20 +1,23 @@
 #pragma once
 
 #include <diracstep/core/integrator/clock.hpp>
+#include <diracstep/core/integrator/guess.hpp>
 #include <diracstep/core/integrator/integrator_options.hpp>
-#include <diracstep/core/integrator/point_reader.hpp>
-#include <diracstep/core/integrator/prepared_scene.hpp>
 #include <diracstep/core/integrator/sample.hpp>
 #include <diracstep/core/integrator/step_report.hpp>
-#include <diracstep/core/integrator/step_sequence.hpp>
 #include <diracstep/core/methods/registry.hpp>
 #include <diracstep/core/numerics/snapshot.hpp>
+#include <diracstep/core/steps/state.hpp>
 #include <diracstep/core/system/scene.hpp>
 #include <memory>
 #include <optional>
 #include <vector>
 
 namespace diracstep {
+
+class PointReader;
+class StepSequence;
+struct PreparedScene;
 
 /// Steps a scene with one method.  Owns every workspace and its solvers, and shares nothing: integrators on
 /// different threads do not meet.  The scene's data are planned once, here; a step allocates nothing of its
@@ -26,6 +29,9 @@ class Integrator {
   /// plan().
   Integrator(std::shared_ptr<const Scene> scene, const Registry& registry, const SolverFactory& solvers,
              const IntegratorOptions& options);
+  Integrator(Integrator&& other) noexcept;
+  Integrator& operator=(Integrator&& other) noexcept;
+  ~Integrator();
 
   /// Goes back to the scene's start, or to another consistent one.
   void reset();
@@ -80,8 +86,7 @@ class Integrator {
   Integrator(PreparedScene prepared, const Registry& registry, const SolverFactory& solvers,
              IntegratorOptions options);
 
-  void go_on_from(double time, ConstVectorRef q, ConstVectorRef p, ConstVectorRef v,
-                  StepSequence::Origin origin);
+  void go_on_from(double time, ConstVectorRef q, ConstVectorRef p, ConstVectorRef v, Origin origin);
   StepReport take(double h, Guess guess);
   StepReport failed(const SolveReport& solve, double time, const std::string& why) const;
   void accept_step(double h, int pieces);
@@ -93,7 +98,7 @@ class Integrator {
   Method method_;
   MatrixForm matrices_;
   std::unique_ptr<PointReader> reader_;  // the sequence refers to it, also after a move
-  StepSequence sequence_;
+  std::unique_ptr<StepSequence> sequence_;
 
   Clock clock_;
   State state_;

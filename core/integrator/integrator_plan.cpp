@@ -1,14 +1,17 @@
 #include <diracstep/core/integrator/integrator.hpp>
+#include <diracstep/core/integrator/step_sequence.hpp>
 
 namespace diracstep {
 
 std::vector<PlanLine> Integrator::plan() const {
-  const StepSolver& part = sequence_.part();
+  const StepSolver& part = sequence_->part();
   const StepProblem& problem = part.problem();
   const NonlinearSolver* const solver = part.solver();
   const int m = scene_->rows();
   std::vector<PlanLine> lines = preparation_;
-  lines.push_back({"step", method_.info.name, method_.info.summary});
+  const MethodInfo& info = method_.info;
+  lines.push_back(
+      {"step", info.name, info.solved_as.empty() ? info.summary : info.summary + "; " + info.solved_as});
   lines.push_back(
       {"unknowns", problem.traits().unknowns,
        solver != nullptr ? "one nonlinear system in each solve" : "the graph is solved for its end"});
@@ -27,8 +30,8 @@ std::vector<PlanLine> Integrator::plan() const {
     lines.push_back({"projection", "left out", "every momentum is that of a velocity"});
   } else {
     const ConstraintRule rule = options_.constraint_rule.value_or(method_.info.constraint_rule);
-    lines.push_back({"multipliers", std::to_string(m) + (method_.rows_inside ? " a node" : ""),
-                     method_.rows_inside
+    lines.push_back({"multipliers", std::to_string(m) + (method_.info.rows_inside ? " a node" : ""),
+                     method_.info.rows_inside
                          ? "nonholonomic rows at the Gauss, holonomic rows at the Lobatto nodes"
                          : std::string("nonholonomic rows by the ") + rule.description() +
                                " rule, holonomic rows at the end of the step"});
@@ -36,7 +39,7 @@ std::vector<PlanLine> Integrator::plan() const {
         {"projection", "where the state is read", "p is defined up to the annihilator between steps"});
   }
   lines.push_back({"composition",
-                   sequence_.stages() == 1 ? "left out" : std::to_string(sequence_.stages()) + " stages",
+                   sequence_->stages() == 1 ? "left out" : std::to_string(sequence_->stages()) + " stages",
                    "order " + std::to_string(options_.order) + ", the method's own is " +
                        std::to_string(method_.info.order)});
   lines.push_back({"forces", scene_->force ? "two impulses a step" : "left out",

@@ -1,4 +1,5 @@
 #include <diracstep/core/integrator/integrator.hpp>
+#include <diracstep/core/integrator/step_sequence.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 
 namespace diracstep {
@@ -39,7 +40,7 @@ Snapshot Integrator::save() const {
   to.put("velocity estimate", state_.v);
   to.put_extended("position rest", state_.rest.q);
   to.put_extended("momentum rest", state_.rest.p);
-  sequence_.save(to);
+  sequence_->save(to);
   return to;
 }
 
@@ -67,7 +68,7 @@ void Integrator::read(SnapshotReader& from) {
   from.read("velocity estimate", state_.v);
   from.read_extended("position rest", state_.rest.q);
   from.read_extended("momentum rest", state_.rest.p);
-  sequence_.restore(from);
+  sequence_->restore(from);
 }
 
 }  // namespace diracstep

@@ -22,7 +22,7 @@ std::function<std::unique_ptr<StepProblem>()> part(const std::shared_ptr<const S
   const std::optional<ConstraintRule> rule = rule_of_part(options, adjoint);
   const bool force = options.force_degenerate, compensated = options.compensated_sums;
   return [=] {
-    auto problem = method.step(*scene, full, rule, force);
+    auto problem = method.make_step(*scene, {full, rule, force});
     if (compensated && !problem->compensate())
       throw Misuse("method '" + method.info.name + "' on scene '" + scene->name +
                    "' has no compensated sums; type1/midpoint and typeN/gl:S have");
@@ -54,7 +54,7 @@ Method chosen_method(const Scene& scene, const Registry& registry, IntegratorOpt
                      std::vector<PlanLine>& plan) {
   if (options.method == automatic_method) {
     const DefaultMethod choice =
-        default_method(scene, options.order, options.constraint_rule, large_from(options.dense_limit));
+        default_method(scene, {options.order, 0.0, options.constraint_rule, large_from(options.dense_limit)});
     options.method = choice.method;
     options.order = choice.order;
     plan.push_back({"method", "by default", choice.reason});

@@ -23,12 +23,6 @@ struct StepDesign {
 /// keep.  A solve leaves no trace until accept_step().
 class StepSequence {
  public:
-  /// Where steps go on from when there is no history.
-  enum class Origin {
-    start,  ///< a start: the first solution is compared with that of half the step
-    motion  ///< a point of a motion under way, whose velocity is near that of the next step
-  };
-
   /// The reader outlives the sequence.
   StepSequence(std::shared_ptr<const Scene> scene, StepDesign design, SolverFactory solvers,
                PointReader& reader);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <diracstep/core/integrator/guess.hpp>
 #include <diracstep/core/integrator/point_reader.hpp>
 #include <diracstep/core/integrator/predictor.hpp>
 #include <diracstep/core/integrator/step_continuation.hpp>
@@ -8,13 +9,6 @@
 #include <memory>
 
 namespace diracstep {
-
-/// What the solve of a step begins from.
-enum class Guess {
-  predicted,     ///< from the last solutions, or plain where they are too few
-  plain,         ///< from the velocity at the start
-  last_solution  ///< what stands in the unknowns
-};
 
 /// Solves one step: its problem, a solver, and what is done where Newton's method from the first guess fails
 /// or may have found another solution than the one that smaller steps lead to (see StepReport).

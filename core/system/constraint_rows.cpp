@@ -2,7 +2,6 @@
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/system/constraint_rows.hpp>
 #include <iterator>
-#include <stdexcept>
 
 namespace diracstep {
 
@@ -16,7 +15,7 @@ ConstraintRows::ConstraintRows(bool holonomic, SparsityPattern pattern, Sparsity
 }
 
 void ConstraintRows::position(double, ConstVectorRef, VectorRef) const {
-  throw std::logic_error("these constraint rows have no position form φ(t,q)");
+  throw Misuse("these constraint rows have no position form φ(t,q)");
 }
 
 std::string ConstraintRows::origin(int) const { return {}; }

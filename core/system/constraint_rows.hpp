@@ -36,7 +36,7 @@ class ConstraintRows {
   /// Whether A depends on neither t nor q, and b not on q; false where that is not known.
   virtual bool constant() const { return false; }
 
-  /// φ(t,q), m values.  Holonomic rows only; the default throws std::logic_error.
+  /// φ(t,q), m values.  Holonomic rows only; the default throws Misuse.
   virtual void position(double t, ConstVectorRef q, VectorRef phi) const;
 
   /// A(t,q) on pattern(), and b(t,q).

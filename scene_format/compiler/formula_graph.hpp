@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <diracstep/core/numerics/errors.hpp>
 #include <span>
 #include <string>
 #include <unordered_map>
@@ -87,7 +88,10 @@ struct NodeData {
 /// give the same graph: no result depends on addresses or hashes.
 class FormulaGraph {
  public:
-  static constexpr std::size_t size_limit = 400'000;  ///< nodes; more throws std::length_error
+  static constexpr std::size_t size_limit = 400'000;  ///< nodes; more throw TooLarge
+  class TooLarge : public Error {
+    using Error::Error;
+  };
 
   /// `as_written`: products and quotients are computed as they stand.  Else what is known early is gathered,
   /// c·(d·x) = (c·d)·x and x/c = (1/c)·x, which saves time in every call but leaves the range of numbers

@@ -6,7 +6,6 @@
 #include <diracstep/scene_format/compiler/piece_builder.hpp>
 #include <diracstep/scene_format/compiler/scene_program.hpp>
 #include <diracstep/scene_format/compiler/sum_terms.hpp>
-#include <stdexcept>
 
 namespace diracstep::scene_compiler {
 
@@ -399,7 +398,7 @@ std::unique_ptr<SceneProgram> compile_scene(const std::string& file, const std::
   auto program = std::make_unique<SceneProgram>(read_document(file, text), as_written);
   try {
     SceneCompiler(*program).compile();
-  } catch (const std::length_error&) {
+  } catch (const FormulaGraph::TooLarge&) {
     throw SceneError(
         file, {},
         fmt::format("the formulas and their derivatives have more than {} parts, the limit; write "

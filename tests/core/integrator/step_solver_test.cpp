@@ -23,8 +23,10 @@ struct Stepper {
   }
   static std::unique_ptr<StepProblem> problem(const Scene& scene, const std::string& method,
                                               bool compensated) {
-    auto problem = Registry::with_built_ins().method(method).step(scene, true);
-    if (compensated) EXPECT_TRUE(problem->compensate());
+    auto problem = Registry::with_built_ins().method(method).make_step(scene, {.dense = true});
+    if (compensated) {
+      EXPECT_TRUE(problem->compensate());
+    }
     return problem;
   }
 

@@ -3,7 +3,7 @@
 
 #include <cmath>
 #include <cstdlib>
-#include <diracstep/scene_format/loader/scene_file.hpp>
+#include <diracstep/scene_format/scene_file.hpp>
 #include <functional>
 #include <random>
 

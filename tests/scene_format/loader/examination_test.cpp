@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <diracstep/scene_format/loader/scene_file.hpp>
+#include <diracstep/scene_format/scene_file.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
 #include <diracstep/validation/laws/scene_examination.hpp>
 

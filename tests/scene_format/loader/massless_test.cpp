@@ -5,7 +5,7 @@
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/runs/run.hpp>
 #include <diracstep/core/system/hidden_rows.hpp>
-#include <diracstep/scene_format/loader/scene_file.hpp>
+#include <diracstep/scene_format/scene_file.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
 
 /// Scenes in which nothing carries momentum: circuits without inductors, motions that rows alone determine.

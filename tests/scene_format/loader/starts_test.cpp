@@ -4,7 +4,7 @@
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/runs/run.hpp>
 #include <diracstep/core/system/redundant_rows.hpp>
-#include <diracstep/scene_format/loader/scene_file.hpp>
+#include <diracstep/scene_format/scene_file.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
 
 /// What is given of a start stays, guesses are moved; rows that depend on others are left out where asked

@@ -4,8 +4,8 @@
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/numerics/lu.hpp>
 #include <diracstep/core/numerics/scales.hpp>
+#include <diracstep/core/steps/gauss_lobatto/phase_space_step.hpp>
 #include <diracstep/core/steps/gauss_lobatto/tableau.hpp>
-#include <diracstep/core/steps/phase_space_step.hpp>
 #include <diracstep/core/system/lagrangian_derivatives.hpp>
 
 namespace diracstep {
