@@ -33,6 +33,28 @@ void load(Session& session, const std::filesystem::path& file) {
   session.plugins.push_back(std::move(plugin));
 }
 
+CatalogueScene made(const Session& session, const std::string& name, const Parameters& changes) {
+  for (const Plugin& plugin : session.plugins) {
+    if (std::ranges::find(plugin.scenes(), name) == plugin.scenes().end()) continue;
+    if (!changes.empty())
+      throw Misuse(fmt::format("scene '{}' of plugin '{}' has no parameter '{}'; it has none", name,
+                               plugin.name(), changes.begin()->first));
+    const PluginScene brought = plugin.scene(name);
+    CatalogueScene scene;
+    scene.scene = brought.scene;
+    scene.kind = "plugin";
+    scene.description = brought.description;
+    scene.source = "plugin " + plugin.name();
+    scene.t_end = brought.end_time;
+    scene.natural_step = brought.step;
+    scene.recommended.step = brought.step;
+    scene.recommended.end = brought.end_time;
+    scene.code = "callbacks of the plugin";
+    return scene;
+  }
+  return ::diracstep::make_scene(name, changes);
+}
+
 }  // namespace
 
 void load_plugins(Session& session) {
@@ -57,25 +79,10 @@ std::vector<std::string> scene_names(const Session& session) {
 }
 
 CatalogueScene make_scene(const Session& session, const std::string& name, const Parameters& changes) {
-  for (const Plugin& plugin : session.plugins) {
-    if (std::ranges::find(plugin.scenes(), name) == plugin.scenes().end()) continue;
-    if (!changes.empty())
-      throw Misuse(fmt::format("scene '{}' of plugin '{}' has no parameter '{}'; it has none", name,
-                               plugin.name(), changes.begin()->first));
-    const PluginScene brought = plugin.scene(name);
-    CatalogueScene scene;
-    scene.scene = brought.scene;
-    scene.kind = "plugin";
-    scene.description = brought.description;
-    scene.source = "plugin " + plugin.name();
-    scene.t_end = brought.end_time;
-    scene.natural_step = brought.step;
-    scene.recommended.step = brought.step;
-    scene.recommended.end = brought.end_time;
-    scene.code = "callbacks of the plugin";
-    return scene;
-  }
-  return ::diracstep::make_scene(name, changes);
+  CatalogueScene entry = made(session, name, changes);
+  if (session.drop_redundant_rows) drop_redundant_rows(entry);
+  for (const std::string& change : entry.changes) say(entry.scene->name + ": " + change);
+  return entry;
 }
 
 }  // namespace diracstep::command

@@ -2,6 +2,7 @@
 
 #include <CLI/App.hpp>
 #include <cerrno>
+#include <cmath>
 #include <cstdio>
 #include <cstring>
 #include <diracstep/command/session.hpp>
@@ -47,6 +48,14 @@ void add_method_options(CLI::App& verb, MethodChoice& choice) {
                   "the method's own without it");
 }
 
+void take_recommendation(const CatalogueScene& entry, MethodChoice& choice, std::optional<double>& step) {
+  const Recommendation& advice = entry.recommended;
+  if (!advice.stated || choice.given || choice.order != 0) return;
+  choice.name = advice.method;
+  choice.order = advice.order;
+  if (!step) step = std::copysign(advice.step, entry.t_end - entry.scene->start.time);
+}
+
 IntegratorOptions integrator_options(const Session& session, const MethodChoice& choice) {
   IntegratorOptions options{.method = choice.name, .order = choice.order};
   if (choice.rule) options.constraint_rule = session.registry.rule(*choice.rule);
@@ -57,6 +66,11 @@ void add_set_option(CLI::App& verb, std::vector<std::string>& assignments) {
   verb.add_option("--set", assignments, "Set a parameter of the scene; may be repeated")
       ->type_name("NAME=VALUE")
       ->allow_extra_args(false);
+}
+
+void add_redundancy_option(CLI::App& verb, Session& session) {
+  verb.add_flag("--drop-redundant", session.drop_redundant_rows,
+                "Leave out rows that depend on others, and say which, instead of refusing the scene");
 }
 
 void say(std::string_view message) { fmt::print(stderr, "diracstep: {}\n", message); }

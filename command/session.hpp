@@ -28,6 +28,7 @@ struct Session {
   SolverFactory solvers = kinsol();
   std::vector<std::string> plugin_files;  ///< as given by --plugin
   std::vector<Plugin> plugins;            ///< those and the ones on DIRACSTEP_PLUGIN_PATH
+  bool drop_redundant_rows = false;       ///< of every scene that is made
   int exit_status = done;
 };
 
@@ -35,7 +36,8 @@ struct Session {
 /// the files of the session; throws Misuse where one of these cannot be loaded.
 void load_plugins(Session& session);
 
-/// A scene of a plugin or of the catalogue, or a file; throws Misuse as diracstep::make_scene does.
+/// A scene of a plugin or of the catalogue, or a file, with what was changed in it told to the person; throws
+/// Misuse as diracstep::make_scene does.
 CatalogueScene make_scene(const Session& session, const std::string& name, const Parameters& changes = {});
 
 /// Names of the catalogue's scenes and of those of plugins.
@@ -49,11 +51,18 @@ struct MethodChoice {
 };
 void add_method_options(CLI::App& verb, MethodChoice& choice);
 
+/// Where neither a method nor an order was asked for, those that the scene's file recommends, and where no
+/// step was asked for either, its step.
+void take_recommendation(const CatalogueScene& entry, MethodChoice& choice, std::optional<double>& step);
+
 /// The options of an integrator with this choice; the rule is looked up by name.
 IntegratorOptions integrator_options(const Session& session, const MethodChoice& choice);
 
 /// Adds --set NAME=VALUE, which may be repeated.
 void add_set_option(CLI::App& verb, std::vector<std::string>& assignments);
+
+/// Adds --drop-redundant, which is kept in the session.
+void add_redundancy_option(CLI::App& verb, Session& session);
 
 /// Adds --solver and --jacobian, which change the session's solvers when the command line is read.
 void add_solver_options(CLI::App& verb, Session& session);

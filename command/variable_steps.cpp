@@ -17,6 +17,8 @@ constexpr std::array<std::pair<const char*, StepControl>, 3> controls{
      {"in-step", StepControl::in_step},
      {"irreversible", StepControl::irreversible}}};
 
+constexpr double few = 20.0;  // times the steps of the scene's own size that variable ones may take
+
 std::string short_number(double value) { return std::isnan(value) ? "" : fmt::format("{:.2e}", value); }
 
 }  // namespace
@@ -66,7 +68,7 @@ std::string search_table(const ErrorControlReport& search) {
   return fmt::format("{}\n{}", head, aligned(rows));
 }
 
-PlanLine rate_line(const Scene& given, const SolverFactory& solvers, double end) {
+PlanLine rate_line(const Scene& given, const SolverFactory& solvers, double end, double step) {
   const auto scene = completed(std::make_shared<const Scene>(given));
   if (!has_accelerations(*scene))
     return {"variable steps", "not offered", "L is linear in v: no accelerations to choose them by"};
@@ -75,6 +77,14 @@ PlanLine rate_line(const Scene& given, const SolverFactory& solvers, double end)
   const std::string reason =
       fmt::format("max ω / min ω = {:.2g} over the first {:.3g} of {:.3g} units of time", survey.ratio(),
                   survey.covered, std::abs(end - scene->start.time));
+  // The survey takes four accelerations a step, and larger steps than a run.
+  const double span = std::abs(end - scene->start.time);
+  const double wanted = 1.5 * static_cast<double>(survey.accelerations) / 4.0 * span / survey.covered;
+  if (wanted > few * span / std::abs(step))
+    return {
+        "variable steps", "left out",
+        fmt::format("they would take about {:.1g} steps, {:.1g} of the scene's own size lead to the end; {}",
+                    wanted, span / std::abs(step), reason)};
   if (survey.variable_steps_pay()) return {"variable steps", "pay: --adaptive", reason};
   return {"variable steps", "left out", reason + ", they pay above 5"};
 }

@@ -25,8 +25,8 @@ std::string warning(const VariableSteps& steps, long taken);
 /// The search for a step and its outcome, for the user.
 std::string search_table(const ErrorControlReport& search);
 
-/// "max ω / min ω = 88 over 20 of 20 units of time": whether variable steps pay on a scene, or why that is
-/// not known.
-PlanLine rate_line(const Scene& scene, const SolverFactory& solvers, double end);
+/// "max ω / min ω = 88 over 20 of 20 units of time": whether variable steps pay on a scene whose own fixed
+/// step is `step`, or why that is not known.
+PlanLine rate_line(const Scene& scene, const SolverFactory& solvers, double end, double step);
 
 }  // namespace diracstep::command

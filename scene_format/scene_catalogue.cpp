@@ -1,4 +1,5 @@
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/system/redundant_rows.hpp>
 #include <diracstep/scene_format/loader/shipped_scenes.hpp>
 #include <diracstep/scene_format/scene_catalogue.hpp>
 #include <diracstep/scene_format/scene_file.hpp>
@@ -9,6 +10,17 @@ std::vector<std::string> scene_names() {
   std::vector<std::string> names;
   for (const ShippedScene& scene : shipped_scenes()) names.emplace_back(scene.name);
   return names;
+}
+
+void drop_redundant_rows(CatalogueScene& entry) {
+  const std::shared_ptr<const Scene> scene = completed(entry.scene);
+  if (!scene->start.q.allFinite() || scene->start.q.size() != scene->dimension()) return;  // refused by runs
+  const std::vector<std::string> dependent = redundant_rows(*scene, scene->start);
+  if (dependent.empty() || singular_at_start_only(*scene, scene->start)) return;
+  entry.scene = without_rows(*entry.scene, dependent);
+  std::string names;
+  for (const std::string& name : dependent) names += (names.empty() ? "'" : ", '") + name + "'";
+  entry.changes.push_back("rows left out, for they depend on others: " + names);
 }
 
 CatalogueScene make_scene(const std::string& name, const Parameters& changes) {

@@ -20,8 +20,9 @@ struct ReferencePoint {
 
 /// What the errors of a study are taken against.
 struct Reference {
-  std::string kind;         ///< "exact": a closed form; "published": digits from a source
-  std::string how;          ///< the closed form or the source in a line
+  std::string kind;  ///< "exact": a closed form; "published": digits from a source; "own": computed by the
+                     ///< authors of the scene
+  std::string how;   ///< the closed form or the source in a line
   double self_error = 0.0;  ///< relative error of the reference itself
   /// The true motion at time t; empty where the reference does not reach t.
   std::function<std::optional<ReferencePoint>(double t)> at;
@@ -51,11 +52,12 @@ struct Invariant {
 
 /// A method that suits the scene, and what it reaches.
 struct Recommendation {
-  std::string method = "type1/midpoint";
-  int order = 0;  ///< 0: the method's own
+  std::string method = "auto";  ///< as IntegratorOptions::method
+  int order = 0;                ///< 0: the method's own
   double step = 0.0;
   double end = 0.0;
   double tolerance = 0.0;  ///< error at `end`, relative to the largest component; 0 where none is stated
+  bool stated = false;     ///< by the file; else these are what a check takes for want of better
 };
 
 /// A symbol of the scene as its author describes it.
@@ -77,8 +79,9 @@ struct CatalogueScene {
   std::vector<KnownState> known = {};  ///< references that hold for the parameters, as the file lists them
   std::vector<Invariant> invariants = {};
   Recommendation recommended = {};
-  std::vector<SymbolNote> notes = {};  ///< coordinates, sizes and parameters
-  std::string code = {};               ///< how the formulas are computed: compiled, or interpreted and why
+  std::vector<SymbolNote> notes = {};     ///< coordinates, sizes and parameters
+  std::string code = {};                  ///< how the formulas are computed: compiled, or interpreted and why
+  std::vector<std::string> changes = {};  ///< what is not as given: a start that was moved, rows left out
 };
 
 /// Names of the scenes that come with the library, sorted.
@@ -88,5 +91,8 @@ std::vector<std::string> scene_names();
 /// Misuse for an unknown scene or parameter, listing the known ones, for a value the scene cannot have, and
 /// for a file that is wrong, with the line and column.
 CatalogueScene make_scene(const std::string& name, const Parameters& changes = {});
+
+/// Leaves out the rows that depend on others (redundant_rows.hpp) and notes which.
+void drop_redundant_rows(CatalogueScene& entry);
 
 }  // namespace diracstep

@@ -6,6 +6,7 @@
 #include <diracstep/core/system/consistent_start.hpp>
 #include <diracstep/scene_format/loader/defined_start.hpp>
 #include <diracstep/scene_format/loader/scene_functions.hpp>
+#include <diracstep/scene_format/loader/scene_kinks.hpp>
 #include <diracstep/scene_format/scene_file.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
 #include <fstream>
@@ -141,7 +142,7 @@ class References {
         valid_, [&](std::size_t i) { return point(i, stated(i).t.value_or(start())).has_value(); });
     if (complete == valid_.end()) return {};
     const SceneDocument::Reference& first = stated(*complete);
-    return {first.kind == "exact" ? "exact" : "published", first.how, std::pow(10.0, -first.digits),
+    return {first.kind, first.how, std::pow(10.0, -first.digits),
             [references = *this](double t) { return references.at(t); }};
   }
 
@@ -216,6 +217,7 @@ Scene scene_of(const LoadedScenePtr& loaded) {
   scene.constraints = file_constraints(loaded);
   scene.force = file_force(loaded);
   scene.start = start_of(*loaded);
+  scene.kinks = file_kinks(loaded);
   return scene;
 }
 
@@ -230,16 +232,39 @@ void require_defined_start(const LoadedScene& loaded, const Scene& scene) {
   require_defined(loaded, scene, scene.start.time, scene.start.q, v, p);
 }
 
-/// Moves the start onto the rows where the file asks for it.
-void project(const SceneDocument& document, Scene& scene) {
-  if (document.project && scene.start.v.size() > 0)
-    scene.start = project_start(scene, scene.start, kinsol()).start;
+/// The components that the file calls guesses; none named: all are.
+Guesses guesses_of(const LoadedScene& loaded) {
+  Guesses guesses;
+  if (loaded.program->guesses.empty()) return guesses;
+  const auto n = static_cast<std::size_t>(loaded.layout.dimension());
+  guesses = {std::vector<bool>(n, false), std::vector<bool>(n, false)};
+  for (const NamedValue& named : loaded.program->guesses)
+    for_each_value(loaded, named, 0.0, [&](int index, double) {
+      (named.role == Role::position ? guesses.q : guesses.v)[static_cast<std::size_t>(index)] = true;
+    });
+  return guesses;
+}
+
+/// Moves the start onto the rows where the file asks for it, and notes by how much.
+void project(const LoadedScene& loaded, CatalogueScene& entry) {
+  const Scene& scene = *entry.scene;
+  const Guesses guesses = guesses_of(loaded);
+  if ((!loaded.program->document.project && guesses.q.empty()) || scene.start.v.size() == 0) return;
+  auto moved = std::make_shared<Scene>(scene);
+  moved->start = project_start(scene, scene.start, kinsol(), guesses).start;
+  const std::string moves = describe_moves(scene, scene.start, moved->start);
+  if (!moves.empty()) entry.changes.push_back("start moved onto the rows: " + moves);
+  entry.scene = std::move(moved);
 }
 
 Recommendation recommendation(const SceneDocument& document) {
   const SceneDocument::Recommended& stated = document.recommended;
-  return {stated.method, stated.order, stated.step > 0.0 ? stated.step : document.step,
-          stated.end != 0.0 ? stated.end : document.study_end, stated.tolerance};
+  return {stated.method,
+          stated.order,
+          stated.step > 0.0 ? stated.step : document.step,
+          stated.end != 0.0 ? stated.end : document.study_end,
+          stated.tolerance,
+          stated.stated};
 }
 
 void describe(CatalogueScene& entry, const LoadedScene& loaded) {
@@ -253,18 +278,19 @@ void describe(CatalogueScene& entry, const LoadedScene& loaded) {
   }
 }
 
-}  // namespace
-
-CatalogueScene scene_from_text(const std::string& file, const std::string& text, const Parameters& changes) {
-  auto program = compile_scene(file, text);
+CatalogueScene load(const std::string& file, const std::string& text, const Parameters& changes,
+                    bool as_written) {
+  auto program = compile_scene(file, text, as_written);
   ParameterValues values = parameter_values(program->document, changes);
   const LoadedScenePtr loaded = std::make_shared<const LoadedScene>(std::move(program), std::move(values));
   const SceneDocument& document = loaded->program->document;
   Scene scene = scene_of(loaded);
   require_defined_start(*loaded, scene);
-  project(document, scene);
 
   CatalogueScene entry;
+  entry.scene = std::make_shared<const Scene>(std::move(scene));
+  project(*loaded, entry);
+  if (document.drop_redundant_rows) drop_redundant_rows(entry);
   entry.kind = document.kind;
   entry.description = document.description;
   entry.source = document.source;
@@ -281,8 +307,17 @@ CatalogueScene scene_from_text(const std::string& file, const std::string& text,
   for (std::size_t i = 0; i < loaded->program->invariants.size(); ++i)
     entry.invariants.push_back({loaded->program->invariants[i].name, file_invariant(loaded, i),
                                 loaded->program->invariants[i].value});
-  entry.scene = std::make_shared<const Scene>(std::move(scene));
   return entry;
+}
+
+}  // namespace
+
+CatalogueScene scene_from_text(const std::string& file, const std::string& text, const Parameters& changes) {
+  try {
+    return load(file, text, changes, false);
+  } catch (const ConstantOutOfRange&) {
+    return load(file, text, changes, true);
+  }
 }
 
 CatalogueScene scene_from_file(const std::string& path, const Parameters& changes) {

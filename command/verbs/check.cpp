@@ -187,6 +187,7 @@ void add_check(CLI::App& app, Session& session) {
   verb->add_option("--set", options->set, "Set a parameter or size of the scenes; may be repeated")
       ->type_name("NAME=VALUE")
       ->allow_extra_args(false);
+  add_redundancy_option(*verb, session);
   verb->add_flag("--json", options->json, "One JSON document on standard output");
   verb->footer(
       "Examples:\n"

@@ -45,15 +45,21 @@ std::string as_text(const Integrator& integrator, const std::vector<PlanLine>& l
 
 void plan(const Options& options, Session& session) {
   const CatalogueScene entry = make_scene(session, options.scene, parameters(options.set));
-  IntegratorOptions used = integrator_options(session, options.method);
-  used.step = entry.natural_step;
+  MethodChoice choice = options.method;
+  std::optional<double> step;
+  take_recommendation(entry, choice, step);
+  IntegratorOptions used = integrator_options(session, choice);
+  used.step = step.value_or(entry.natural_step);
   const Integrator integrator(entry.scene, session.registry, session.solvers, used);
   std::vector<PlanLine> lines = integrator.plan();
   if (options.adaptive)
     lines = AdaptiveIntegrator(entry.scene, session.registry, session.solvers, used,
                                {.eps = options.eps, .end = entry.t_end})
                 .plan();
-  lines.push_back(rate_line(*entry.scene, session.solvers, entry.t_end));
+  for (const std::string& change : entry.changes) lines.push_back({"scene", "changed", change});
+  if (choice.name != options.method.name)
+    lines.push_back({"method", choice.name, "the scene's file recommends it"});
+  lines.push_back(rate_line(*entry.scene, session.solvers, entry.t_end, entry.natural_step));
   print(options.json ? as_json(integrator, lines) : as_text(integrator, lines));
 }
 
@@ -67,6 +73,7 @@ void add_plan(CLI::App& app, Session& session) {
   add_method_options(*verb, options->method);
   verb->add_flag("--adaptive", options->adaptive, "The plan of reversible steps of varying size");
   verb->add_option("--eps", options->eps, "Radians of a step of varying size")->capture_default_str();
+  add_redundancy_option(*verb, session);
   add_set_option(*verb, options->set);
   verb->add_flag("--json", options->json, "One JSON document on standard output");
   verb->footer("Example:  diracstep plan knife_edge --method type1/midpoint --order 4");

@@ -20,7 +20,7 @@ std::string as_json(const std::vector<PublishedCase>& cases) {
                              {"step", one.run.step},
                              {"end", one.run.end},
                              {"component", one.component},
-                             {"published", one.published},
+                             {"reference", one.published},
                              {"computed", one.computed},
                              {"error", one.error},
                              {"allowed", one.allowed},
@@ -33,7 +33,7 @@ std::string as_json(const std::vector<PublishedCase>& cases) {
 
 std::string as_text(const std::vector<PublishedCase>& cases) {
   std::vector<std::vector<std::string>> rows{
-      {"scene", "method", "order", "step", "end", "published", "error", "allowed", "result", "source"}};
+      {"scene", "method", "order", "step", "end", "reference", "error", "allowed", "result", "source"}};
   for (const PublishedCase& one : cases)
     rows.push_back(
         {one.scene, one.run.method, fmt::format("{}", one.run.order), fmt::format("{:.4g}", one.run.step),

@@ -209,6 +209,11 @@ void run(const Options& given, Session& session) {
   result.momentum = momentum(options.momentum);
   const double end =
       options.at.empty() ? options.end.value_or(entry.t_end) : numbers("--at", options.at).back();
+  if (!options.error && !options.adaptive) {
+    take_recommendation(entry, options.method, options.step);
+    if (!given.step && options.step)
+      options.step = std::copysign(*options.step, end - entry.scene->start.time);
+  }
   IntegratorOptions used = integrator_options(session, options.method);
   used.step = options.step.value_or(std::copysign(entry.natural_step, end - entry.scene->start.time));
   used.substeps = options.substeps;
@@ -269,6 +274,7 @@ void add_run(CLI::App& app, Session& session) {
           "Relative error at the end; the library chooses method and step,\nand repeats the run until its "
           "estimate is below")
       ->type_name("E");
+  add_redundancy_option(*verb, session);
   add_set_option(*verb, options->set);
   verb->add_flag("--json", options->json, "One JSON document on standard output");
   verb->footer(

@@ -164,9 +164,9 @@ PageFacts facts_of(const StudyOptions& study) {
   if (!study.baselines.empty())
     facts.emplace_back("tolerances of the baselines", fmt::format("{:g}", fmt::join(study.rtols, ", ")));
   if (std::ranges::find(study.baselines, ida_method) != study.baselines.end()) {
-    facts.emplace_back("formulation of IDA", study.ida_formulation
-                                            ? name(*study.ida_formulation)
-                                            : "on each scene those that are fastest to 1e-3, 1e-6 or 1e-9");
+    facts.emplace_back("formulation of IDA",
+                       study.ida_formulation ? name(*study.ida_formulation)
+                                             : "on each scene those that are fastest to 1e-3, 1e-6 or 1e-9");
     facts.emplace_back("formulations", formulations);
   }
   facts.emplace_back("CPU time", fmt::format("of the thread, output excluded, median of {}", study.repeats));
@@ -316,6 +316,7 @@ void add_study(CLI::App& app, Session& session) {
       ->type_name("OLD.json");
   verb->add_option("--table", options->table, "Markdown file: CPU time of each method at the compared errors")
       ->type_name("FILE");
+  add_redundancy_option(*verb, session);
   add_set_option(*verb, options->set);
   verb->add_flag("--json", options->json, "One JSON document on standard output");
   verb->footer(

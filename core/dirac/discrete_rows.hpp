@@ -46,7 +46,8 @@ struct ConstraintRule {
 };
 
 /// Throws Misuse unless the rows discretise the nonholonomic ones among `constraints` at (t, q), saying which
-/// requirement fails and by how much:
+/// requirement fails and by how much.  An integrator asks at the start of each step, wherever the motion
+/// goes:
 ///
 ///   (q,q) ∈ Δ^d_Q                   c = 0 on the diagonal for h = 0          Leok and Ohsawa (4.17)
 ///   ∂c/∂q1 at (q,q) spans Δ°_Q(q)   so that Δ^d_Q induces Δ_Q back           (4.18), (4.19)

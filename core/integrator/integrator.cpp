@@ -12,6 +12,18 @@ namespace diracstep {
 
 namespace {
 
+/// What a discrete constraint of one's own misses at the start of a step; empty where nothing.
+std::string fault_of_own_rows(const IntegratorOptions& options, const Scene& scene, double t,
+                              const Vector& q) {
+  if (!options.constraint_rule || !options.constraint_rule->own) return {};
+  try {
+    require_discretisation(*options.constraint_rule->own, scene.constraints, t, q);
+  } catch (const Misuse& misuse) {
+    return misuse.what();
+  }
+  return {};
+}
+
 IntegratorOptions checked(IntegratorOptions options) {
   require_step(options.step);
   if (options.substeps < 1)
@@ -103,6 +115,8 @@ StepReport Integrator::take(double h, Guess guess) {
   last_.size = h;
   const Interval step{time(), h};
   int pieces = 1;
+  if (const std::string fault = fault_of_own_rows(options_, *scene_, step.start, state_.q); !fault.empty())
+    return failed({.status = SolveStatus::refused}, step.start, fault);
   StepSequence::Outcome outcome = sequence_->solve(step, state_, guess, pieces, work_);
   for (int more = 2; !outcome.ok() && more <= options_.substeps; more *= 2) {
     StepSequence::Outcome divided = sequence_->solve(step, state_, Guess::plain, more, work_);
@@ -111,15 +125,16 @@ StepReport Integrator::take(double h, Guess guess) {
     outcome = std::move(divided);
     pieces = more;
   }
-  StepReport report{outcome.solve, work_.steps, step.start, {}};
-  if (outcome.ok()) {
-    accept_step(h, pieces);
-    return report;
-  }
-  std::ostringstream message;
-  message << "step " << report.step << " from t = " << report.time << ": " << outcome.failure;
-  report.failure = message.str();
+  if (!outcome.ok()) return failed(outcome.solve, step.start, outcome.failure);
+  const StepReport report{outcome.solve, work_.steps, step.start, {}};
+  accept_step(h, pieces);
   return report;
+}
+
+StepReport Integrator::failed(const SolveReport& solve, double time, const std::string& why) const {
+  std::ostringstream message;
+  message << "step " << work_.steps << " from t = " << time << ": " << why;
+  return {solve, work_.steps, time, message.str()};
 }
 
 void Integrator::accept_step(double h, int pieces) {

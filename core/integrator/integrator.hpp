@@ -88,6 +88,7 @@ class Integrator {
 
   void go_on_from(double time, ConstVectorRef q, ConstVectorRef p, ConstVectorRef v, Origin origin);
   StepReport take(double h, Guess guess);
+  StepReport failed(const SolveReport& solve, double time, const std::string& why) const;
   void accept_step(double h, int pieces);
   void read(SnapshotReader& from);
 

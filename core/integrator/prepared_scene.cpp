@@ -2,6 +2,7 @@
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/system/consistent_start.hpp>
 #include <diracstep/core/system/hidden_rows.hpp>
+#include <diracstep/core/system/redundant_rows.hpp>
 #include <sstream>
 #include <utility>
 
@@ -15,6 +16,17 @@ std::string joined(const std::vector<std::string>& names) {
   return list;
 }
 
+void require_start(const Scene& scene) {
+  try {
+    require_consistent(scene, scene.start);
+  } catch (const InconsistentStart& off) {
+    throw InconsistentStart(
+        std::string(off.what()) +
+        "; to move it there name what may move, guess = [\"…\"] in [start] of a scene file, or "
+        "set IntegratorOptions::project_start");
+  }
+}
+
 }  // namespace
 
 PreparedScene prepared(std::shared_ptr<const Scene> given, const IntegratorOptions& options,
@@ -24,9 +36,14 @@ PreparedScene prepared(std::shared_ptr<const Scene> given, const IntegratorOptio
   require_size("scene '" + scene->name + "': the start q", scene->start.q.size(), scene->storage_size());
   if (scene->rows() > 0 && scene->start.q.allFinite()) {
     const std::vector<std::string> dependent = redundant_rows(*scene, scene->start);
+    if (!dependent.empty() && singular_at_start_only(*scene, scene->start))
+      throw Misuse("scene '" + scene->name + "': rows that depend on others at the start, but not near it: " +
+                   joined(dependent) + "; the start is singular: move it");
     if (!dependent.empty() && !options.drop_redundant_rows)
-      throw Misuse("scene '" + scene->name + "': rows that depend on others at the start: " +
-                   joined(dependent) + "; remove them, or ask for dependent rows to be dropped");
+      throw Misuse("scene '" + scene->name +
+                   "': rows that depend on others at the start: " + joined(dependent) +
+                   "; remove them, or drop them: --drop-redundant, redundant = \"drop\" in a scene file, or "
+                   "IntegratorOptions::drop_redundant_rows");
     if (!dependent.empty()) {
       scene = without_rows(*scene, dependent);
       result.lines.push_back({"dropped rows", joined(dependent), "they depend on others at the start"});
@@ -49,7 +66,7 @@ PreparedScene prepared(std::shared_ptr<const Scene> given, const IntegratorOptio
     text << "q moved by " << moved.position_moved << ", v by " << moved.velocity_moved;
     result.lines.push_back({"start", "projected", text.str()});
   }
-  require_consistent(*scene, scene->start);
+  require_start(*scene);
   return result;
 }
 

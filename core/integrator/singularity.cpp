@@ -23,7 +23,7 @@ std::string name_of(int equation, const NonlinearProblem& problem, const Scene& 
       continue;
     }
     if (std::string_view(block.name) == "constraint" && scene.rows() > 0)
-      return "row '" + scene.row_names()[static_cast<std::size_t>(equation % scene.rows())] + "'";
+      return row_label(scene.constraints, equation % scene.rows());
     return std::string(block.name) + " of '" +
            scene.coordinates[static_cast<std::size_t>(equation % scene.dimension())] + "'";
   }

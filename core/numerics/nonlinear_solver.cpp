@@ -19,6 +19,8 @@ const char* describe(SolveStatus status) {
       return "a value was not finite";
     case SolveStatus::other_branch:
       return "the solution found is not the one that smaller steps lead to";
+    case SolveStatus::refused:
+      return "refused before it was solved";
   }
   return "unknown status";
 }

@@ -47,6 +47,7 @@ enum class SolveStatus {
   singular_jacobian,  ///< the linear solver met a zero pivot
   not_finite,         ///< a residual or Jacobian was NaN or infinite
   other_branch,       ///< solved, but smaller steps do not lead to this solution (step_continuation.hpp)
+  refused,            ///< not solved at all: the failure of the step says why
 };
 
 /// One line a person can read.

@@ -1,12 +1,13 @@
 #include <Eigen/QR>
-#include <Eigen/SparseCholesky>
 #include <algorithm>
+#include <cmath>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/system/consistent_start.hpp>
 #include <diracstep/core/system/constraint_distribution.hpp>
 #include <diracstep/core/system/hidden_rows.hpp>
+#include <diracstep/core/system/redundant_rows.hpp>
 #include <diracstep/core/system/saddle_point.hpp>
-#include <set>
+#include <functional>
 #include <sstream>
 
 namespace diracstep {
@@ -14,10 +15,12 @@ namespace diracstep {
 namespace {
 
 /// Unknowns (q, ν):   q − q̂ + Dφ(q)ᵀν = 0,   φ(t,q) = 0: the nearest point of the constraint, full matrices.
+/// Of coordinates that are held the first equation is q = q̂.
 class NearestPointProblem final : public NonlinearProblem {
  public:
-  NearestPointProblem(ConstraintBlocks blocks, double t, const Vector& given)
+  NearestPointProblem(ConstraintBlocks blocks, double t, const Vector& given, std::vector<int> held)
       : blocks_(std::move(blocks)),
+        held_(std::move(held)),
         rows_(blocks_, static_cast<int>(given.size())),
         t_(t),
         given_(given),
@@ -34,6 +37,7 @@ class NearestPointProblem final : public NonlinearProblem {
     rows_.evaluate(t_, x.head(n_));
     f.head(n_) = x.head(n_) - given_;
     rows_.add_annihilator(x.tail(m_), f.head(n_));
+    for (const int i : held_) f[i] = x[i] - given_[i];
     int row = n_;
     for (const auto& block : blocks_) {
       block->position(t_, x.head(n_), f.segment(row, block->rows()));
@@ -59,10 +63,15 @@ class NearestPointProblem final : public NonlinearProblem {
       j(n_ + i, c) = j(c, n_ + i) = rows_.coefficients()[k];
       ++k;
     }
+    for (const int i : held_) {
+      j.row(i).setZero();
+      j(i, i) = 1.0;
+    }
   }
 
  private:
   ConstraintBlocks blocks_;
+  std::vector<int> held_;
   ConstraintsAtPoint rows_;
   double t_;
   Vector given_;
@@ -79,131 +88,93 @@ class NearestPointProblem final : public NonlinearProblem {
   throw Misuse(message.str());
 }
 
-/// Some rows of a block, in order.
-class RowSubset final : public ConstraintRows {
- public:
-  RowSubset(std::shared_ptr<const ConstraintRows> block, std::vector<int> kept)
-      : ConstraintRows(block->holonomic(), subset(block->pattern(), kept), block->curvature_pattern(),
-                       names_of(*block, kept)),
-        block_(std::move(block)),
-        kept_(std::move(kept)) {
-    const std::vector<int> numbers = numbers_of(block_->rows(), kept_);
-    int k = 0;
-    for (const auto& [row, column] : block_->pattern().entries()) {
-      if (numbers[static_cast<std::size_t>(row)] >= 0) places_.push_back(k);
-      ++k;
-    }
-  }
+constexpr int largest_full = 100;        // rows that are looked through for dependent ones
+constexpr double rank_tolerance = 1e-7;  // of their independence, at poses found to 1e-10
 
-  bool constant() const override { return block_->constant(); }
-  void position(double t, ConstVectorRef q, VectorRef phi) const override {
-    Vector all(block_->rows());
-    block_->position(t, q, all);
-    take_rows(all, phi);
-  }
-  void coefficients(double t, ConstVectorRef q, VectorRef a, VectorRef b) const override {
-    Vector all(block_->pattern().nonzeros()), offset(block_->rows());
-    block_->coefficients(t, q, all, offset);
-    take_values(all, a);
-    take_rows(offset, b);
-  }
-  void derivative(double t, ConstVectorRef q, ConstVectorRef w, double s, VectorRef d) const override {
-    Vector all(block_->pattern().nonzeros());
-    block_->derivative(t, q, w, s, all);
-    take_values(all, d);
-  }
-  void time_derivative(double t, ConstVectorRef q, ConstVectorRef v, VectorRef d) const override {
-    Vector all(block_->rows());
-    block_->time_derivative(t, q, v, all);
-    take_rows(all, d);
-  }
-  void annihilator_derivative(double t, ConstVectorRef q, ConstVectorRef lambda, VectorRef d) const override {
-    Vector all = Vector::Zero(block_->rows());
-    for (std::size_t r = 0; r < kept_.size(); ++r) all[kept_[r]] = lambda[static_cast<Eigen::Index>(r)];
-    block_->annihilator_derivative(t, q, all, d);
-  }
-
- private:
-  /// The number of each row among the kept ones; -1 for those left out.
-  static std::vector<int> numbers_of(int rows, const std::vector<int>& kept) {
-    std::vector<int> numbers(static_cast<std::size_t>(rows), -1);
-    for (std::size_t r = 0; r < kept.size(); ++r)
-      numbers[static_cast<std::size_t>(kept[r])] = static_cast<int>(r);
-    return numbers;
-  }
-  static SparsityPattern subset(const SparsityPattern& pattern, const std::vector<int>& kept) {
-    const std::vector<int> numbers = numbers_of(pattern.rows(), kept);
-    std::vector<std::pair<int, int>> entries;
-    for (const auto& [row, column] : pattern.entries())
-      if (const int number = numbers[static_cast<std::size_t>(row)]; number >= 0)
-        entries.emplace_back(number, column);
-    return {static_cast<int>(kept.size()), pattern.columns(), entries};
-  }
-  static std::vector<std::string> names_of(const ConstraintRows& block, const std::vector<int>& kept) {
-    std::vector<std::string> names;
-    for (const int row : kept) names.push_back(block.names()[static_cast<std::size_t>(row)]);
-    return names;
-  }
-  void take_rows(const Vector& all, VectorRef out) const {
-    for (std::size_t r = 0; r < kept_.size(); ++r) out[static_cast<Eigen::Index>(r)] = all[kept_[r]];
-  }
-  void take_values(const Vector& all, VectorRef out) const {
-    for (std::size_t k = 0; k < places_.size(); ++k) out[static_cast<Eigen::Index>(k)] = all[places_[k]];
-  }
-
-  std::shared_ptr<const ConstraintRows> block_;
-  std::vector<int> kept_;    ///< ascending, so the entries keep their order
-  std::vector<int> places_;  ///< values of the kept rows among all
-};
-
-/// Up to so many rows full matrices take less time.
-constexpr int max_rows_in_full = 100;
-
-/// Aᵀ with columns of size 1, since rows may come in any units.
-Columns full_one_forms(const ConstraintsAtPoint& rows) {
-  Columns one_forms = rows.pattern().full(rows.coefficients()).transpose();
-  for (auto column : one_forms.colwise())
-    if (const double size = column.norm(); size > 0.0) column /= size;
-  return one_forms;
-}
-Eigen::SparseMatrix<double> sparse_one_forms(const ConstraintsAtPoint& rows) {
-  const SparsityPattern& pattern = rows.pattern();
-  Eigen::SparseMatrix<double> one_forms =
-      Eigen::Map<const Eigen::SparseMatrix<double>>(pattern.rows(), pattern.columns(), pattern.nonzeros(),
-                                                    pattern.column_starts().data(),
-                                                    pattern.row_indices().data(), rows.coefficients().data())
-          .transpose();
-  for (int r = 0; r < pattern.rows(); ++r)
-    if (const double size = one_forms.col(r).norm(); size > 0.0) one_forms.col(r) /= size;
-  return one_forms;
+/// Numbers of the components that are no guesses.
+std::vector<int> held(const std::vector<bool>& guesses) {
+  std::vector<int> numbers;
+  for (std::size_t i = 0; i < guesses.size(); ++i)
+    if (!guesses[i]) numbers.push_back(static_cast<int>(i));
+  return numbers;
 }
 
-std::vector<int> dependent_columns(const Columns& one_forms, double tolerance) {
-  Eigen::ColPivHouseholderQR<Columns> qr;
-  qr.setThreshold(tolerance);
-  qr.compute(one_forms);
-  const auto& order = qr.colsPermutation().indices();
-  return {order.data() + qr.rank(), order.data() + order.size()};
+/// Throws Misuse where a row is not met at the start, telling that guesses alone may move.
+void require_met(const Scene& scene, const Start& start, const char* guessed) {
+  try {
+    require_consistent(scene, start);
+  } catch (const InconsistentStart& start_off) {
+    throw Misuse(std::string(start_off.what()) + "; the guesses of " + guessed +
+                 " cannot meet it while what is given stays");
+  }
 }
 
-/// The pivots of the Gram matrix are squared distances from the columns before.  The shift keeps those that
-/// vanish from dividing, and 1e-12 is what round-off leaves to be told from zero.
-std::vector<int> dependent_columns(const Eigen::SparseMatrix<double>& one_forms, double tolerance) {
-  const Eigen::SparseMatrix<double> products = one_forms.transpose() * one_forms;
-  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factors;
-  factors.setShift(1e-14);
-  factors.compute(products);
-  const Vector pivots = factors.vectorD();
-  const auto& order = factors.permutationPinv().indices();
-  std::vector<int> dependent;
-  for (Eigen::Index k = 0; k < pivots.size(); ++k)
-    if (!(pivots[k] > std::max(tolerance * tolerance, 1e-12))) dependent.push_back(order[k]);
-  return dependent;
+/// The scene without the rows that depend on others, where only what is not held moves, at its start or at a
+/// pose near it.
+std::shared_ptr<const Scene> independent(std::shared_ptr<const Scene> scene, const std::vector<int>& held) {
+  if (scene->rows() == 0 || scene->rows() > largest_full) return scene;
+  const Start& start = scene->start;
+  ConstraintsAtPoint rows(scene->constraints, scene->dimension());
+  rows.evaluate(start.time,
+                pose_near(only_holonomic(scene->constraints), start.time, start.q, held).value_or(start.q));
+  const std::vector<std::string> names = scene->row_names();
+  std::vector<std::string> left;
+  for (const int r : dependent_columns(full_one_forms(rows, held), rank_tolerance))
+    left.push_back(names[static_cast<std::size_t>(r)]);
+  return left.empty() ? scene : without_rows(*scene, left);
+}
+
+/// The nearest point of the holonomic rows that differs in guesses alone.  Rows that these cannot move, or
+/// only together with others, are not solved for.
+Vector nearest_position(const Scene& scene, const Start& start, const Guesses& guesses,
+                        const SolverFactory& solvers) {
+  const std::vector<int> kept = held(guesses.q);
+  auto all = std::make_shared<Scene>(scene);
+  all->constraints = only_holonomic(scene.constraints);
+  all->start = start;
+  const auto solved = independent(all, kept);
+  if (solved->rows() == 0) return start.q;
+  NearestPointProblem problem(solved->constraints, start.time, start.q, kept);
+  Vector x = Vector::Zero(problem.size());
+  x.head(start.q.size()) = start.q;
+  const SolveReport report = solvers(problem)->solve(x);
+  if (!report.ok() && !kept.empty())
+    require_met(*all, {start.time, x.head(start.q.size()), start.v}, "positions");
+  if (!report.ok()) throw_not_found(scene, "no nearest point of the holonomic rows", report);
+  return x.head(start.q.size());
+}
+
+/// The velocity of the distribution nearest to v in the norm of ∂²L/∂v² that differs in guesses alone:
+///   [ M_gg  A_gᵀ ] [ change ]   [      0      ]
+///   [ A_g    0   ] [   μ    ] = [ −(A v + b)  ]    in least squares, for M_gg and the rows may be singular.
+Vector nearest_velocity(const Scene& scene, const Start& start, const std::vector<bool>& guessed) {
+  std::vector<int> free;
+  for (int i = 0; i < scene.dimension(); ++i)
+    if (guessed.empty() || guessed[static_cast<std::size_t>(i)]) free.push_back(i);
+  const auto g = static_cast<Eigen::Index>(free.size()), m = static_cast<Eigen::Index>(scene.rows());
+  const SparsityPattern& pattern = scene.lagrangian->pattern();
+  Vector lqq(pattern.nonzeros()), lqv = lqq, lvv = lqq, off(m);
+  scene.lagrangian->hessian(start.time, start.q, start.v, lqq, lqv, lvv);
+  ConstraintsAtPoint rows(scene.constraints, scene.dimension());
+  rows.evaluate(start.time, start.q);
+  rows.velocity_residual(start.v, off);
+  const Columns mass = pattern.full(lvv), a = rows.pattern().full(rows.coefficients());
+  Columns system = Columns::Zero(g + m, g + m);
+  system.topLeftCorner(g, g) = mass(free, free);
+  system.bottomLeftCorner(m, g) = a(Eigen::all, free);
+  system.topRightCorner(g, m) = system.bottomLeftCorner(m, g).transpose();
+  Vector right = Vector::Zero(g + m);
+  right.tail(m) = -off;
+  const Vector change = system.completeOrthogonalDecomposition().solve(right);
+  Vector v = start.v;
+  for (Eigen::Index k = 0; k < g; ++k) v[free[static_cast<std::size_t>(k)]] += change[k];
+  return v;
 }
 
 }  // namespace
 
-ConsistentStart project_start(const Scene& given, const Start& given_start, const SolverFactory& solvers) {
+ConsistentStart project_start(const Scene& given, const Start& given_start, const SolverFactory& solvers,
+                              const Guesses& guesses) {
   auto copy = std::make_shared<Scene>(given);
   copy->start = given_start;
   const auto complete = completed(std::move(copy)), extended = with_hidden_rows(complete);
@@ -213,58 +184,55 @@ ConsistentStart project_start(const Scene& given, const Start& given_start, cons
   require_size("the start v", start.v.size(), scene.dimension());
   ConsistentStart result{start, 0.0, 0.0};
   const Eigen::Index n = start.q.size();
-  const ConstraintBlocks holonomic = only_holonomic(scene.constraints);
-  if (!holonomic.empty()) {
-    NearestPointProblem problem(holonomic, start.time, start.q);
-    Vector x = Vector::Zero(problem.size());
-    x.head(n) = start.q;
-    const SolveReport report = solvers(problem)->solve(x);
-    if (!report.ok()) throw_not_found(scene, "no nearest point of the holonomic rows", report);
-    result.start.q = x.head(n);
-    result.position_moved = (result.start.q - start.q).norm();
-  }
+  result.start.q = nearest_position(scene, start, guesses, solvers);
+  result.position_moved = (result.start.q - start.q).norm();
   if (scene.rows() == 0) return result;
-  Vector lq(n), p(n), x = Vector::Zero(n + scene.rows());
-  scene.lagrangian->gradient(start.time, result.start.q, start.v, lq, p);
-  VelocityProblem problem(scene, true);
-  problem.begin(start.time, result.start.q, p);
-  x.head(n) = start.v;
-  const SolveReport report = solvers(problem)->solve(x);
-  if (!report.ok()) throw_not_found(scene, "no nearest velocity of the distribution", report);
-  result.start.v = x.head(n);
+  auto there = std::make_shared<Scene>(scene);
+  there->start = result.start;
+  const bool redundant = independent(there, {})->rows() < scene.rows();
+  if (!held(guesses.v).empty() || redundant) {
+    auto moved = std::make_shared<Scene>(*complete);  // what carries no momentum is set anew at this position
+    moved->start.q = result.start.q;
+    result.start.v = with_hidden_rows(moved)->start.v;
+    result.start.v = nearest_velocity(scene, result.start, guesses.v);
+  } else {
+    Vector lq(n), p(n), x = Vector::Zero(n + scene.rows());
+    scene.lagrangian->gradient(start.time, result.start.q, start.v, lq, p);
+    VelocityProblem problem(scene, true);
+    problem.begin(start.time, result.start.q, p);
+    x.head(n) = start.v;
+    const SolveReport report = solvers(problem)->solve(x);
+    if (!report.ok()) throw_not_found(scene, "no nearest velocity of the distribution", report);
+    result.start.v = x.head(n);
+  }
   result.velocity_moved = (result.start.v - start.v).norm();
+  if (!held(guesses.q).empty() || !held(guesses.v).empty())
+    require_met(scene, result.start, held(guesses.v).empty() ? "positions" : "positions and velocities");
   return result;
 }
 
-std::vector<std::string> redundant_rows(const Scene& scene, const Start& start, double tolerance) {
-  if (scene.rows() == 0) return {};
-  ConstraintsAtPoint rows(scene.constraints, scene.dimension());
-  rows.evaluate(start.time, start.q);
-  const std::vector<int> numbers = scene.rows() <= max_rows_in_full
-                                       ? dependent_columns(full_one_forms(rows), tolerance)
-                                       : dependent_columns(sparse_one_forms(rows), tolerance);
-  if (numbers.empty()) return {};
-  const std::vector<std::string> names = scene.row_names();
-  std::vector<std::string> dependent;
-  for (const int r : numbers) dependent.push_back(names[static_cast<std::size_t>(r)]);
-  std::ranges::sort(dependent);
-  return dependent;
-}
-
-std::shared_ptr<const Scene> without_rows(const Scene& scene, const std::vector<std::string>& names) {
-  auto copy = std::make_shared<Scene>(scene);
-  copy->constraints.clear();
-  const std::set<std::string> left_out(names.begin(), names.end());
-  for (const auto& block : scene.constraints) {
-    std::vector<int> kept;
-    for (int r = 0; r < block->rows(); ++r)
-      if (!left_out.contains(block->names()[static_cast<std::size_t>(r)])) kept.push_back(r);
-    if (static_cast<int>(kept.size()) == block->rows())
-      copy->constraints.push_back(block);
-    else if (!kept.empty())
-      copy->constraints.push_back(std::make_shared<const RowSubset>(block, kept));
-  }
-  return copy;
+std::string describe_moves(const Scene& scene, const Start& from, const Start& to) {
+  constexpr std::size_t most = 8;
+  struct Move {
+    std::string name;
+    double from, to;
+  };
+  std::vector<Move> moves;
+  const auto collect = [&](const char* prefix, const Vector& before, const Vector& after) {
+    for (Eigen::Index i = 0; i < std::min(before.size(), after.size()); ++i)
+      if (before[i] != after[i])
+        moves.push_back({prefix + scene.coordinates[static_cast<std::size_t>(i)], before[i], after[i]});
+  };
+  collect("", from.q, to.q);
+  collect("v_", from.v, to.v);
+  std::ranges::stable_sort(moves, std::greater<>(),
+                           [](const Move& move) { return std::abs(move.to - move.from); });
+  std::ostringstream text;
+  text.precision(10);
+  for (std::size_t k = 0; k < std::min(most, moves.size()); ++k)
+    text << (k == 0 ? "" : ", ") << moves[k].name << " from " << moves[k].from << " to " << moves[k].to;
+  if (moves.size() > most) text << " and " << moves.size() - most << " more by less";
+  return text.str();
 }
 
 }  // namespace diracstep

@@ -7,6 +7,12 @@
 
 namespace diracstep {
 
+/// Which components of a start are guesses, which projection may move; the others are given and stay.  An
+/// empty list stands for all.
+struct Guesses {
+  std::vector<bool> q, v;
+};
+
 /// A start moved onto the constraints, and how far it had to move (Euclidean norms).
 struct ConsistentStart {
   Start start;
@@ -16,17 +22,15 @@ struct ConsistentStart {
 
 /// The nearest start on the constraints: q is the point of φ(t,q) = 0 nearest to the given one in the
 /// Euclidean norm, then v the velocity of the affine distribution nearest to the given one in the norm of
-/// ∂²L/∂v² (for a degenerate Lagrangian: of any solution of  ∂L/∂v(q,v) − Aᵀμ = ∂L/∂v(q,v̂),  A v + b = 0).
-/// The rows that a degenerate Lagrangian hides count as rows (hidden_rows.hpp).  A start with a momentum in
-/// place of v is given its velocity first.  Throws Misuse where no such point is found, saying why.
-ConsistentStart project_start(const Scene& scene, const Start& start, const SolverFactory& solvers);
+/// ∂²L/∂v² (for a degenerate Lagrangian: of any solution of  ∂L/∂v(q,v) − Aᵀμ = ∂L/∂v(q,v̂),  A v + b = 0);
+/// both among those that differ in `guesses` alone.
+/// The rows that a degenerate Lagrangian hides count as rows (hidden_rows.hpp), and the velocities that carry
+/// no momentum are set by them, given or not.  A start with a momentum in place of v is given its velocity
+/// first. Throws Misuse where no such point is found, with the row that is not met.
+ConsistentStart project_start(const Scene& scene, const Start& start, const SolverFactory& solvers,
+                              const Guesses& guesses = {});
 
-/// Names of the rows of A(t,q) that depend on the others to within `tolerance` of their size, found with
-/// column pivoting; of more than 100 rows, where sparse products are factored, to within 1e-6 at best.  Empty
-/// where all rows are independent.
-std::vector<std::string> redundant_rows(const Scene& scene, const Start& start, double tolerance = 1e-10);
-
-/// The same scene without the rows of these names.
-std::shared_ptr<const Scene> without_rows(const Scene& scene, const std::vector<std::string>& names);
+/// "b from 0.1745 to 0.1148, v_c from 0 to 0.2": what differs, the largest changes first, at most eight.
+std::string describe_moves(const Scene& scene, const Start& from, const Start& to);
 
 }  // namespace diracstep

@@ -18,10 +18,24 @@ void ConstraintRows::position(double, ConstVectorRef, VectorRef) const {
   throw Misuse("these constraint rows have no position form φ(t,q)");
 }
 
+std::string ConstraintRows::origin(int) const { return {}; }
+
 int row_count(const ConstraintBlocks& blocks) {
   int rows = 0;
   for (const auto& block : blocks) rows += block->rows();
   return rows;
+}
+
+std::string row_label(const ConstraintBlocks& blocks, int row) {
+  for (const auto& block : blocks) {
+    if (row < block->rows()) {
+      const std::string origin = block->origin(row);
+      const std::string label = "row '" + block->names()[static_cast<std::size_t>(row)] + "'";
+      return origin.empty() ? label : label + " (" + origin + ")";
+    }
+    row -= block->rows();
+  }
+  throw std::out_of_range("there is no such row");
 }
 
 ConstraintBlocks only_holonomic(const ConstraintBlocks& blocks) {

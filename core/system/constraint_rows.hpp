@@ -30,6 +30,9 @@ class ConstraintRows {
   const SparsityPattern& curvature_pattern() const { return curvature_pattern_; }
   const std::vector<std::string>& names() const { return names_; }
 
+  /// Where a row comes from that the author of the scene has not written, in words; empty for others.
+  virtual std::string origin(int row) const;
+
   /// Whether A depends on neither t nor q, and b not on q; false where that is not known.
   virtual bool constant() const { return false; }
 
@@ -61,6 +64,10 @@ using ConstraintBlocks = std::vector<std::shared_ptr<const ConstraintRows>>;
 
 /// Number of rows in all blocks.
 int row_count(const ConstraintBlocks& blocks);
+
+/// A row for messages: "row 'blade'", with its origin in brackets where it has one.  `row` counts through all
+/// blocks.
+std::string row_label(const ConstraintBlocks& blocks, int row);
 
 /// Those blocks that are holonomic, or those that are not.
 ConstraintBlocks only_holonomic(const ConstraintBlocks& blocks);

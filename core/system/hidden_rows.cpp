@@ -1,5 +1,6 @@
 #include <Eigen/LU>
 #include <Eigen/SparseCholesky>
+#include <algorithm>
 #include <cmath>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/numerics/scales.hpp>
@@ -7,14 +8,20 @@
 #include <diracstep/core/system/hidden_rows.hpp>
 #include <diracstep/core/system/lagrangian_derivatives.hpp>
 #include <diracstep/core/system/rows_along_motions.hpp>
+#include <limits>
 
 namespace diracstep {
 
 namespace {
 
 constexpr int largest_full_matrix = 1500;
-constexpr double rank_tolerance = 1e-10;  // of a pivot, in relation to the largest
 constexpr double zero_tolerance = 1e-12;  // of an entry, in relation to the terms of its row
+
+/// What round-off leaves of a zero pivot, in relation to the largest: a mass ratio of 1e-13 is no degeneracy.
+double rank_tolerance(const Columns& matrix) {
+  return 16.0 * std::numeric_limits<double>::epsilon() *
+         static_cast<double>(std::max(matrix.rows(), matrix.cols()));
+}
 
 /// Where derivatives of the scene's functions are taken.
 struct Point {
@@ -66,7 +73,7 @@ bool positive_definite(const Lagrangian& lagrangian, const Start& start) {
 /// A basis of the kernel, without a column where there is none.
 Columns kernel(const Columns& matrix) {
   Eigen::FullPivLU<Columns> lu;
-  lu.setThreshold(rank_tolerance);
+  lu.setThreshold(rank_tolerance(matrix));
   lu.compute(matrix);
   if (lu.dimensionOfKernel() == 0) return Columns(matrix.cols(), 0);
   Columns basis = lu.kernel();
@@ -125,7 +132,7 @@ struct Directions {
 Directions split(const Columns& w, const Columns& fv) {
   const Columns resistance = w.transpose() * fv * w;
   Eigen::FullPivLU<Columns> lu;
-  lu.setThreshold(rank_tolerance);
+  lu.setThreshold(rank_tolerance(resistance));
   lu.compute(resistance);
   Directions result{Columns(w.rows(), lu.rank()), w * kernel(resistance.transpose())};
   const auto& order = lu.permutationP().indices();
@@ -158,14 +165,20 @@ void require_described(const Scene& scene, const Columns& w, const Directions& s
     refuse(scene, w, "the force along it is not linear in v, which is not supported; add a small inertia");
 }
 
-/// W, or nothing where ∂²L/∂v² is regular along the rows at the start or near it.
+/// W, without a column where ∂²L/∂v² is regular along the rows at the start or near it: what is singular at
+/// the start alone is no degeneracy.
 Columns directions(const Scene& scene, const Point& start, const FullDerivatives& at_start,
                    const Point& other, const FullDerivatives& at_other) {
-  Columns w = kernel(stacked(scene, start, at_start));
-  if (w.cols() == 0) return w;
-  const Columns elsewhere = stacked(scene, other, at_other);
-  if (elsewhere.allFinite() && !vanishes(elsewhere * w, elsewhere)) return Columns(w.rows(), 0);
-  return w;
+  const Columns here = stacked(scene, start, at_start), elsewhere = stacked(scene, other, at_other);
+  const Columns w = kernel(here);
+  if (w.cols() == 0 || !elsewhere.allFinite()) return w;
+  Columns both(here.rows() + elsewhere.rows(), here.cols());
+  both << here, elsewhere;
+  const Columns constant = kernel(both);
+  if (kernel(elsewhere).cols() > constant.cols())
+    refuse(scene, w,
+           "elsewhere another motion does: a direction without momentum that moves is not supported");
+  return constant;
 }
 
 Columns hidden_matrix(const Directions& w, const FullDerivatives& d) {
@@ -214,7 +227,9 @@ std::shared_ptr<const Scene> with_hidden_rows(std::shared_ptr<const Scene> scene
   const Point start{scene->start.time, scene->start.q, scene->start.v};
   ConstraintsAtPoint hidden(blocks, scene->dimension());
   hidden.evaluate(start.t, start.q);
-  const Columns w = kernel(stacked(*scene, start, FullDerivatives(*scene, start)));
+  const Point other = near(scene->start);
+  const Columns w =
+      directions(*scene, start, FullDerivatives(*scene, start), other, FullDerivatives(*scene, other));
   Vector off(hidden.rows());
   hidden.velocity_residual(start.v, off);
   const Columns response = hidden.pattern().full(hidden.coefficients()) * w;

@@ -23,7 +23,7 @@ namespace diracstep {
 ///
 /// Empty where ∂²L/∂v² is regular on Δ_Q at the start or near it, and for phase-space Lagrangians, which have
 /// a step of their own.  Throws Misuse where such a motion is determined by nothing, or by more than is
-/// described here, and names it.
+/// described here, or where W is not constant, and names it.
 ConstraintBlocks hidden_rows(const Scene& scene);
 
 /// The scene itself where it hides no rows; else a copy with them below its own, and with the velocities that

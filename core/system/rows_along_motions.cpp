@@ -2,17 +2,26 @@
 #include <diracstep/core/system/lagrangian_derivatives.hpp>
 #include <diracstep/core/system/rows_along_motions.hpp>
 #include <sstream>
+#include <string_view>
 #include <utility>
 
 namespace diracstep {
 
 namespace {
 
+constexpr std::string_view prefix = "hidden_";  // of the names of these rows
+
 /// The rows Wᵀ(∂L/∂q + f), each divided by the size of its coefficients at the start.
 class RowsAlongMotions final : public ConstraintRows {
  public:
   RowsAlongMotions(const Scene& scene, bool holonomic, const Columns& directions, const Vector& units)
       : RowsAlongMotions(scene, holonomic, in_units(directions, units), directions, pattern_of(directions)) {}
+
+  std::string origin(int row) const override {
+    const std::string& name = names()[static_cast<std::size_t>(row)];
+    return "not in the file: the balance of forces along " + name.substr(prefix.size()) +
+           ", which carries no momentum";
+  }
 
   void position(double t, ConstVectorRef q, VectorRef phi) const override { force_along(t, q, phi); }
 
@@ -97,7 +106,8 @@ class RowsAlongMotions final : public ConstraintRows {
   }
   static std::vector<std::string> names_of(const Scene& scene, const Columns& w) {
     std::vector<std::string> names;
-    for (Eigen::Index k = 0; k < w.cols(); ++k) names.push_back("hidden_" + motion_along(scene, w.col(k)));
+    for (Eigen::Index k = 0; k < w.cols(); ++k)
+      names.push_back(std::string(prefix) + motion_along(scene, w.col(k)));
     return names;
   }
 

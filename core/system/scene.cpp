@@ -21,13 +21,12 @@ void require_finite(const Scene& scene, const char* what, const Vector& column) 
     }
 }
 
-[[noreturn]] void throw_off_row(const Scene& scene, const ConstraintRows& block, int row, const char* what,
-                                double residual, double terms) {
+[[noreturn]] void throw_off_row(const Scene& scene, int row, const char* what, double residual,
+                                double terms) {
   std::ostringstream message;
-  message << "scene '" << scene.name << "': the start violates row '"
-          << block.names()[static_cast<std::size_t>(row)] << "': " << what << " = " << residual
-          << ", allowed " << start_tolerance * terms;
-  throw Misuse(message.str());
+  message << "scene '" << scene.name << "': the start violates " << row_label(scene.constraints, row) << ": "
+          << what << " = " << residual << ", allowed " << start_tolerance * terms;
+  throw InconsistentStart(message.str());
 }
 
 }  // namespace
@@ -110,6 +109,7 @@ void require_consistent(const Scene& scene, const Start& given) {
   require_finite(scene, "q", start.q);
   require_finite(scene, "v", start.v);
   if (!std::isfinite(start.time)) throw Misuse(prefix + "the start time is not finite");
+  int first = 0;
   for (const auto& block : scene.constraints) {
     const int m = block->rows();
     Vector a(block->pattern().nonzeros()), b(m), residual(m), terms(m), phi(m);
@@ -121,7 +121,7 @@ void require_consistent(const Scene& scene, const Start& given) {
                                     terms.data());
       for (int r = 0; r < m; ++r)
         if (!(std::abs(phi[r]) <= start_tolerance * terms[r]))
-          throw_off_row(scene, *block, r, "φ(q)", phi[r], terms[r]);
+          throw_off_row(scene, first + r, "φ(q)", phi[r], terms[r]);
     }
     residual = b;
     block->pattern().multiply_add(a.data(), start.v.data(), residual.data());
@@ -129,8 +129,9 @@ void require_consistent(const Scene& scene, const Start& given) {
     block->pattern().multiply_add(a.cwiseAbs().eval().data(), start.v.cwiseAbs().eval().data(), terms.data());
     for (int r = 0; r < m; ++r)
       if (!(std::abs(residual[r]) <= start_tolerance * terms[r]))
-        throw_off_row(scene, *block, r, "the velocity is off the distribution, A v + b", residual[r],
+        throw_off_row(scene, first + r, "the velocity is off the distribution, A v + b", residual[r],
                       terms[r]);
+    first += m;
   }
 }
 

@@ -1,7 +1,9 @@
 #pragma once
 
+#include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/system/constraint_rows.hpp>
 #include <diracstep/core/system/force.hpp>
+#include <diracstep/core/system/kinks.hpp>
 #include <diracstep/core/system/phase_function.hpp>
 #include <memory>
 #include <string>
@@ -32,6 +34,7 @@ struct Scene {
   ConstraintBlocks constraints;
   std::shared_ptr<const Force> force;  ///< null where there is none
   Start start;
+  std::shared_ptr<const Kinks> kinks = {};  ///< null where nothing is known of any
 
   /// Of the tangent spaces: how many numbers a velocity, a momentum, a row and the second derivatives of L
   /// have.
@@ -62,9 +65,14 @@ std::shared_ptr<const Scene> completed(std::shared_ptr<const Scene> scene);
 /// The scene's Hamiltonian, or the one derived from its Lagrangian.  Throws Misuse where that is degenerate.
 std::shared_ptr<const Hamiltonian> hamiltonian_of(const Scene& scene);
 
-/// Throws Misuse where the start, completed, is of the wrong size, is not finite, violates φ(q) = 0, or has a
-/// velocity off the distribution; names the coordinate or the row, and the amount.  A row counts as violated
-/// when its residual exceeds 1e-10 of the terms that cancel in it.
+/// A start that violates a row.
+class InconsistentStart : public Misuse {
+  using Misuse::Misuse;
+};
+
+/// Throws Misuse where the start, completed, is of the wrong size or not finite, InconsistentStart where it
+/// violates φ(q) = 0 or has a velocity off the distribution; names the coordinate or the row, and the amount.
+/// A row counts as violated when its residual exceeds 1e-10 of the terms that cancel in it.
 void require_consistent(const Scene& scene, const Start& start);
 
 }  // namespace diracstep

@@ -62,7 +62,7 @@ std::vector<std::pair<std::string, Node>> CircuitFormulas::current_laws() {
       if (branch.from == node) sum = graph_.add(sum, i);
       if (branch.to == node) sum = graph_.subtract(sum, i);
     }
-    laws.emplace_back("node_" + node, sum);
+    laws.emplace_back(node, sum);
   }
   return laws;
 }

@@ -19,7 +19,7 @@ class CircuitFormulas {
   Node lagrangian();
   /// ½ R i² of the resistors.
   Node dissipation();
-  /// Kirchhoff's current law at the nodes where it does not follow from the others, with the rows' names.
+  /// Kirchhoff's current law at the nodes where it does not follow from the others, with their names.
   std::vector<std::pair<std::string, Node>> current_laws();
 
  private:

@@ -25,6 +25,10 @@ int arity(Op op) {
     case Op::divide:
     case Op::pow:
     case Op::atan2:
+    case Op::min:
+    case Op::max:
+    case Op::hypot:
+    case Op::where:
     case Op::kepler_E:
     case Op::sn:
     case Op::cn:
@@ -99,6 +103,14 @@ Node FormulaGraph::fold(const NodeData& node) {
 
 Node FormulaGraph::apply(Op op, Node a, Node b) { return fold({op, a, b}); }
 
+Node FormulaGraph::where(Node condition, Node value) {
+  if (is_number(value, 0.0)) return value;
+  const NodeData data = (*this)[condition];
+  if (data.op != Op::number) return fold({Op::where, condition, value});
+  if (data.value > 0.0) return value;
+  return data.value < 0.0 ? number(0.0) : multiply(number(0.5), value);
+}
+
 Node FormulaGraph::negative(Node a) {
   if ((*this)[a].op == Op::negative) return (*this)[a].a;
   return fold({Op::negative, a});
@@ -121,6 +133,13 @@ Node FormulaGraph::subtract(Node a, Node b) {
   return fold({Op::subtract, a, b});
 }
 
+/// Products of two numbers are judged here; those that hold parameters when these have their values.
+bool FormulaGraph::may_gather(Node a, Node b) const {
+  const NodeData &first = (*this)[a], &second = (*this)[b];
+  if (as_written_) return false;
+  return first.op != Op::number || second.op != Op::number || std::isnormal(first.value * second.value);
+}
+
 Node FormulaGraph::multiply(Node a, Node b) {
   if (is_number(a, 0.0) || is_number(b, 0.0)) return number(0.0);
   if (is_number(a, 1.0)) return b;
@@ -132,7 +151,8 @@ Node FormulaGraph::multiply(Node a, Node b) {
   if ((*this)[b].op == Op::negative) return negative(multiply(a, (*this)[b].a));
   // What is known earlier is gathered, so that it is computed earlier: c·(d·x) becomes (c·d)·x.
   if (known(a) > known(b)) std::swap(a, b);
-  if (known(a) < Known::each_call && (*this)[b].op == Op::multiply && known((*this)[b].a) < Known::each_call)
+  if (known(a) < Known::each_call && (*this)[b].op == Op::multiply &&
+      known((*this)[b].a) < Known::each_call && may_gather(a, (*this)[b].a))
     return multiply(multiply(a, (*this)[b].a), (*this)[b].b);
   if (known(a) == known(b) && a > b) std::swap(a, b);
   return fold({Op::multiply, a, b});
@@ -141,8 +161,9 @@ Node FormulaGraph::multiply(Node a, Node b) {
 Node FormulaGraph::divide(Node a, Node b) {
   if (is_number(b, 1.0)) return a;
   if (is_number(a, 0.0) && !is_number(b, 0.0)) return number(0.0);
-  if (known(a) == Known::each_call && known(b) < Known::each_call)  // one division beforehand, not one a call
-    return multiply(fold({Op::divide, number(1.0), b}), a);
+  if (!as_written_ && known(a) == Known::each_call && known(b) < Known::each_call &&
+      ((*this)[b].op != Op::number || std::isnormal(1.0 / (*this)[b].value)))
+    return multiply(fold({Op::divide, number(1.0), b}), a);  // one division beforehand, not one a call
   return fold({Op::divide, a, b});
 }
 
@@ -214,27 +235,27 @@ Node FormulaGraph::partial(Node node, bool second) {
     case Op::tan:
       return one_plus(power(node, 2));
     case Op::asin:
-      return inverse(apply(Op::sqrt, one_minus(power(a, 2))));
+      return inverse(apply(Op::sqrt, multiply(one_minus(a), one_plus(a))));
     case Op::acos:
-      return negative(inverse(apply(Op::sqrt, one_minus(power(a, 2)))));
+      return negative(inverse(apply(Op::sqrt, multiply(one_minus(a), one_plus(a)))));
     case Op::atan:
       return inverse(one_plus(power(a, 2)));
     case Op::atan2: {
-      const Node norm = inverse(add(power(a, 2), power(b, 2)));
-      return second ? negative(multiply(a, norm)) : multiply(b, norm);
+      const Node size = apply(Op::hypot, a, b);
+      return second ? negative(divide(divide(a, size), size)) : divide(divide(b, size), size);
     }
     case Op::sinh:
       return apply(Op::cosh, a);
     case Op::cosh:
       return apply(Op::sinh, a);
     case Op::tanh:
-      return one_minus(power(node, 2));
+      return power(inverse(apply(Op::cosh, a)), 2);
     case Op::asinh:
-      return inverse(apply(Op::sqrt, one_plus(power(a, 2))));
+      return inverse(apply(Op::hypot, one, a));
     case Op::acosh:
-      return inverse(apply(Op::sqrt, subtract(power(a, 2), one)));
+      return inverse(multiply(apply(Op::sqrt, subtract(a, one)), apply(Op::sqrt, one_plus(a))));
     case Op::atanh:
-      return inverse(one_minus(power(a, 2)));
+      return inverse(multiply(one_minus(a), one_plus(a)));
     case Op::exp:
       return node;
     case Op::log:
@@ -243,9 +264,20 @@ Node FormulaGraph::partial(Node node, bool second) {
       return apply(Op::sign, a);
     case Op::sign:
       return number(0.0);
+    case Op::hypot:
+      return divide(second ? b : a, node);
     default:
       throw Error("a function without a derivative was differentiated");
   }
+}
+
+/// The derivative of min, max or where, of whose arguments only the chosen one counts: no product with zero,
+/// which would be NaN beside an infinite slope.
+Node FormulaGraph::change_of_choice(const NodeData& choice, Node of_a, Node of_b) {
+  if (choice.op == Op::where) return where(choice.a, of_b);
+  const bool largest = choice.op == Op::max;
+  const Node first = subtract(choice.a, choice.b), second = subtract(choice.b, choice.a);
+  return add(where(largest ? first : second, of_a), where(largest ? second : first, of_b));
 }
 
 std::vector<Node> FormulaGraph::derivative(std::span<const Node> roots, Node symbol) {
@@ -262,6 +294,11 @@ std::vector<Node> FormulaGraph::derivative(std::span<const Node> roots, Node sym
       continue;
     }
     const NodeData data = (*this)[node];
+    if (data.op == Op::min || data.op == Op::max || data.op == Op::where) {
+      const Node chosen = change_of_choice(data, change(data.a), change(data.b));
+      if (chosen != zero) changes[node] = chosen;
+      continue;
+    }
     Node sum = zero;
     for (const bool second : {false, true}) {
       if (arity(data.op) < (second ? 2 : 1) || data.op == Op::list) continue;
@@ -291,6 +328,8 @@ Node FormulaGraph::rebuild(const NodeData& node) {
       return power(node.a, node.c);
     case Op::pow:
       return raise(node.a, node.b);
+    case Op::where:
+      return where(node.a, node.b);
     default:
       return fold(node);
   }

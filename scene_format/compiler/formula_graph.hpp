@@ -47,6 +47,10 @@ enum class Op : unsigned char {
   log,
   abs,
   sign,
+  min,
+  max,
+  hypot,
+  where,     ///< b where a > 0, b/2 where a = 0, else 0: derivatives of min and max
   kepler_E,  ///< from here on for references only, without derivatives
   sn,
   cn,
@@ -89,6 +93,11 @@ class FormulaGraph {
     using Error::Error;
   };
 
+  /// `as_written`: products and quotients are computed as they stand.  Else what is known early is gathered,
+  /// c·(d·x) = (c·d)·x and x/c = (1/c)·x, which saves time in every call but leaves the range of numbers
+  /// where c·d or 1/c does.
+  explicit FormulaGraph(bool as_written = false) : as_written_(as_written) {}
+
   Node number(double value) { return insert({Op::number, none, none, 0, value}); }
   Node parameter(int id) { return insert({Op::parameter, id}); }
   Node element(int id, Node index) { return insert({Op::element, id, index}); }
@@ -109,9 +118,13 @@ class FormulaGraph {
   Node divide(Node a, Node b);
   Node raise(Node a, Node exponent);
   Node power(Node a, int exponent);
+  /// `value` where condition > 0, half of it where condition = 0, else 0, and then nothing of `value` is
+  /// left.
+  Node where(Node condition, Node value);
   /// Any other operation of one or two arguments.
   Node apply(Op op, Node a, Node b = none);
 
+  bool as_written() const { return as_written_; }
   const NodeData& operator[](Node node) const { return nodes_[static_cast<std::size_t>(node)]; }
   std::size_t size() const { return nodes_.size(); }
   Known known(Node node) const { return known_[static_cast<std::size_t>(node)]; }
@@ -138,8 +151,11 @@ class FormulaGraph {
   Node fold(const NodeData& node);
   /// ∂node/∂a or ∂node/∂b of a computing node.
   Node partial(Node node, bool second);
+  Node change_of_choice(const NodeData& choice, Node of_a, Node of_b);
   Node rebuild(const NodeData& node);
+  bool may_gather(Node a, Node b) const;
 
+  bool as_written_;
   std::vector<NodeData> nodes_;
   std::vector<Known> known_;
   std::unordered_map<NodeData, Node, Hash> index_;

@@ -33,15 +33,18 @@ constexpr std::array functions{Function{"sin", Op::sin, 1},
                                Function{"sqrt", Op::sqrt, 1},
                                Function{"abs", Op::abs, 1},
                                Function{"pow", Op::pow, 2},
+                               Function{"min", Op::min, 2},
+                               Function{"max", Op::max, 2},
                                Function{"kepler_E", Op::kepler_E, 2, true},
                                Function{"sn", Op::sn, 2, true},
                                Function{"cn", Op::cn, 2, true},
                                Function{"dn", Op::dn, 2, true}};
 
 /// Functions with arguments of their own kind.
-constexpr std::array<std::string_view, 5> forms{"sum", "rate", "diff", "min", "max"};
-constexpr std::array<std::string_view, 12> keys{"t",      "pi",   "kind",   "digits",  "how", "with",
-                                                "source", "name", "method", "project", "for", "each"};
+constexpr std::array<std::string_view, 3> forms{"sum", "rate", "diff"};
+constexpr std::array<std::string_view, 13> keys{"t",    "pi",     "kind", "digits", "how",
+                                                "with", "source", "name", "method", "project",
+                                                "for",  "each",   "guess"};
 
 }  // namespace
 
@@ -238,7 +241,6 @@ class FormulaParser::Reader : FormulaScanner {
     if (name == "sum") return sum(place);
     if (name == "rate") return rate(place);
     if (name == "diff") return diff(place);
-    if (name == "min" || name == "max") return extreme(name == "max");
     const auto function = std::ranges::find(functions, name, &Function::name);
     if (function == functions.end())
       fail(place, "unknown function '" + name + "'" + suggestion(name, function_names()));
@@ -317,17 +319,6 @@ class FormulaParser::Reader : FormulaScanner {
     for (const Node node : graph_.reachable(std::span(&f, 1)))
       if (graph_[node].op == Op::sum || graph_[node].op >= Op::kepler_E)
         fail(place, std::string(form) + " cannot take a sum or a reference function");
-  }
-
-  /// max(a,b) = (a + b + |a−b|)/2, so that it has derivatives.
-  Node extreme(bool largest) {
-    const Node a = expression();
-    expect(',', "',' and the second argument");
-    const Node b = expression();
-    expect(')', "')'");
-    const Node distance = graph_.apply(Op::abs, graph_.subtract(a, b)), both = graph_.add(a, b);
-    return graph_.multiply(graph_.number(0.5),
-                           largest ? graph_.add(both, distance) : graph_.subtract(both, distance));
   }
 
   std::vector<std::string> known_names() const {

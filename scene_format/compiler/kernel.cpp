@@ -156,6 +156,14 @@ const char* function_name(Op op) {
       return "fabs";
     case Op::sign:
       return "diracstep_sign";
+    case Op::min:
+      return "diracstep_min";
+    case Op::max:
+      return "diracstep_max";
+    case Op::hypot:
+      return "hypot";
+    case Op::where:
+      return "diracstep_where";
     default:
       return nullptr;
   }
@@ -278,6 +286,9 @@ typedef struct {
 } diracstep_call;
 typedef void (*diracstep_kernel)(const void*);
 static inline double diracstep_sign(double x) { return x > 0.0 ? 1.0 : x < 0.0 ? -1.0 : 0.0; }
+static inline double diracstep_min(double a, double b) { return a < b || a != a ? a : b; }
+static inline double diracstep_max(double a, double b) { return a > b || a != a ? a : b; }
+static inline double diracstep_where(double a, double b) { return a > 0.0 ? b : a < 0.0 ? 0.0 : b / 2.0; }
 )";
   return text;
 }

@@ -60,6 +60,14 @@ T computed(const NodeData& node, T a, T b) {
       return std::abs(a);
     case Op::sign:
       return a > T(0) ? T(1) : a < T(0) ? T(-1) : T(0);
+    case Op::min:
+      return a < b || std::isnan(a) ? a : b;
+    case Op::max:
+      return a > b || std::isnan(a) ? a : b;
+    case Op::hypot:
+      return std::hypot(a, b);
+    case Op::where:
+      return a > T(0) ? b : a < T(0) ? T(0) : b / T(2);
     case Op::kepler_E:
       return static_cast<T>(kepler_anomaly(a, b));
     case Op::sn:

@@ -33,6 +33,15 @@ PieceBuilder::Matrix PieceBuilder::gradients(const Piece& piece, const std::vect
   return rows;
 }
 
+/// Whether the second derivatives miss something: a jump of the first ones.
+bool PieceBuilder::has_kink(const Piece& piece) const {
+  return std::ranges::any_of(graph_.reachable(piece.outputs), [&](Node node) {
+    const Op op = graph_[node].op;
+    const bool kink = op == Op::abs || op == Op::sign || op == Op::min || op == Op::max || op == Op::where;
+    return kink && varies(node);
+  });
+}
+
 void PieceBuilder::add_kernel(Piece& piece, std::vector<Store> stores) {
   piece.kernels.emplace_back(graph_, std::move(stores), piece.layout, known_, piece.instance);
 }
@@ -40,6 +49,15 @@ void PieceBuilder::add_kernel(Piece& piece, std::vector<Store> stores) {
 void PieceBuilder::add_value(SceneFunction& function, Piece piece) {
   find_slots(piece);
   add_kernel(piece, {{0, Table::fixed, 0, piece.outputs[0]}});
+  function.pieces.push_back(std::move(piece));
+}
+
+void PieceBuilder::add_outputs(SceneFunction& function, Piece piece) {
+  find_slots(piece);
+  std::vector<Store> values;
+  for (std::size_t r = 0; r < piece.outputs.size(); ++r)
+    values.push_back({0, Table::slots, piece.layout.slot_count + static_cast<int>(r), piece.outputs[r]});
+  add_kernel(piece, std::move(values));
   function.pieces.push_back(std::move(piece));
 }
 
@@ -71,6 +89,8 @@ void PieceBuilder::add_phase(SceneFunction& function, Piece piece) {
       if (!zero(fyy[k][l])) function.y_hessian_zero = false;
       if (varies(fxx[k][l]) || varies(fxy[k][l]) || varies(fyy[k][l])) function.quadratic = false;
     }
+
+  if (has_kink(piece)) function.quadratic = function.y_hessian_constant = false;
 
   std::vector<Store> gradient, rate, position_rate;
   const std::vector<Node> fyt = graph_.derivative(fy, graph_.time()),

@@ -16,6 +16,8 @@ class PieceBuilder {
   void add_force(SceneFunction& function, Piece piece);
   /// f alone, without derivatives.
   void add_value(SceneFunction& function, Piece piece);
+  /// The outputs alone, each in the place of its row.
+  void add_outputs(SceneFunction& function, Piece piece);
 
  private:
   using Matrix = std::vector<std::vector<Node>>;
@@ -26,6 +28,7 @@ class PieceBuilder {
   Matrix gradients(const Piece& piece, const std::vector<Node>& roots, Role role);
   bool zero(Node node) const { return graph_.is_number(node, 0.0); }
   bool varies(Node node) const { return graph_.known(node) == Known::each_call; }
+  bool has_kink(const Piece& piece) const;
   void add_kernel(Piece& piece, std::vector<Store> stores);
 
   FormulaGraph& graph_;

@@ -33,10 +33,11 @@ class DocumentReader : TableReader {
 
   SceneDocument read(const toml::table& root) {
     check_keys(root, "the scene",
-               {"name",        "class",       "description", "source",   "needs",          "lagrangian",
-                "hamiltonian", "dissipation", "coordinates", "sizes",    "parameters",     "definitions",
-                "rows",        "force",       "start",       "span",     "reference",      "invariants",
-                "recommended", "inductor",    "capacitor",   "resistor", "source_voltage", "mutual"});
+               {"name",       "class",       "description",    "source",      "needs",
+                "lagrangian", "hamiltonian", "dissipation",    "coordinates", "sizes",
+                "parameters", "definitions", "rows",           "force",       "start",
+                "span",       "reference",   "invariants",     "recommended", "inductor",
+                "capacitor",  "resistor",    "source_voltage", "mutual",      "redundant"});
     read_head(root);
     read_parameters(root, "sizes", true);
     read_parameters(root, "parameters", false);
@@ -84,6 +85,10 @@ class DocumentReader : TableReader {
     document_.description = string(root, "description");
     document_.source = string(root, "source");
     document_.needs = string(root, "needs");
+    const std::string redundant = string(root, "redundant", "refuse");
+    if (redundant != "drop" && redundant != "refuse")
+      fail(place_of(root.get("redundant")->source()), "'redundant': expected \"drop\" or \"refuse\"");
+    document_.drop_redundant_rows = redundant == "drop";
     document_.lagrangian = optional_formula(root, "lagrangian");
     document_.hamiltonian = optional_formula(root, "hamiltonian");
     document_.dissipation = optional_formula(root, "dissipation");
@@ -208,11 +213,21 @@ class DocumentReader : TableReader {
     for (const Item& item : items(root, "start")) {
       if (item.key == "project")
         document_.project = flag(*root["start"].as_table(), "project");
+      else if (item.key == "guess")
+        read_guesses(item);
       else if (item.key == "t")
         document_.start_time = formula(*item.node, "t");
       else
         document_.start.push_back(entry(item));
     }
+  }
+
+  void read_guesses(const Item& item) {
+    const toml::array* list = item.node->as_array();
+    const bool names = list != nullptr && !list->empty() &&
+                       std::ranges::all_of(*list, [](const toml::node& node) { return node.is_string(); });
+    if (!names) fail(item.place, "expected guess = [\"x\", \"v_y\", …], the values that may be moved");
+    for (const toml::node& node : *list) document_.guesses.push_back(formula(node, "guess"));
   }
 
   void read_span(const toml::table& root) {
@@ -275,6 +290,7 @@ class DocumentReader : TableReader {
     const toml::table& table = *node->as_table();
     check_keys(table, "[recommended]", {"method", "order", "step", "end", "tolerance"});
     SceneDocument::Recommended& recommended = document_.recommended;
+    recommended.stated = true;
     recommended.method = string(table, "method", recommended.method);
     const double order = number(table, "order").value_or(0.0);
     recommended.step = number(table, "step").value_or(0.0);

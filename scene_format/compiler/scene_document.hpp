@@ -75,11 +75,12 @@ struct SceneDocument {
     Place place;
   };
   struct Recommended {
-    std::string method = "type1/midpoint";
+    std::string method = "auto";
     int order = 0;           ///< 0: the method's own
     double step = 0.0;       ///< 0: the span's
     double end = 0.0;        ///< 0: the last reference
     double tolerance = 0.0;  ///< relative error in q and v that this reaches; 0: none stated
+    bool stated = false;
   };
 
   std::string file;  ///< its name, for messages
@@ -92,6 +93,8 @@ struct SceneDocument {
   std::vector<Entry> force, start;
   std::optional<FormulaText> start_time;
   bool project = false;
+  std::vector<FormulaText> guesses;  ///< components of the start that projection may move: "b", "v_x[2]"
+  bool drop_redundant_rows = false;
   double t_end = 0.0, step = 0.0, study_end = 0.0;
   std::vector<Reference> references;
   std::vector<Invariant> invariants;

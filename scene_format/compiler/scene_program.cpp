@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <diracstep/scene_format/compiler/circuit_formulas.hpp>
+#include <diracstep/scene_format/compiler/kink_finder.hpp>
 #include <diracstep/scene_format/compiler/piece_builder.hpp>
 #include <diracstep/scene_format/compiler/scene_program.hpp>
 #include <diracstep/scene_format/compiler/sum_terms.hpp>
@@ -35,6 +36,7 @@ class SceneCompiler {
     compile_references();
     compile_invariants();
     write_source();
+    program_.kinks = KinkFinder(program_, builder_).find();
   }
 
  private:
@@ -72,37 +74,45 @@ class SceneCompiler {
 
   SceneFunction phase_function(Node whole, const std::string& what, Place place) {
     SceneFunction function{FunctionKind::phase};
-    bool second = false;
     for (Term& term : terms_.of(whole, {}, what, place)) {
-      second = second || has_velocity(std::span(&term.node, 1));
       Piece piece;
       piece.loops = std::move(term.loops);
       piece.outputs = {term.node};
       builder_.add_phase(function, std::move(piece));
     }
-    if (!second)
-      fail(place, fmt::format("{} contains no {}: nothing would move", what,
-                              what == "the Lagrangian" ? "velocity v_…" : "momentum p_…"));
     return function;
   }
 
   void compile_energies() {
-    if (document_.lagrangian || !document_.branches.empty()) {
-      const Place place =
-          document_.lagrangian ? document_.lagrangian->start : document_.branches.front().place;
-      Node whole = document_.lagrangian
-                       ? parser_.formula(*document_.lagrangian, mechanics("the Lagrangian", 'v'))
-                       : graph_.number(0.0);
-      program_.lagrangian = phase_function(graph_.add(whole, circuit_.lagrangian()), "the Lagrangian", place);
+    const bool massless = !document_.rows.empty() || !document_.branches.empty();  // rows may say what moves
+    if (document_.lagrangian || (massless && !document_.hamiltonian)) compile_lagrangian();
+    if (document_.hamiltonian) {
+      const Node whole = parser_.formula(*document_.hamiltonian, mechanics("the Hamiltonian", 'p'));
+      if (!has_velocity(std::span(&whole, 1)))
+        fail(document_.hamiltonian->start, "the Hamiltonian contains no momentum p_…: nothing would move");
+      program_.hamiltonian = phase_function(whole, "the Hamiltonian", document_.hamiltonian->start);
     }
-    if (document_.hamiltonian)
-      program_.hamiltonian =
-          phase_function(parser_.formula(*document_.hamiltonian, mechanics("the Hamiltonian", 'p')),
-                         "the Hamiltonian", document_.hamiltonian->start);
     if (!program_.lagrangian && !program_.hamiltonian)
       fail({},
            "the scene has neither a 'lagrangian' nor a 'hamiltonian'; these keys stand above the first "
            "[table]");
+  }
+
+  void compile_lagrangian() {
+    const Place place = document_.lagrangian          ? document_.lagrangian->start
+                        : !document_.branches.empty() ? document_.branches.front().place
+                                                      : Place{};
+    Node whole = document_.lagrangian
+                     ? parser_.formula(*document_.lagrangian, mechanics("the Lagrangian", 'v'))
+                     : graph_.number(0.0);
+    whole = graph_.add(whole, circuit_.lagrangian());
+    const std::vector<Node> nodes = graph_.reachable(std::span(&whole, 1));
+    const bool driven = std::ranges::any_of(nodes, [&](Node node) { return graph_[node].op == Op::time; });
+    const bool others = !document_.rows.empty() || !document_.force.empty() || document_.dissipation ||
+                        !document_.branches.empty();
+    if (!has_velocity(std::span(&whole, 1)) && !driven && !others)
+      fail(place, "the Lagrangian contains no velocity v_…: nothing would move");
+    program_.lagrangian = phase_function(whole, "the Lagrangian", place);
   }
 
   // Rows.
@@ -121,7 +131,8 @@ class SceneCompiler {
       rows.push_back({{row.name, loops, row.equation.start},
                       parser_.equation(row.equation, mechanics(what, 'v', loops))});
     }
-    for (const auto& [name, node] : circuit_.current_laws()) rows.push_back({{name, {}, {}}, node});
+    for (const auto& [name, node] : circuit_.current_laws())
+      rows.push_back({{"node_" + name, {}, {}, "Kirchhoff's current law at node '" + name + "'"}, node});
     std::vector<bool> order;  // which kinds there are, by first appearance
     for (const Row& row : rows) {
       const bool holonomic = is_holonomic(row);
@@ -301,9 +312,17 @@ class SceneCompiler {
     if (program_.start_by_momentum && !program_.hamiltonian)
       fail(program_.start.front().place,
            "a start with momenta needs a 'hamiltonian'; give velocities v_… instead");
+    for (const FormulaText& guess : document_.guesses) compile_guess(guess);
     program_.start_time = document_.start_time
                               ? parser_.formula(*document_.start_time, {.what = "the start time"})
                               : graph_.number(0.0);
+  }
+
+  void compile_guess(const FormulaText& guess) {
+    const FormulaText zero{"0", guess.start};
+    program_.guesses.push_back(named_value({guess, {zero}}, {.what = "'guess'"}));
+    if (program_.guesses.back().momentum || program_.start_by_momentum)
+      fail(guess.start, "'guess' is for starts by coordinates and velocities; this one is by momenta");
   }
 
   void compile_references() {
@@ -374,8 +393,9 @@ std::vector<const SceneFunction*> SceneProgram::functions() const {
   return all;
 }
 
-std::unique_ptr<SceneProgram> compile_scene(const std::string& file, const std::string& text) {
-  auto program = std::make_unique<SceneProgram>(read_document(file, text));
+std::unique_ptr<SceneProgram> compile_scene(const std::string& file, const std::string& text,
+                                            bool as_written) {
+  auto program = std::make_unique<SceneProgram>(read_document(file, text), as_written);
   try {
     SceneCompiler(*program).compile();
   } catch (const FormulaGraph::TooLarge&) {

@@ -48,6 +48,7 @@ struct RowGroup {
   std::string name;
   std::vector<int> loops;
   Place place;
+  std::string origin = {};  ///< of rows that the file does not hold
 };
 
 /// A function of the scene as a sum of pieces, and what is known of its second derivatives.
@@ -80,9 +81,18 @@ struct InvariantProgram {
   std::optional<double> value;
 };
 
+/// Where the formulas are not smooth or change fast (core/system/kinks.hpp), each with one output for each
+/// row of its groups.
+struct KinkProgram {
+  SceneFunction kinks{FunctionKind::rows}, ramps{FunctionKind::rows};  ///< switching functions
+  SceneFunction events{FunctionKind::rows};       ///< functions of the time whose zeros are instants,
+  SceneFunction widths{FunctionKind::rows};       ///< and how wide each is there, row by row
+  SceneFunction phase_rates{FunctionKind::rows};  ///< of sines of the time
+};
+
 /// A scene file compiled: everything but the numbers.
 struct SceneProgram {
-  explicit SceneProgram(SceneDocument scene) : document(std::move(scene)) {}
+  SceneProgram(SceneDocument scene, bool as_written) : document(std::move(scene)), graph(as_written) {}
   SceneDocument document;
   FormulaGraph graph;
   Symbols symbols;
@@ -90,10 +100,12 @@ struct SceneProgram {
   std::optional<SceneFunction> lagrangian, hamiltonian, force;
   std::vector<SceneFunction> rows;  ///< holonomic and nonholonomic, in the order they first appear
   std::vector<NamedValue> start;
+  std::vector<NamedValue> guesses;  ///< without values of use: the components of the start that may be moved
   bool start_by_momentum = false;
   Node start_time = none;
   std::vector<ReferenceProgram> references;  ///< as in the document
   std::vector<InvariantProgram> invariants;
+  KinkProgram kinks;
   std::string source;  ///< C for all kernels
   std::string name;    ///< of the source, by its content; the table in it is diracstep_kernels_NAME
 
@@ -101,7 +113,8 @@ struct SceneProgram {
   std::vector<const SceneFunction*> functions() const;
 };
 
-/// Reads, checks and differentiates a scene.  Throws SceneError.
-std::unique_ptr<SceneProgram> compile_scene(const std::string& file, const std::string& text);
+/// Reads, checks and differentiates a scene.  `as_written`: see FormulaGraph.  Throws SceneError.
+std::unique_ptr<SceneProgram> compile_scene(const std::string& file, const std::string& text,
+                                            bool as_written = false);
 
 }  // namespace diracstep::scene_compiler

@@ -2,16 +2,16 @@
 
 #include <algorithm>
 #include <diracstep/scene_format/compiler/sum_terms.hpp>
+#include <functional>
+#include <map>
 
 namespace diracstep::scene_compiler {
 
 namespace {
 
-/// An addend that may still be taken apart: factor · node, summed over the loops.
-struct Part {
-  Node node, factor;
-  std::vector<int> loops;
-};
+/// What a node is summed over, and what the sum is multiplied by.  The largest node comes first, so that all
+/// that holds a node has been taken apart before it is, and a node that is used often is so but once.
+using Parts = std::map<std::pair<Node, std::vector<int>>, Node, std::greater<>>;
 
 }  // namespace
 
@@ -20,32 +20,37 @@ std::vector<Term> SumTerms::of(Node whole, const std::vector<int>& outer, const 
   const std::vector<bool> with_sum = holds_sum(whole);
   const auto has_sum = [&](Node node) { return with_sum[static_cast<std::size_t>(node)]; };
   std::vector<Term> terms;
-  std::vector<Part> parts{{whole, graph_.number(1.0), outer}};
+  Parts parts{{{whole, outer}, graph_.number(1.0)}};
+  const auto add = [&](Node node, std::vector<int> loops, Node factor) {
+    const auto [found, added] = parts.try_emplace({node, std::move(loops)}, factor);
+    if (!added) found->second = graph_.add(found->second, factor);
+  };
   while (!parts.empty()) {
-    Part part = parts.back();
-    parts.pop_back();
-    const NodeData data = graph_[part.node];
-    if (!has_sum(part.node)) {
-      terms.push_back({part.loops, graph_.multiply(part.factor, part.node)});
+    const auto part = parts.extract(parts.begin());
+    const auto& [node, loops] = part.key();
+    const Node factor = part.mapped();
+    const NodeData data = graph_[node];
+    if (!has_sum(node)) {
+      terms.push_back({loops, graph_.multiply(factor, node)});
     } else if (data.op == Op::sum) {
-      part.loops.push_back(data.b);
-      parts.push_back({data.a, part.factor, part.loops});
+      std::vector<int> inner = loops;
+      inner.push_back(data.b);
+      add(data.a, std::move(inner), factor);
     } else if (data.op == Op::add || data.op == Op::subtract) {
-      const Node second = data.op == Op::add ? part.factor : graph_.negative(part.factor);
-      parts.push_back({data.b, second, part.loops});
-      parts.push_back({data.a, part.factor, part.loops});
+      add(data.b, loops, data.op == Op::add ? factor : graph_.negative(factor));
+      add(data.a, loops, factor);
     } else if (data.op == Op::negative) {
-      parts.push_back({data.a, graph_.negative(part.factor), part.loops});
+      add(data.a, loops, graph_.negative(factor));
     } else if (data.op == Op::multiply && !(has_sum(data.a) && has_sum(data.b))) {
       const bool first = has_sum(data.a);
-      parts.push_back(
-          {first ? data.a : data.b, graph_.multiply(part.factor, first ? data.b : data.a), part.loops});
+      add(first ? data.a : data.b, loops, graph_.multiply(factor, first ? data.b : data.a));
     } else if (data.op == Op::divide && !has_sum(data.b)) {
-      parts.push_back({data.a, graph_.divide(part.factor, data.b), part.loops});
+      add(data.a, loops, graph_.divide(factor, data.b));
     } else {
-      refuse(part.node, what, place);
+      refuse(node, what, place);
     }
   }
+  std::ranges::reverse(terms);  // as they stand in the file
   return joined(std::move(terms), outer);
 }
 

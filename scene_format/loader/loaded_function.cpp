@@ -42,6 +42,11 @@ void LoadedFunction::place_rows() {
   }
 }
 
+const std::string& LoadedFunction::row_origin(int row) const {
+  const auto after = std::ranges::upper_bound(first_rows_, row);
+  return function_->groups[static_cast<std::size_t>(after - first_rows_.begin()) - 1].origin;
+}
+
 int LoadedFunction::coordinate(const Evaluator& body, std::size_t root, Node leaf, const Turns& turns) const {
   const SceneProgram& program = *scene_->program;
   const NodeData& data = program.graph[leaf];
@@ -81,7 +86,7 @@ void LoadedFunction::load(const Piece& piece) {
       loaded.slots.push_back(first_rows_[static_cast<std::size_t>(group)] +
                              (piece.counting_loops > 0 ? static_cast<int>(row) : 0));
     for (std::size_t k = first_constant; k < roots.size(); ++k)
-      loaded.instance.push_back(static_cast<double>(body.value(k)));
+      loaded.instance.push_back(constant(program, body.value(k)));
     ++loaded.count;
   });
   pieces_.push_back(std::move(loaded));

@@ -18,6 +18,8 @@ class LoadedFunction {
 
   const scene_compiler::SceneFunction& function() const { return *function_; }
   const std::vector<std::string>& row_names() const { return row_names_; }
+  /// Where a row comes from that the file does not hold; empty for others.
+  const std::string& row_origin(int row) const;
   int dimension() const { return scene_->layout.dimension(); }
 
   /// (i, j) of all derivatives: rows and coordinates for rows, else coordinates twice.

@@ -1,8 +1,16 @@
+#include <cmath>
 #include <diracstep/scene_format/loader/loaded_scene.hpp>
 
 namespace diracstep {
 
 using namespace scene_compiler;
+
+double constant(const SceneProgram& program, long double value) {
+  const auto rounded = static_cast<double>(value);
+  const bool kept = std::isnormal(rounded) || static_cast<long double>(rounded) == value;
+  if (!kept && std::isfinite(value) && !program.graph.as_written()) throw ConstantOutOfRange();
+  return rounded;
+}
 
 LoadedScene::LoadedScene(std::unique_ptr<const SceneProgram> compiled, ParameterValues values)
     : program(std::move(compiled)),
@@ -12,7 +20,7 @@ LoadedScene::LoadedScene(std::unique_ptr<const SceneProgram> compiled, Parameter
   Evaluator evaluator(*program, parameters, program->known.nodes());
   evaluator.evaluate();
   for (std::size_t i = 0; i < program->known.nodes().size(); ++i)
-    known.push_back(static_cast<double>(evaluator.value(i)));
+    known.push_back(constant(*program, evaluator.value(i)));
 }
 
 }  // namespace diracstep

@@ -7,6 +7,13 @@
 
 namespace diracstep {
 
+/// Thrown where a subexpression of the parameters, gathered to save time, leaves the range of doubles: the
+/// formulas must be computed as written (FormulaGraph).
+struct ConstantOutOfRange {};
+
+/// The value as a double.  Throws ConstantOutOfRange where it loses its size, unless formulas are as written.
+double constant(const scene_compiler::SceneProgram& program, long double value);
+
 /// A scene file with its parameters set: all that its functions share.
 struct LoadedScene {
   LoadedScene(std::unique_ptr<const scene_compiler::SceneProgram> compiled,

@@ -116,6 +116,8 @@ class FileRows final : public ConstraintRows {
     });
   }
 
+  std::string origin(int row) const override { return function_.row_origin(row); }
+
   void position(double t, ConstVectorRef q, VectorRef phi) const override {
     if (!holonomic()) return ConstraintRows::position(t, q, phi);
     clear(phi);

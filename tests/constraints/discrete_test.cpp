@@ -38,6 +38,27 @@ TEST(OwnDiscreteConstraint, AMidpointRuleWrittenOutIsTheBuiltInOne) {
                      midpoint_rows(), 1e-12);
 }
 
+/// Rows that are right where the motion starts, at x = x̂, and not elsewhere: the coefficient of dz is off by
+/// (x − x̂)².
+TEST(OwnDiscreteConstraint, RowsThatGoWrongOnTheWayFailThatStep) {
+  const auto scene = testing::nonholonomic();
+  const double at = scene->start.q[0];
+  const auto rows =
+      discrete_rows<3, 1>([at]<class T>(const std::array<T, 3>& q0, const std::array<T, 3>& q1) {
+        const T off = q0[0] - at;
+        return std::array<T, 1>{q1[0] - q0[0] + (0.5 * (q0[1] + q1[1]) + off * off) * (q1[2] - q0[2])};
+      });
+  Integrator integrator(scene, Registry::with_built_ins(), kinsol(),
+                        {.method = "type1/midpoint", .step = 0.05, .constraint_rule = rows});
+  StepReport report;
+  int taken = 0;
+  for (; taken < 100; ++taken)
+    if (report = integrator.step(); !report.ok()) break;
+  EXPECT_LT(taken, 100);
+  EXPECT_GT(taken, 0);
+  EXPECT_NE(report.failure.find("(4.18)"), std::string::npos) << report.failure;
+}
+
 TEST(OwnDiscreteConstraint, StandsInForTheNonholonomicRowsAmongOthers) {
   const auto rows = discrete_rows<3, 1>([]<class T>(const std::array<T, 3>& q0, const std::array<T, 3>& q1) {
     return std::array<T, 1>{q1[0] - q0[0] + (2.0 + 0.5 * (q0[1] + q1[1])) * (q1[2] - q0[2])};

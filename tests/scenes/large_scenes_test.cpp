@@ -3,6 +3,7 @@
 #include <diracstep/core/integrator/integrator.hpp>
 #include <diracstep/core/steps/matrix_form.hpp>
 #include <diracstep/core/system/consistent_start.hpp>
+#include <diracstep/core/system/redundant_rows.hpp>
 #include <diracstep/scene_format/scene_catalogue.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
 

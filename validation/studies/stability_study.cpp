@@ -8,6 +8,7 @@
 #include <diracstep/core/runs/run.hpp>
 #include <diracstep/core/runs/run_checks.hpp>
 #include <diracstep/core/system/consistent_start.hpp>
+#include <diracstep/core/system/redundant_rows.hpp>
 #include <diracstep/validation/references/ida_reference.hpp>
 #include <diracstep/validation/studies/stability_study.hpp>
 #include <diracstep/validation/studies/study_run.hpp>

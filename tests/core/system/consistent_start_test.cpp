@@ -2,6 +2,7 @@
 
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/system/consistent_start.hpp>
+#include <diracstep/core/system/redundant_rows.hpp>
 
 #include "scenes.hpp"
 #include "stepping.hpp"

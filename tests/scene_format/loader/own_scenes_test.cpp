@@ -36,13 +36,13 @@ INSTANTIATE_TEST_SUITE_P(Examples, OwnScenes,
 TEST(Schema, HasTheKeysOfTheReader) {
   std::ifstream file(DIRACSTEP_SCHEMA);
   const auto schema = nlohmann::json::parse(file)["properties"];
-  for (const char* key :
-       {"name",        "class",       "description", "source",   "needs",          "lagrangian",
-        "hamiltonian", "dissipation", "coordinates", "sizes",    "parameters",     "definitions",
-        "rows",        "force",       "start",       "span",     "reference",      "invariants",
-        "recommended", "inductor",    "capacitor",   "resistor", "source_voltage", "mutual"})
+  for (const char* key : {"name",       "class",       "description",    "source",      "needs",
+                          "lagrangian", "hamiltonian", "dissipation",    "coordinates", "sizes",
+                          "parameters", "definitions", "rows",           "force",       "start",
+                          "span",       "reference",   "invariants",     "recommended", "inductor",
+                          "capacitor",  "resistor",    "source_voltage", "mutual",      "redundant"})
     EXPECT_TRUE(schema.contains(key)) << key;
-  EXPECT_EQ(schema.size(), 24u);
+  EXPECT_EQ(schema.size(), 25u);
 }
 
 }  // namespace

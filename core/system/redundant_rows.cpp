@@ -1,0 +1,257 @@
+#include <Eigen/QR>
+#include <Eigen/SVD>
+#include <Eigen/SparseCholesky>
+#include <algorithm>
+#include <cmath>
+#include <diracstep/core/system/redundant_rows.hpp>
+#include <optional>
+#include <set>
+
+namespace diracstep {
+
+namespace {
+
+/// Some rows of a block, in order.
+class RowSubset final : public ConstraintRows {
+ public:
+  RowSubset(std::shared_ptr<const ConstraintRows> block, std::vector<int> kept)
+      : ConstraintRows(block->holonomic(), subset(block->pattern(), kept), block->curvature_pattern(),
+                       names_of(*block, kept)),
+        block_(std::move(block)),
+        kept_(std::move(kept)) {
+    const std::vector<int> numbers = numbers_of(block_->rows(), kept_);
+    int k = 0;
+    for (const auto& [row, column] : block_->pattern().entries()) {
+      if (numbers[static_cast<std::size_t>(row)] >= 0) places_.push_back(k);
+      ++k;
+    }
+  }
+
+  bool constant() const override { return block_->constant(); }
+  std::string origin(int row) const override { return block_->origin(kept_[static_cast<std::size_t>(row)]); }
+  void position(double t, ConstVectorRef q, VectorRef phi) const override {
+    Vector all(block_->rows());
+    block_->position(t, q, all);
+    take_rows(all, phi);
+  }
+  void coefficients(double t, ConstVectorRef q, VectorRef a, VectorRef b) const override {
+    Vector all(block_->pattern().nonzeros()), offset(block_->rows());
+    block_->coefficients(t, q, all, offset);
+    take_values(all, a);
+    take_rows(offset, b);
+  }
+  void derivative(double t, ConstVectorRef q, ConstVectorRef w, double s, VectorRef d) const override {
+    Vector all(block_->pattern().nonzeros());
+    block_->derivative(t, q, w, s, all);
+    take_values(all, d);
+  }
+  void time_derivative(double t, ConstVectorRef q, ConstVectorRef v, VectorRef d) const override {
+    Vector all(block_->rows());
+    block_->time_derivative(t, q, v, all);
+    take_rows(all, d);
+  }
+  void annihilator_derivative(double t, ConstVectorRef q, ConstVectorRef lambda, VectorRef d) const override {
+    Vector all = Vector::Zero(block_->rows());
+    for (std::size_t r = 0; r < kept_.size(); ++r) all[kept_[r]] = lambda[static_cast<Eigen::Index>(r)];
+    block_->annihilator_derivative(t, q, all, d);
+  }
+
+ private:
+  /// The number of each row among the kept ones; -1 for those left out.
+  static std::vector<int> numbers_of(int rows, const std::vector<int>& kept) {
+    std::vector<int> numbers(static_cast<std::size_t>(rows), -1);
+    for (std::size_t r = 0; r < kept.size(); ++r)
+      numbers[static_cast<std::size_t>(kept[r])] = static_cast<int>(r);
+    return numbers;
+  }
+  static SparsityPattern subset(const SparsityPattern& pattern, const std::vector<int>& kept) {
+    const std::vector<int> numbers = numbers_of(pattern.rows(), kept);
+    std::vector<std::pair<int, int>> entries;
+    for (const auto& [row, column] : pattern.entries())
+      if (const int number = numbers[static_cast<std::size_t>(row)]; number >= 0)
+        entries.emplace_back(number, column);
+    return {static_cast<int>(kept.size()), pattern.columns(), entries};
+  }
+  static std::vector<std::string> names_of(const ConstraintRows& block, const std::vector<int>& kept) {
+    std::vector<std::string> names;
+    for (const int row : kept) names.push_back(block.names()[static_cast<std::size_t>(row)]);
+    return names;
+  }
+  void take_rows(const Vector& all, VectorRef out) const {
+    for (std::size_t r = 0; r < kept_.size(); ++r) out[static_cast<Eigen::Index>(r)] = all[kept_[r]];
+  }
+  void take_values(const Vector& all, VectorRef out) const {
+    for (std::size_t k = 0; k < places_.size(); ++k) out[static_cast<Eigen::Index>(k)] = all[places_[k]];
+  }
+
+  std::shared_ptr<const ConstraintRows> block_;
+  std::vector<int> kept_;    ///< ascending, so the entries keep their order
+  std::vector<int> places_;  ///< values of the kept rows among all
+};
+
+/// Up to so many rows full matrices take less time.
+constexpr int max_rows_in_full = 100;
+
+Eigen::SparseMatrix<double> sparse_one_forms(const ConstraintsAtPoint& rows) {
+  const SparsityPattern& pattern = rows.pattern();
+  Eigen::SparseMatrix<double> one_forms =
+      Eigen::Map<const Eigen::SparseMatrix<double>>(pattern.rows(), pattern.columns(), pattern.nonzeros(),
+                                                    pattern.column_starts().data(),
+                                                    pattern.row_indices().data(), rows.coefficients().data())
+          .transpose();
+  for (int r = 0; r < pattern.rows(); ++r)
+    if (const double size = one_forms.col(r).norm(); size > 0.0) one_forms.col(r) /= size;
+  return one_forms;
+}
+
+/// The pivots of the Gram matrix are squared distances from the columns before.  The shift keeps those that
+/// vanish from dividing, and 1e-12 is what round-off leaves to be told from zero.
+std::vector<int> dependent_sparse_columns(const Eigen::SparseMatrix<double>& one_forms, double tolerance) {
+  const Eigen::SparseMatrix<double> products = one_forms.transpose() * one_forms;
+  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factors;
+  factors.setShift(1e-14);
+  factors.compute(products);
+  const Vector pivots = factors.vectorD();
+  const auto& order = factors.permutationPinv().indices();
+  std::vector<int> dependent;
+  for (Eigen::Index k = 0; k < pivots.size(); ++k)
+    if (!(pivots[k] > std::max(tolerance * tolerance, 1e-12))) dependent.push_back(order[k]);
+  return dependent;
+}
+
+/// One-forms at the start, and at poses around it that the rows allow.
+std::vector<Columns> one_forms_around(const Scene& scene, const Start& start) {
+  ConstraintsAtPoint rows(scene.constraints, scene.dimension());
+  const auto at = [&](const Vector& q) {
+    rows.evaluate(start.time, q);
+    return full_one_forms(rows);
+  };
+  std::vector<Columns> all{at(start.q)};
+  const ConstraintBlocks holonomic = only_holonomic(scene.constraints);
+  const double size = std::max(start.q.lpNorm<Eigen::Infinity>(), 1e-2);
+  for (const double distance : {-0.3, -0.1, 0.1, 0.3}) {
+    Vector q = start.q;
+    for (Eigen::Index i = 0; i < q.size(); ++i)
+      q[i] += distance * size * std::sin(1.0 + 1.7 * static_cast<double>(i));
+    const auto pose = pose_near(holonomic, start.time, q, {});
+    if (!pose) continue;
+    if (Columns there = at(*pose); there.allFinite()) all.push_back(std::move(there));
+  }
+  return all;
+}
+
+/// The smallest singular value of the columns that are left, over all poses.
+double margin_without(const std::vector<int>& dropped, const std::vector<Columns>& poses) {
+  double least = HUGE_VAL;
+  for (const Columns& one_forms : poses) {
+    Columns kept(one_forms.rows(), one_forms.cols() - static_cast<Eigen::Index>(dropped.size()));
+    Eigen::Index k = 0;
+    for (Eigen::Index c = 0; c < one_forms.cols(); ++c)
+      if (std::ranges::find(dropped, c) == dropped.end()) kept.col(k++) = one_forms.col(c);
+    if (kept.cols() == 0) continue;
+    least = std::min(least, kept.jacobiSvd().singularValues().minCoeff());
+  }
+  return least;
+}
+
+/// Of the choices that each pose would make the one that suits all best.
+std::vector<int> best_choice(std::vector<int> at_start, const std::vector<Columns>& poses, double tolerance) {
+  constexpr double clearly = 2.0;
+  double best = margin_without(at_start, poses);
+  for (std::size_t k = 1; k < poses.size(); ++k) {
+    std::vector<int> other = dependent_columns(poses[k], tolerance);
+    if (other.size() != at_start.size()) continue;
+    const double margin = margin_without(other, poses);
+    if (margin <= clearly * best) continue;
+    best = margin;
+    at_start = std::move(other);
+  }
+  return at_start;
+}
+
+}  // namespace
+
+std::optional<Vector> pose_near(const ConstraintBlocks& holonomic, double t, Vector q,
+                                const std::vector<int>& held) {
+  constexpr int most = 50;
+  constexpr double small = 1e-10, dependent = 1e-6;
+  ConstraintsAtPoint rows(holonomic, static_cast<int>(q.size()));
+  for (int iteration = 0; rows.rows() > 0 && iteration < most; ++iteration) {
+    Vector phi(rows.rows());
+    int row = 0;
+    for (const auto& block : holonomic) {
+      block->position(t, q, phi.segment(row, block->rows()));
+      row += block->rows();
+    }
+    rows.evaluate(t, q);
+    Columns a = rows.pattern().full(rows.coefficients());
+    for (const int i : held) a.col(i).setZero();
+    if (!phi.allFinite() || !a.allFinite()) return std::nullopt;
+    Eigen::CompleteOrthogonalDecomposition<Columns> solver;
+    solver.setThreshold(dependent);
+    solver.compute(a);
+    const Vector change = solver.solve(phi);
+    q -= change;
+    if (change.norm() <= small * (1.0 + q.norm())) return q;
+    if (iteration + 1 == most) return std::nullopt;
+  }
+  return q;
+}
+
+Columns full_one_forms(const ConstraintsAtPoint& rows, const std::vector<int>& held) {
+  Columns one_forms = rows.pattern().full(rows.coefficients()).transpose();
+  for (const int i : held) one_forms.row(i).setZero();
+  for (auto column : one_forms.colwise())
+    if (const double size = column.norm(); size > 0.0) column /= size;
+  return one_forms;
+}
+
+std::vector<int> dependent_columns(const Columns& one_forms, double tolerance) {
+  Eigen::ColPivHouseholderQR<Columns> qr;
+  qr.setThreshold(tolerance);
+  qr.compute(one_forms);
+  const auto& order = qr.colsPermutation().indices();
+  return {order.data() + qr.rank(), order.data() + order.size()};
+}
+
+std::vector<std::string> redundant_rows(const Scene& scene, const Start& start, double tolerance) {
+  if (scene.rows() == 0) return {};
+  ConstraintsAtPoint rows(scene.constraints, scene.dimension());
+  rows.evaluate(start.time, start.q);
+  const bool full = scene.rows() <= max_rows_in_full;
+  std::vector<int> numbers = full ? dependent_columns(full_one_forms(rows), tolerance)
+                                  : dependent_sparse_columns(sparse_one_forms(rows), tolerance);
+  if (numbers.empty()) return {};
+  if (full) numbers = best_choice(std::move(numbers), one_forms_around(scene, start), tolerance);
+  const std::vector<std::string> names = scene.row_names();
+  std::vector<std::string> dependent;
+  for (const int r : numbers) dependent.push_back(names[static_cast<std::size_t>(r)]);
+  std::ranges::sort(dependent);
+  return dependent;
+}
+
+bool singular_at_start_only(const Scene& scene, const Start& start, double tolerance) {
+  if (scene.rows() == 0 || scene.rows() > max_rows_in_full) return false;
+  const std::vector<Columns> poses = one_forms_around(scene, start);
+  const std::size_t here = dependent_columns(poses[0], tolerance).size();
+  return std::ranges::any_of(
+      poses, [&](const Columns& there) { return dependent_columns(there, tolerance).size() < here; });
+}
+
+std::shared_ptr<const Scene> without_rows(const Scene& scene, const std::vector<std::string>& names) {
+  auto copy = std::make_shared<Scene>(scene);
+  copy->constraints.clear();
+  const std::set<std::string> left_out(names.begin(), names.end());
+  for (const auto& block : scene.constraints) {
+    std::vector<int> kept;
+    for (int r = 0; r < block->rows(); ++r)
+      if (!left_out.contains(block->names()[static_cast<std::size_t>(r)])) kept.push_back(r);
+    if (static_cast<int>(kept.size()) == block->rows())
+      copy->constraints.push_back(block);
+    else if (!kept.empty())
+      copy->constraints.push_back(std::make_shared<const RowSubset>(block, kept));
+  }
+  return copy;
+}
+
+}  // namespace diracstep

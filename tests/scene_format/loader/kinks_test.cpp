@@ -1,0 +1,97 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <diracstep/scene_format/scene_file.hpp>
+
+/// What the compiler knows of kinks, steep ramps and pulses.
+namespace diracstep {
+namespace {
+
+std::shared_ptr<const Kinks> kinks_of(const std::string& force, const std::string& more = "") {
+  return scene_from_text("kinks.toml", "name = \"kinks\"\nlagrangian = \"v_x^2/2 - x^2/2\"\n" + more +
+                                           "[coordinates]\nx = {}\n[parameters]\non = 1.0007\noff = 2.5003\n"
+                                           "steep = 1e9\nw = 0.001\n[force]\nx = \"" +
+                                           force + "\"\n[span]\nend = 10\nstep = 0.1\n")
+      .scene->kinks;
+}
+
+Vector one(double x) { return Vector::Constant(1, x); }
+
+TEST(Kinks, SmoothScenesHaveNone) {
+  EXPECT_EQ(kinks_of("-v_x"), nullptr);
+  EXPECT_EQ(kinks_of("-min(on, off)*v_x"), nullptr) << "a choice between parameters does not switch";
+}
+
+TEST(Kinks, SwitchingFunctionsChangeSignWhereDerivativesJump) {
+  const auto kinks = kinks_of("abs(x - 2) + min(v_x, 3*t) - tanh(steep*(x - 1))");
+  ASSERT_NE(kinks, nullptr);
+  ASSERT_EQ(kinks->count(), 3);
+  EXPECT_EQ(kinks->kinds(), (std::vector{Kinks::Kind::kink, Kinks::Kind::kink, Kinks::Kind::ramp}));
+  Vector g(3);
+  kinks->evaluate(0.5, one(2.25), one(2.0), g);
+  EXPECT_EQ(g[0], 0.25);
+  EXPECT_EQ(g[1], 0.5);
+  EXPECT_NEAR(g[2], 1.25e9, 1.0);
+  EXPECT_EQ(kinks->names()[0], "abs in line 11");
+  EXPECT_TRUE(kinks->instants(0.0, 10.0).empty()) << "where these lie depends on the motion";
+}
+
+TEST(Kinks, TimesOfSwitchesAndPulsesAreExact) {
+  const auto switched = kinks_of("min(1, max(0, steep*(t - on))) - min(1, max(0, steep*(t - off)))");
+  const auto at = switched->instants(0.0, 10.0);
+  ASSERT_EQ(at.size(), 4u);
+  for (const Kinks::Instant& instant : at) EXPECT_EQ(instant.width, 0.0);
+  EXPECT_NEAR(at[0].time, 1.0007, 1e-14);
+  EXPECT_NEAR(at[1].time, 1.0007 + 1e-9, 1e-14);
+  EXPECT_NEAR(at[2].time, 2.5003, 1e-14);
+  EXPECT_NEAR(at[3].time, 2.5003 + 1e-9, 1e-14);
+  EXPECT_EQ(switched->instants(1.1, 2.4).size(), 0u);
+
+  const auto narrowest = [](const std::shared_ptr<const Kinks>& kinks) {
+    Kinks::Instant best{0.0, HUGE_VAL};
+    for (const Kinks::Instant& instant : kinks->instants(0.0, 10.0))
+      if (instant.width < best.width) best = instant;
+    return best;
+  };
+  for (const char* pulse :
+       {"500*exp(-((t - 4.3)/w)^2)", "exp(-1e6*(t - 4.3)^2)", "1/(1 + ((t - 4.3)/w)^2)",
+        "1/cosh((t - 4.3)/w)", "tanh((t - 4.3)/w)", "1/(1 + exp(-(t - 4.3)/w))", "atan(1000*t - 4300)"}) {
+    const Kinks::Instant found = narrowest(kinks_of(pulse));
+    EXPECT_NEAR(found.time, 4.3, 1e-12) << pulse;
+    EXPECT_NEAR(found.width, 1e-3, 5e-4) << pulse;
+  }
+}
+
+TEST(Kinks, ZerosOfOtherFunctionsOfTheTimeAreFound) {
+  const auto kinks = kinks_of("abs(sin(300*t))");
+  const auto at = kinks->instants(0.0, 10.0);
+  ASSERT_EQ(at.size(), 955u);  // k π/300 up to 10, with k = 0
+  for (std::size_t k = 0; k < at.size(); ++k)
+    EXPECT_NEAR(at[k].time, static_cast<double>(k) * M_PI / 300.0, 1e-12);
+}
+
+TEST(Kinks, RepeatedElementsHaveTheirOwn) {
+  const CatalogueScene entry = scene_from_text("chain.toml", R"toml(
+name = "chain"
+lagrangian = "sum(j = 1..N, v_y[j]^2/2 - max(0, -y[j])^2.5) - sum(j = 1..N, y[j]*min(1, t))"
+[sizes]
+N = 5
+[coordinates]
+y = { for = "j = 1..N" }
+[span]
+end = 1
+step = 0.1
+)toml");
+  const auto kinks = entry.scene->kinks;
+  ASSERT_EQ(kinks->count(), 6) << "one for each element, and one that they share";
+  Vector y = Vector::LinSpaced(5, -1.0, 1.0), g(6);
+  kinks->evaluate(0.25, y, y, g);
+  EXPECT_EQ((g.array() == 0.75).count(), 1);
+  EXPECT_EQ((g.array() > 0.0).count(), 3);
+  const auto instants = kinks->instants(0.0, 2.0);
+  ASSERT_EQ(instants.size(), 1u);
+  EXPECT_NEAR(instants[0].time, 1.0, 1e-14);
+}
+
+}  // namespace
+}  // namespace diracstep
