@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <diracstep/core/adaptive/adaptive_integrator.hpp>
+#include <diracstep/core/adaptive/variable_run_checks.hpp>
 #include <diracstep/core/methods/composition.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <sstream>
@@ -101,7 +102,15 @@ void AdaptiveIntegrator::reset() {
   throw Misuse("scene '" + main_.scene().name + "': " + rate_.failure);
 }
 
-/// v, ω and, if asked for, d(ln ω)/dt at the current node.
+double AdaptiveIntegrator::largest_rate() const {
+  const double start = main_.scene().start.time;
+  const double span = std::abs(adaptive_.end.value_or(start + 100.0 * options_.step) - start);
+  const double smallest = adaptive_.smallest_step > 0.0 ? adaptive_.smallest_step : 1e-9 * span;
+  return adaptive_.eps / smallest;
+}
+
+/// v, ω and, if asked for, d(ln ω)/dt at the current node.  ω is bounded from above, by a number that is even
+/// in v as ω is.
 bool AdaptiveIntegrator::measure(bool growth) {
   const double t = main_.time();
   const SolveReport report = meter_.motion().velocity(t, main_.position(), main_.momentum(), v_);
@@ -111,6 +120,7 @@ bool AdaptiveIntegrator::measure(bool growth) {
     rate_ = growth ? meter_.rate_and_growth(t, main_.position(), v_, next_size_)
                    : meter_.rate(t, main_.position(), v_, next_size_);
   if (!rate_.ok()) return false;
+  if (const double largest = largest_rate(); rate_.rate > largest) rate_ = {largest, 0.0, {}};
   report_.slowest = std::min(report_.slowest, rate_.rate);
   report_.fastest = std::max(report_.fastest, rate_.rate);
   return true;
@@ -145,6 +155,9 @@ void AdaptiveIntegrator::note(double size) {
 }
 
 StepReport AdaptiveIntegrator::step() {
+  if (work().steps >= adaptive_.max_steps)
+    return failed(std::to_string(adaptive_.max_steps) +
+                  " steps did not reach the end; take a larger eps, a fixed step, or more steps");
   const long before = meter_.motion().accelerations();
   StepReport report;
   if (adaptive_.control == StepControl::in_step) {
@@ -262,10 +275,23 @@ void require_ahead(double from, double to, double direction) {
   throw Misuse("t = " + text(to) + " does not lie ahead of t = " + text(from));
 }
 
+StepReport checked_step(AdaptiveIntegrator& integrator, VariableRunChecks* checks) {
+  if (checks != nullptr) checks->before_step();
+  StepReport report = integrator.step();
+  if (checks != nullptr && report.ok()) checks->after_step();
+  return report;
+}
+
+/// Shows a point to the checks and to the observer; whether the run goes on.
+bool shown(const Sample& sample, const Observer& observer, VariableRunChecks* checks) {
+  if (checks != nullptr) checks->see(sample);
+  return !observer || observer(sample);
+}
+
 }  // namespace
 
 RunReport run_at(AdaptiveIntegrator& integrator, std::span<const double> times, Momentum momentum,
-                 const Observer& observer) {
+                 const Observer& observer, VariableRunChecks* checks) {
   double last = integrator.time();
   for (const double t : times) {
     require_ahead(last, t, integrator.next_size());
@@ -275,17 +301,17 @@ RunReport run_at(AdaptiveIntegrator& integrator, std::span<const double> times, 
   Sample sample;
   for (const double t : times) {
     while (!reaches(integrator.time(), integrator.next_size(), t)) {
-      report.last = integrator.step();
+      report.last = checked_step(integrator, checks);
       if (!report.last.ok()) return report;
     }
     report.last = integrator.sample_at(t, momentum, sample);
-    if (!report.last.ok() || (observer && !observer(sample))) return report;
+    if (!report.last.ok() || !shown(sample, observer, checks)) return report;
   }
   return report;
 }
 
 RunReport run(AdaptiveIntegrator& integrator, double end, Momentum momentum, long every,
-              const Observer& observer) {
+              const Observer& observer, VariableRunChecks* checks) {
   if (every < 1) throw Misuse("every = " + std::to_string(every) + "; 1 or more is needed");
   require_ahead(integrator.time(), end, integrator.next_size());
   RunReport report;
@@ -293,15 +319,15 @@ RunReport run(AdaptiveIntegrator& integrator, double end, Momentum momentum, lon
   for (long k = 0;; ++k) {
     if (k % every == 0) {
       report.last = integrator.sample_at(integrator.time(), momentum, sample);
-      if (!report.last.ok() || (observer && !observer(sample))) return report;
+      if (!report.last.ok() || !shown(sample, observer, checks)) return report;
     }
     if (reaches(integrator.time(), integrator.next_size(), end)) break;
-    report.last = integrator.step();
+    report.last = checked_step(integrator, checks);
     if (!report.last.ok()) return report;
   }
   if (integrator.time() == end && integrator.work().steps % every == 0) return report;
   report.last = integrator.sample_at(end, momentum, sample);
-  if (report.last.ok() && observer) observer(sample);
+  if (report.last.ok()) shown(sample, observer, checks);
   return report;
 }
 

@@ -35,6 +35,8 @@ struct AdaptiveOptions {
   MonitorScales scales = {};       ///< of the generic monitor; zeros are taken from a survey towards `end`
   std::optional<double> end = {};  ///< where the motion will end, for the survey; 100 steps of the options'
                                    ///< size without it
+  double smallest_step = 0.0;    ///< without sign: ω counts as at most eps over it; 0: 1e-9 of the time to `end`
+  long max_steps = 10'000'000;   ///< the next one fails
 };
 
 /// What the control did since the start.
@@ -89,6 +91,7 @@ class AdaptiveIntegrator {
   StepReport control_step(double size);
   StepReport solve_size(double eps, double guess, double& size);
   bool measure(bool growth);
+  double largest_rate() const;
   bool start_control();
   StepReport failed(const std::string& what) const;
   void note(double size);
@@ -111,13 +114,16 @@ class AdaptiveIntegrator {
   std::vector<Sizes> last_sizes_;  ///< of each part
 };
 
+class VariableRunChecks;
+
 /// Steps to `end` and shows the start, every `every`-th node and the end itself, which a side step reaches.
+/// `checks`, where given, see the same points and every step.
 RunReport run(AdaptiveIntegrator& integrator, double end, Momentum momentum, long every,
-              const Observer& observer);
+              const Observer& observer, VariableRunChecks* checks = nullptr);
 
 /// Shows the motion at the given times, which must run from the start in the direction of the motion, by side
 /// steps.  Throws Misuse for times out of order.
 RunReport run_at(AdaptiveIntegrator& integrator, std::span<const double> times, Momentum momentum,
-                 const Observer& observer);
+                 const Observer& observer, VariableRunChecks* checks = nullptr);
 
 }  // namespace diracstep

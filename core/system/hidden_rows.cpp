@@ -134,6 +134,9 @@ class HiddenRows final : public ConstraintRows {
   HiddenRows(const Scene& scene, bool holonomic, const Columns& directions, const Vector& units)
       : HiddenRows(scene, holonomic, in_units(directions, units), directions, pattern_of(directions)) {}
 
+  /// They follow from the equations of motion, so that their forces are zero.
+  bool workless() const override { return true; }
+
   void position(double t, ConstVectorRef q, VectorRef phi) const override { force_along(t, q, phi); }
 
   void coefficients(double t, ConstVectorRef q, VectorRef a, VectorRef b) const override {

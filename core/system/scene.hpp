@@ -2,7 +2,9 @@
 
 #include <diracstep/core/system/constraint_rows.hpp>
 #include <diracstep/core/system/force.hpp>
+#include <diracstep/core/system/kinks.hpp>
 #include <diracstep/core/system/phase_function.hpp>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -32,6 +34,10 @@ struct Scene {
   ConstraintBlocks constraints;
   std::shared_ptr<const Force> force;  ///< null where there is none
   Start start;
+  std::shared_ptr<const Kinks> kinks = {};  ///< null where nothing is known of any
+  /// Empty, or says after use why the functions above are not to be believed, as derivatives by differences
+  /// that two step sizes do not agree on.
+  std::function<std::string()> doubt = {};
 
   int dimension() const { return static_cast<int>(coordinates.size()); }
   int rows() const { return row_count(constraints); }

@@ -91,7 +91,8 @@ class FilePhaseFunction final : public Base {
 
  private:
   static PhaseStructure structure_of(const SceneFunction& f) {
-    return {f.separable, f.y_hessian_constant, f.y_hessian_diagonal, f.quadratic, f.y_hessian_zero};
+    return {f.separable, f.y_hessian_constant, f.y_hessian_diagonal,
+            f.quadratic, f.y_hessian_zero,     f.autonomous};
   }
 
   LoadedFunction function_;
@@ -115,6 +116,8 @@ class FileRows final : public ConstraintRows {
                                  [&](std::size_t number) { return piece.kernels[number].empty(); });
     });
   }
+
+  bool workless() const override { return function_.function().workless; }
 
   void position(double t, ConstVectorRef q, VectorRef phi) const override {
     if (!holonomic()) return ConstraintRows::position(t, q, phi);

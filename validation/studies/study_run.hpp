@@ -40,7 +40,7 @@ struct StudyRow {
   double error_p = none;
   double self_error = none;  ///< a baseline's: how far its result is from that of the next tighter tolerance
   double constraint = none;  ///< largest |φ(q)| and |A(q)v + b| at the end
-  double energy_error = none;  ///< |E(end) − E(start)| / max(|E(start)|, 1)
+  double energy_error = none;  ///< |E(end) − E(start)| / max(|E(start)|, |E(end)|, |p·v|/2 at the end)
   CpuSeconds cpu_seconds = {};
   long steps = 0;
   long newton_iterations = 0;

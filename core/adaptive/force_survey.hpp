@@ -1,0 +1,84 @@
+#pragma once
+
+#include <diracstep/core/adaptive/step_plan.hpp>
+#include <diracstep/core/system/constraint_distribution.hpp>
+#include <diracstep/core/system/scene.hpp>
+#include <string>
+#include <vector>
+
+namespace diracstep {
+
+/// A point of a run: what it steps over is looked for between such points.
+struct PathPoint {
+  double time;
+  Vector q, v;
+};
+
+/// What a survey of the forces along a run found.
+struct ForceSurveyReport {
+  /// What a run with even steps over these parts of the motion would miss: the largest component of
+  /// ∫|F − its polynomial| dt over all steps, in parts of the largest momentum.
+  double missed = 0.0;
+  double time = 0.0;     ///< where most of it is missed
+  bool followed = true;  ///< false where F changes so fast on so much of the motion that the survey gave up
+  std::vector<Stretch> stretches;  ///< that resolve what was found
+};
+
+/// Looks for forces that switch, jump or pulse between the points that a run read them at.
+///
+/// Along the run, a cubic between each two points, the survey reads F = (∂L/∂q + f, ∂L/∂v, A v + b) at 12
+/// Chebyshev points of each step and compares the polynomial through them with F at further points: in all
+/// some 20000 on a small scene where a force acts or the time enters, else 2000, spread evenly with
+/// irrational distances, and others that approach both ends of the step geometrically.  A step whose
+/// polynomial misses F is divided: at the kinks and instants that the scene knows (Scene::kinks), at a jump
+/// found by bisection, else in the middle, until each part has a polynomial.  A gap of a few units of
+/// round-off is left at a jump.
+///
+/// What lies between the points and is not known to the scene is not seen: a pulse much narrower than 1/20000
+/// of the motion.
+class ForceSurvey {
+ public:
+  /// For forces whose impulse counts from `error` times the largest momentum on.  The scene, one with a
+  /// Lagrangian, must outlive this.
+  ForceSurvey(const Scene& scene, double error);
+
+  /// Surveys a run given by its points, at least two; a gap lies between two that are a few units of
+  /// round-off apart.  Each step is looked at in so many parts: the run in question may have had finer ones.
+  ForceSurveyReport along(const std::vector<PathPoint>& path, long parts = 1);
+
+ private:
+  struct Cubic;
+  struct Fit {
+    double excess = 0.0;     ///< of the worst point over what is allowed; above 1 the polynomial misses F
+    double time = 0.0;       ///< of that point
+    double deviation = 0.0;  ///< there, in parts of the momentum over time
+  };
+
+  void read(const Cubic& path, double t, VectorRef f);
+  void find_scales(const std::vector<PathPoint>& path);
+  Fit fit(const Cubic& path, double a, double b, long points, const std::vector<double>& known);
+  std::vector<double> known_times(const Cubic& path, double a, double b);
+  void crossings(const Cubic& path, double a, double b, std::vector<double>& times);
+  double crossing(const Cubic& path, double a, double b, int number, bool sign);
+  void examine(const Cubic& path, double a, double b, ForceSurveyReport& report);
+  void divide(const Cubic& path, double a, double b, const std::vector<double>& known,
+              ForceSurveyReport& report);
+  void count_missed(const Cubic& path, double a, double b, std::size_t first, ForceSurveyReport& report);
+  std::pair<double, double> narrow(const Cubic& path, double a, double b);
+  bool jumps(const Cubic& before, const Cubic& after);
+
+  const Scene& scene_;
+  double error_;
+  Eigen::Index n_, m_;
+  ConstraintsAtPoint rows_;
+  Vector allowed_, weights_;  ///< of each component of F, and what turns it into parts of the momentum
+  bool smooth_;               ///< as far as is known: no force, no time, no kinks
+  std::vector<Kinks::Instant> instants_;
+  Vector q_, v_, external_, value_, other_, switches_, before_;
+  Columns samples_;
+  double span_ = 0.0, most_missed_ = 0.0;
+  long points_ = 0, parts_ = 0, readings_ = 0;
+  bool whole_ = false;  ///< the last stretch consists of undivided steps
+};
+
+}  // namespace diracstep
