@@ -10,8 +10,9 @@ namespace {
 
 using detail::RefinementSearch;
 
-constexpr double pays = 5.0;              // max ω / min ω from which variable steps are tried
-constexpr double cost_of_variable = 1.4;  // of a variable step beside a fixed one of the same method
+constexpr double pays = 5.0;               // max ω / min ω from which variable steps are tried
+constexpr double cost_of_variable = 1.4;   // of a variable step beside a fixed one of the same method
+constexpr double most_over_median = 30.0;  // of the rate that the first fixed step follows
 constexpr long survey_steps = 400;
 
 std::string text(double value) {
@@ -33,15 +34,19 @@ void add_work(Work& all, const Work& part) {
 /// Coarse steps of both kinds, from which the search starts.
 struct FirstSteps {
   double fixed, eps;
+  double fixed_solves;  ///< of a coarse run that resolves the fastest part of the motion
 };
 
 FirstSteps first_steps(const ErrorControlOptions& options, const RateSurvey& survey, int order, double span) {
   // Radians: coarse, since the runs that follow are finer by 2 and more.
   const double accuracy = std::pow(options.error, 1.0 / order);
+  const double radians = std::clamp(12.0 * accuracy, 0.05, 4.0);
   double step = options.first_step > 0.0 ? options.first_step : span / 20.0;
+  // Where a force jumps the fastest rate is without meaning; coarse runs that are too coarse cost little.
+  const double median = survey.scales.lowest / 0.3;
   if (options.first_step <= 0.0 && survey.fastest > 0.0)
-    step = std::min(step, std::clamp(12.0 * accuracy, 0.05, 4.0) / survey.fastest);
-  return {step, std::clamp(5.0 * accuracy, 0.02, 1.2)};
+    step = std::min(step, radians / std::min(survey.fastest, most_over_median * median));
+  return {step, std::clamp(5.0 * accuracy, 0.02, 1.2), span * survey.fastest / radians};
 }
 
 /// A search with both kinds of steps, until coarse runs have measured which needs less; the other's work
@@ -54,8 +59,7 @@ ErrorControlReport search_both(const RefinementSearch::Motion& motion, const Err
   RefinementSearch by_variable(motion, variable, first.eps), by_fixed(motion, fixed, first.fixed);
   const bool measured = by_variable.measure(motion.options.max_solves);
   const double of_variable = measured ? cost_of_variable * by_variable.predicted_solves() : HUGE_VAL;
-  const double span = std::abs(motion.end - motion.scene->start.time);
-  const bool fixed_is_dearer = measured && span / first.fixed > of_variable;
+  const bool fixed_is_dearer = measured && first.fixed_solves > of_variable;
   const double of_fixed = !fixed_is_dearer && by_fixed.measure(motion.options.max_solves)
                               ? by_fixed.predicted_solves()
                               : HUGE_VAL;
@@ -71,10 +75,11 @@ ErrorControlReport search_both(const RefinementSearch::Motion& motion, const Err
     taken.reason += "; variable steps did not get there: " + variable.refusal;
   (take_variable ? by_variable : by_fixed).go();
   add_work(taken.work, other);
-  if (taken.ok() || !take_variable || fixed_is_dearer) return taken;
+  if (taken.ok() || !take_variable) return taken;
   fixed.refusal.clear();
   fixed.reason = prepared.reason + "; variable steps did not get there: " + taken.refusal;
   by_fixed.go();
+  if (fixed.end.q.size() == 0) return taken;  // no time was left
   add_work(fixed.work, variable.work);
   return fixed;
 }
@@ -127,16 +132,14 @@ RunReport run_again(const std::shared_ptr<const Scene>& scene, const Registry& r
                     long every, const Observer& observer) {
   if (every < 1) throw Misuse("every = " + std::to_string(every) + "; 1 or more is needed");
   Work work;
-  ControlReport control;
   RunReport done;
   Sample sample;
   long node = 0;
-  done.last =
-      detail::run_steps_of(completed(scene), registry, solvers, report.steps, report.adaptive,
-                           report.end.time, work, control, [&](const detail::ReadNode& read, bool last) {
-                             if (node++ % every != 0 && !last) return true;
-                             return read(momentum, sample).ok() && observer(sample);
-                           });
+  done.last = detail::run_steps_of(completed(scene), registry, solvers, report.steps, report.adaptive,
+                                   report.end.time, work, [&](const detail::ReadNode& read, bool last) {
+                                     if (node++ % every != 0 && !last) return true;
+                                     return read(momentum, sample).ok() && observer(sample);
+                                   });
   return done;
 }
 

@@ -11,9 +11,10 @@ namespace {
 
 constexpr int nodes = 12;  // of a polynomial
 constexpr long points_of_smooth = 2'000, all_points = 20'000, fewest_points = 2'000;
-constexpr long most_parts = 3'000, most_readings = 3'000'000;
+constexpr long most_parts = 3'000, most_readings = 2'000'000;  // the latter of a small scene
 constexpr double counts = 0.02;       // part of the error asked for that the forces missed may make up
 constexpr double read_error = 1e-11;  // relative, of F and of its polynomial
+constexpr double widest_gap = 32.0;   // in closest times, at a jump
 constexpr double next_point = 0.125;  // ratio of the distances of points that approach an end
 
 /// So close to t two times count as one.
@@ -136,6 +137,16 @@ ForceSurvey::Fit ForceSurvey::fit(const Cubic& path, double a, double b, long po
   const double middle = 0.5 * (a + b), half = 0.5 * (b - a);
   for (int k = 0; k < nodes; ++k)
     read(path, middle + half * chebyshev.x[static_cast<std::size_t>(k)], samples_.col(k));
+  // What rounding of F and of t leaves of F here, whatever is asked for.
+  const double rounding = 2.0 * std::numeric_limits<double>::epsilon() * std::abs(middle);
+  local_ = 1e-13 * samples_.cwiseAbs().rowwise().maxCoeff();
+  for (int k = 0; k + 1 < nodes; ++k) {
+    const double apart = std::abs(half) * (chebyshev.x[static_cast<std::size_t>(k)] -
+                                           chebyshev.x[static_cast<std::size_t>(k + 1)]);
+    local_ = local_.cwiseMax(rounding / apart * (samples_.col(k) - samples_.col(k + 1)).cwiseAbs());
+  }
+  for (Eigen::Index i = 0; i < local_.size(); ++i)
+    local_[i] = std::max(allowed_[i], std::isfinite(local_[i]) ? local_[i] : 0.0);
   Fit worst;
   const auto compare = [&](double t) {
     if (!((t - a) * (b - t) > 0.0)) return;
@@ -144,8 +155,8 @@ ForceSurvey::Fit ForceSurvey::fit(const Cubic& path, double a, double b, long po
     other_ = (other_ - value_).cwiseAbs();
     double excess = 0.0;
     for (Eigen::Index i = 0; i < other_.size(); ++i)
-      if (!(other_[i] <= allowed_[i]))
-        excess = std::max(excess, std::isfinite(other_[i]) ? other_[i] / allowed_[i] : HUGE_VAL);
+      if (!(other_[i] <= local_[i]))
+        excess = std::max(excess, std::isfinite(other_[i]) ? other_[i] / local_[i] : HUGE_VAL);
     if (excess <= worst.excess) return;
     worst = {excess, t, (other_.array() * weights_.array()).maxCoeff()};
   };
@@ -241,7 +252,7 @@ void ForceSurvey::divide(const Cubic& path, double a, double b, const std::vecto
   if (cuts.empty()) {
     const auto [low, high] = narrow(path, a, b);
     const double middle = 0.5 * (low + high), width = std::abs(high - low);
-    if (width <= closest(b))
+    if (width <= widest_gap * closest(b))
       cuts.emplace_back(low, high);
     else if (width < std::abs(b - a) / 64.0)
       cuts.emplace_back(middle, middle);
@@ -254,14 +265,14 @@ void ForceSurvey::divide(const Cubic& path, double a, double b, const std::vecto
     const double part_from = from;
     from = next;
     if (!((to - part_from) * (b - a) > 0.0)) continue;
-    if (++parts_ > most_parts || readings_ > most_readings) {
+    if (++parts_ > most_parts || readings_ > most_readings / std::max(1L, static_cast<long>(n_ + m_) / 16)) {
       report.followed = false;
       return;
     }
     const long points =
         std::max(8L, static_cast<long>(static_cast<double>(points_) * std::abs(to - part_from) / span_));
     const Fit part = fit(path, part_from, to, points, {});
-    if (part.excess > 1.0 && std::abs(to - part_from) > 2.0 * closest(to))
+    if (part.excess > 1.0 && std::abs(to - part_from) > widest_gap * closest(to))
       divide(path, part_from, to, {}, report);
     else
       report.stretches.push_back({part_from, to});
@@ -336,7 +347,7 @@ ForceSurveyReport ForceSurvey::along(const std::vector<PathPoint>& path, long pa
   for (std::size_t k = 0; k + 1 < path.size() && report.followed; ++k) {
     const Cubic cubic{path[k], path[k + 1]};
     const double a = cubic.begin(), b = cubic.end();
-    if (std::abs(b - a) <= 4.0 * closest(b)) {
+    if (std::abs(b - a) <= (2.0 + widest_gap) * closest(b)) {
       whole_ = false;
       continue;
     }
@@ -350,7 +361,7 @@ ForceSurveyReport ForceSurvey::along(const std::vector<PathPoint>& path, long pa
     gap = 0.0;
     if (!report.followed || k + 2 >= path.size()) continue;
     const Cubic next{path[k + 1], path[k + 2]};
-    if (std::abs(next.end() - b) <= 4.0 * closest(b) || !jumps(cubic, next)) continue;
+    if (std::abs(next.end() - b) <= (2.0 + widest_gap) * closest(b) || !jumps(cubic, next)) continue;
     gap = std::copysign(closest(b), b - a);
     report.stretches.back().end -= gap;
     whole_ = false;

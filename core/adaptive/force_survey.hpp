@@ -74,7 +74,7 @@ class ForceSurvey {
   Vector allowed_, weights_;  ///< of each component of F, and what turns it into parts of the momentum
   bool smooth_;               ///< as far as is known: no force, no time, no kinks
   std::vector<Kinks::Instant> instants_;
-  Vector q_, v_, external_, value_, other_, switches_, before_;
+  Vector q_, v_, external_, local_, value_, other_, switches_, before_;
   Columns samples_;
   double span_ = 0.0, most_missed_ = 0.0;
   long points_ = 0, parts_ = 0, readings_ = 0;

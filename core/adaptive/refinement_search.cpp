@@ -95,7 +95,7 @@ StepReport run_variable(AdaptiveIntegrator& integrator, double end, const AtNode
 
 StepReport run_steps_of(const std::shared_ptr<const Scene>& scene, const Registry& registry,
                         const SolverFactory& solvers, const ErrorControlReport::Steps& steps, bool adaptive,
-                        double end, Work& work, ControlReport& control, const AtNode& at_node) {
+                        double end, Work& work, const AtNode& at_node) {
   StepReport report;
   if (adaptive) {
     AdaptiveIntegrator integrator(scene, registry, solvers, steps.integrator, steps.variable);
@@ -105,7 +105,6 @@ StepReport run_steps_of(const std::shared_ptr<const Scene>& scene, const Registr
     work.iterations += integrator.side_work().iterations;
     work.residual_evaluations += integrator.side_work().residual_evaluations;
     work.jacobian_evaluations += integrator.side_work().jacobian_evaluations;
-    control = integrator.control();
   } else {
     Integrator integrator(scene, registry, solvers, steps.integrator);
     report = run_fixed(integrator, steps, at_node);
@@ -182,7 +181,7 @@ double RefinementSearch::predicted_solves() const {
   return convergence_.work_to_go() * static_cast<double>(report_.runs.back().solves);
 }
 
-void RefinementSearch::count(ErrorControlRun& now, const Work& work, const ControlReport& control) {
+void RefinementSearch::count(ErrorControlRun& now, const Work& work) {
   now.steps = work.steps;
   now.solves = work.solves;
   report_.work.steps += work.steps;
@@ -190,10 +189,6 @@ void RefinementSearch::count(ErrorControlRun& now, const Work& work, const Contr
   report_.work.iterations += work.iterations;
   report_.work.residual_evaluations += work.residual_evaluations;
   report_.work.jacobian_evaluations += work.jacobian_evaluations;
-  report_.warning.clear();
-  if (report_.adaptive && control.resets * 1000 > work.steps)
-    report_.warning = "the step controller was reset " + std::to_string(control.resets) + " times in " +
-                      std::to_string(work.steps) + " steps";
 }
 
 RefinementSearch::Outcome RefinementSearch::run(long refinement) {
@@ -203,18 +198,20 @@ RefinementSearch::Outcome RefinementSearch::run(long refinement) {
   last_refinement_ = refinement;
   Sample end;
   Work work;
-  ControlReport control;
   long nodes = 0;
   SolveReport read_end;
+  NodeCheck rest(*motion_.scene, 0, true);
+  Sample node;
   const auto at_node = [&](const ReadNode& read, bool last) {
+    if (!last && rest.wants(nodes) && read(Momentum::projected, node).ok()) rest.see(nodes, node);
     if (last) read_end = read(Momentum::projected, end);
     if (++nodes % nodes_between_looks != 0) return true;
     ended_ = motion_.options.go_on && !motion_.options.go_on();
     return !ended_ && !time_is_up();
   };
   const StepReport done = run_steps_of(motion_.scene, motion_.registry, motion_.solvers, steps,
-                                       report_.adaptive, motion_.end, work, control, at_node);
-  count(now, work, control);
+                                       report_.adaptive, motion_.end, work, at_node);
+  count(now, work);
   now.failure = done.failure;
   if (now.failure.empty() && end.q.size() == 0) {
     now.failure = ended_          ? "interrupted"
@@ -230,6 +227,7 @@ RefinementSearch::Outcome RefinementSearch::run(long refinement) {
     return Outcome::does_not_count;
   }
   last_steps_ = work.steps;
+  frozen_ = rest.text();
   if (first) first_good_ = refinement;
   if (!first) now.difference = relative_change(end, report_.end);
   convergence_.add(now.step, now.difference);
@@ -252,8 +250,7 @@ bool RefinementSearch::next(long max_solves) {
     case Outcome::failed:
       if (++failures_ > max_failures)
         return refuse("a run failed even with the step " + text(report_.runs.back().step) + ": " +
-                      report_.runs.back().failure),
-               false;
+                      report_.runs.back().failure);
       [[fallthrough]];
     case Outcome::does_not_count:
       refinement_ *= 2;
@@ -262,14 +259,14 @@ bool RefinementSearch::next(long max_solves) {
       failures_ = 0;
   }
   if (convergence_.accepted()) {
-    if (!survey()) return report_.refusal.empty();
+    if (!survey(true)) return report_.refusal.empty();
     accept();
     return false;
   }
-  if (convergence_.runs() >= 4 && !convergence_.order_confirmed() && !surveyed_ && !survey())
+  if (convergence_.runs() >= 4 && !convergence_.order_confirmed() && !surveyed_ && !survey(false))
     return report_.refusal.empty();
   if (convergence_.stagnates() && (convergence_.runs() > 8 || convergence_.difference() < 1e-4))
-    return refuse(convergence_.obstacle()), false;
+    return refuse(convergence_.obstacle());
   const double next = static_cast<double>(refinement_) / convergence_.next_factor();
   refinement_ = std::max(refinement_ + 1, std::lround(next));
   return true;
@@ -290,16 +287,13 @@ void RefinementSearch::go() {
 std::vector<PathPoint> RefinementSearch::path_of(long refinement) {
   std::vector<PathPoint> path;
   Work work;
-  ControlReport control;
   Sample point;
-  NodeCheck rest(*motion_.scene, 0, true);
   const auto& stretches = plan_.stretches();
   std::size_t stretch = 0;
   long left = report_.adaptive ? -1 : stretches.front().steps * refinement;
   const auto at_node = [&](const ReadNode& read, bool) {
     if (!read(Momentum::projected, point).ok()) return false;
     path.push_back({point.time, point.q, point.v});
-    if (const long node = std::ssize(path) - 1; rest.wants(node)) rest.see(node, point);
     if (path.size() > 1 && --left == 0 && ++stretch < stretches.size()) {
       left = stretches[stretch].steps * refinement;
       if (stretches[stretch].begin != point.time)
@@ -308,25 +302,27 @@ std::vector<PathPoint> RefinementSearch::path_of(long refinement) {
     return !time_is_up();
   };
   (void)run_steps_of(motion_.scene, motion_.registry, motion_.solvers, steps_of(refinement), report_.adaptive,
-                     motion_.end, work, control, at_node);
+                     motion_.end, work, at_node);
   report_.work.solves += work.solves;
-  frozen_ = rest.text();
   return path;
 }
 
-/// Looks for what the steps of the last run do not resolve.  False where the motion is divided anew or the
+/// Looks for what the steps of the last run do not resolve, before it is accepted or because the runs do not
+/// converge.  False where the motion is divided anew or the
 /// search is refused.
-bool RefinementSearch::survey() {
+bool RefinementSearch::survey(bool accepted) {
   surveyed_ = true;
   // A coarse run shows the way; after a division a fine one, for the place of a kink depends on the motion.
   const long way = divisions_ == 0 ? first_good_ : refinement_;
   const std::vector<PathPoint> path = path_of(way);
-  if (path.size() < 2 || !reached_end(path.back().time)) return true;
+  if (path.size() < 2 || !reached_end(path.back().time))
+    return refuse("the time was used up before the forces along the motion were surveyed (--max-time)");
   ForceSurvey forces(*motion_.scene, motion_.options.error);
   const long parts = std::max(1L, std::lround(static_cast<double>(refinement_) / static_cast<double>(way)));
   const ForceSurveyReport found = forces.along(path, parts);
   if (found.missed <= missed_allowed * motion_.options.error) return true;
   fast_ = "the force changes fast near t = " + time_text(found.time);
+  if (!accepted && (!found.followed || report_.adaptive)) return true;  // finer steps may do
   if (!found.followed)
     refuse(fast_ + " and on much of the motion: steps that follow it would be too many");
   else if (report_.adaptive)
@@ -342,6 +338,7 @@ bool RefinementSearch::survey() {
 void RefinementSearch::divide(const ForceSurveyReport& found) {
   plan_ = StepPlan(found.stretches, first_);
   convergence_.clear();
+  report_.estimate = report_.observed_order = std::nan("");
   refinement_ = 1;
   last_steps_ = 0;
   surveyed_ = false;
@@ -356,11 +353,13 @@ void RefinementSearch::accept() {
   report_.observed_order = convergence_.observed_order();
 }
 
-void RefinementSearch::refuse(const std::string& why) {
+/// Ends the search, for which false stands.
+bool RefinementSearch::refuse(const std::string& why) {
   report_.refusal = "error " + text(motion_.options.error) + " not reached: " + why;
   if (!fast_.empty() && why.find(fast_) == std::string::npos) report_.refusal += "; " + fast_;
   if (convergence_.runs() > 1)
     report_.refusal += "; the best answer so far has an estimated error of " + text(report_.estimate);
+  return false;
 }
 
 }  // namespace diracstep::detail

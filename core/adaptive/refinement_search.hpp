@@ -15,7 +15,7 @@ using AtNode = std::function<bool(const ReadNode& read, bool last)>;
 /// One run with the steps of a report.  `work` receives what it took.
 StepReport run_steps_of(const std::shared_ptr<const Scene>& scene, const Registry& registry,
                         const SolverFactory& solvers, const ErrorControlReport::Steps& steps, bool adaptive,
-                        double end, Work& work, ControlReport& control, const AtNode& at_node);
+                        double end, Work& work, const AtNode& at_node);
 
 /// Repeats one motion with finer and finer steps of one kind, fixed or variable.
 class RefinementSearch {
@@ -46,15 +46,15 @@ class RefinementSearch {
   bool next(long max_solves);
   Outcome run(long refinement);
   ErrorControlReport::Steps steps_of(long refinement) const;
-  void count(ErrorControlRun& now, const Work& work, const ControlReport& control);
+  void count(ErrorControlRun& now, const Work& work);
   bool time_is_up() const;
   bool reached_end(double t) const;
   bool stopped(long max_solves);
-  bool survey();
+  bool survey(bool accepted);
   std::vector<PathPoint> path_of(long refinement);
   void divide(const ForceSurveyReport& found);
   void accept();
-  void refuse(const std::string& why);
+  bool refuse(const std::string& why);
 
   const Motion& motion_;
   ErrorControlReport& report_;
