@@ -40,11 +40,18 @@ struct Sums {
   double size(Eigen::Index r, double factor) const {
     return std::max(std::abs(sixth[r]), std::abs(bend[r]) * scale_over_increment / factor);
   }
-  bool agree(double factor) const {
-    for (Eigen::Index r = 0; r < sixth.size(); ++r)
-      if (!(disagreement(r) <= agreement * size(r, factor) + 8.0 * round_off * largest[r])) return false;
-    return true;
+  /// The largest part by which both formulas disagree beyond round-off.
+  double misfit(double factor) const {
+    double largest_part = 0.0;
+    for (Eigen::Index r = 0; r < sixth.size(); ++r) {
+      const double beyond = disagreement(r) - 8.0 * round_off * largest[r];
+      if (beyond <= 0.0) continue;
+      const double part = beyond / size(r, factor);
+      largest_part = std::isfinite(part) ? std::max(largest_part, part) : HUGE_VAL;
+    }
+    return largest_part;
   }
+  bool agree(double factor) const { return misfit(factor) <= agreement; }
 };
 
 /// The sums of f(k · factor, out), which evaluates at k increments.
@@ -65,21 +72,25 @@ void take(const F& f, double factor, Vector& ahead, Vector& behind, Sums& sums) 
   }
 }
 
-/// The same with increments that both formulas agree at; returns the factor of the increments, or of the
-/// smallest ones tried.
+/// The same with increments that both formulas agree at; returns the factor of the increments, or of those
+/// with the smallest misfit where none do: what is not smooth, or lost in round-off, only becomes worse.
 template <class F>
 double take_checked(const F& f, Vector& ahead, Vector& behind, Sums& sums) {
   double factor = 1.0;
   take(f, factor, ahead, behind, sums);
-  for (int k = 0; k < most_divisions && !sums.agree(factor); ++k) {
-    const Sums before = sums;
-    factor /= divisor;
-    take(f, factor, ahead, behind, sums);
-    // What is not smooth at any size, or lost in round-off, is left at the larger increments.
-    if (k > 1 && sums.disagreement(0) * divisor > before.disagreement(0) && sums.sixth.size() == 1) {
-      sums = before;
-      return factor * divisor;
-    }
+  double misfit = sums.misfit(factor);
+  if (misfit <= agreement) return factor;
+  Sums next(sums.sixth.size());
+  double smaller = factor;
+  for (int k = 0; k < most_divisions && misfit > agreement; ++k) {
+    smaller /= divisor;
+    take(f, smaller, ahead, behind, next);
+    const double found = next.misfit(smaller);
+    if (found > 4.0 * misfit) break;
+    if (found > misfit) continue;
+    misfit = found;
+    factor = smaller;
+    sums = next;
   }
   return factor;
 }
