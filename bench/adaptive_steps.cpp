@@ -8,7 +8,7 @@
 #include <cmath>
 #include <cstdio>
 #include <cstring>
-#include <diracstep/core/adaptive/adaptive_integrator.hpp>
+#include <diracstep/core/adaptive/adaptive_run.hpp>
 #include <diracstep/core/runs/run.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
 #include <diracstep/validation/studies/study_run.hpp>
@@ -68,13 +68,14 @@ Point measure(const ReferenceEnd& reference, Once once) {
   return point;
 }
 
-Point fixed_run(const CatalogueScene& scene, const Method& method, double step, const ReferenceEnd& reference) {
+Point fixed_run(const CatalogueScene& scene, const Method& method, double step,
+                const ReferenceEnd& reference) {
   const StepGrid grid = fit_steps(scene.scene->start.time, scene.t_end, step);
   Integrator integrator(scene.scene, Registry::with_built_ins(), kinsol(), options_of(method, grid.step));
   return measure(reference, [&](Sample& end, double& solves) {
     integrator.reset();
     const RunReport report =
-        run(integrator, grid.steps, Momentum::projected, grid.steps, [&](const Sample& sample) {
+        run_steps(integrator, grid.steps, Momentum::projected, grid.steps, [&](const Sample& sample) {
           end = sample;
           return true;
         });
@@ -91,7 +92,7 @@ Point variable_run(const CatalogueScene& scene, const Method& method, double eps
   return measure(reference, [&](Sample& end, double& solves) {
     integrator.reset();
     const RunReport report =
-        run(integrator, scene.t_end, Momentum::projected, 1'000'000'000, [&](const Sample& sample) {
+        run_until(integrator, scene.t_end, Momentum::projected, 1'000'000'000, [&](const Sample& sample) {
           end = sample;
           return true;
         });
@@ -144,8 +145,8 @@ std::string at_errors(const std::vector<Point>& points, bool with_solves) {
 void compare(const std::string& name) {
   const CatalogueScene scene = make_scene(name);
   const ReferenceEnd reference = reference_end(scene, scene.t_end);
-  std::printf("\n%s, t = %g, reference: %s, known to %.0e\n\n", name.c_str(), scene.t_end, reference.kind.c_str(),
-              reference.self_error);
+  std::printf("\n%s, t = %g, reference: %s, known to %.0e\n\n", name.c_str(), scene.t_end,
+              reference.kind.c_str(), reference.self_error);
   std::printf("| method | steps | 1e-6: solves / ms | 1e-8 | 1e-10 |\n|---|---|---|---|---|\n");
   const auto row = [](const char* label, const char* steps, const std::vector<Point>& points) {
     std::printf("| %s | %s |%s\n", label, steps, at_errors(points, true).c_str());
@@ -155,8 +156,8 @@ void compare(const std::string& name) {
     row(method.label, "fixed",
         ladder(8.0 * scene.natural_step, [&](double h) { return fixed_run(scene, method, h, reference); }));
     const auto variable = [&](StepControl control, const Monitor& monitor) {
-      return ladder(1.0,
-                    [&](double eps) { return variable_run(scene, method, eps, control, monitor, reference); });
+      return ladder(
+          1.0, [&](double eps) { return variable_run(scene, method, eps, control, monitor, reference); });
     };
     row(method.label, "controller", variable(StepControl::integrating, {}));
     row(method.label, "in-step", variable(StepControl::in_step, {}));
@@ -183,7 +184,7 @@ void long_run(const CatalogueScene& scene, const Method& method, double eps, Ste
   const double energy = scene.scene->energy(start.time, start.q, start.v);
   std::array<double, 10> largest{};
   const double before = processor_seconds();
-  const RunReport report = run(integrator, end, Momentum::projected, 1, [&](const Sample& sample) {
+  const RunReport report = run_until(integrator, end, Momentum::projected, 1, [&](const Sample& sample) {
     const double part = (sample.time - start.time) / (end - start.time);
     double& place = largest.at(static_cast<std::size_t>(std::clamp(10.0 * part, 0.0, 9.0)));
     place = std::max(place, std::abs(sample.energy - energy));

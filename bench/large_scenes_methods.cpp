@@ -27,7 +27,7 @@ CatalogueScene with_own_reference(const LargeScene& large, const Registry& regis
   const StepGrid grid = fit_steps(0.0, large.t_end, large.step / 8.0);
   Integrator integrator(entry.scene, registry, kinsol(), {.method = "type1/gl:6", .step = grid.step});
   Sample end;
-  const RunReport report = run(integrator, grid.steps, Momentum::projected, grid.steps, nullptr);
+  const RunReport report = run_steps(integrator, grid.steps, Momentum::projected, grid.steps, nullptr);
   if (!report.ok() || !integrator.sample(Momentum::projected, end).ok())
     std::printf("no reference: %s\n", report.last.failure.c_str());
   entry.reference = {"own", "GL(6)", 0.0, [end](double) {

@@ -3,6 +3,7 @@
 
 #include <diracstep/core/integrator/integrator.hpp>
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/runs/step_loop.hpp>
 #include <diracstep/plugins/callback_scene.hpp>
 #include <diracstep/plugins/loaded_plugin.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
@@ -113,9 +114,7 @@ void diracstep_destroy(diracstep_integrator* integrator) { delete integrator; }
 int diracstep_step(diracstep_integrator* integrator, long steps) {
   return guarded_use(integrator, [&](Integrator& made) -> std::string {
     if (steps < 0) throw Misuse("steps is " + std::to_string(steps) + "; 0 or more are needed");
-    for (long k = 0; k < steps; ++k)
-      if (StepReport report = made.step(); !report.ok()) return std::move(report.failure);
-    return {};
+    return take_steps(made, steps).failure;
   });
 }
 

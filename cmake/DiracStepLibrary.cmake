@@ -16,8 +16,8 @@ function(diracstep_compile_options target)
 endfunction()
 
 # The headers that nearly every source reads, compiled once for each of the kinds library, command and test: they take
-# half of the time of a build.  Sources include what they use all the same; without DIRACSTEP_PRECOMPILED_HEADERS the
-# build shows it.
+# half of the time of a build.  Sources include what they use all the same: the preset tidy compiles without them, so
+# ./dev tidy shows it.
 set(diracstep_headers_library <Eigen/Core> <algorithm> <array> <cmath> <functional> <limits> <map> <memory> <optional>
   <span> <sstream> <string> <utility> <vector>)
 set(diracstep_headers_command ${diracstep_headers_library} <CLI/CLI.hpp> <fmt/format.h> <nlohmann/json.hpp>)
@@ -41,7 +41,6 @@ function(diracstep_precompile target kind)
     target_link_libraries(${common} PRIVATE Eigen3::Eigen ${ARGN})
     diracstep_compile_options(${common})
     target_precompile_headers(${common} PRIVATE ${diracstep_headers_${kind}})
-    set_target_properties(${common} PROPERTIES CXX_CLANG_TIDY "")
   endif()
   target_precompile_headers(${target} REUSE_FROM ${common})
 endfunction()
@@ -54,8 +53,19 @@ function(diracstep_install_library target component)
     DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/DiracStep)
 endfunction()
 
+# Installs the headers that <folder>/public_headers.txt lists; the others are of use to the library only.
+function(diracstep_install_headers folder)
+  set(list ${CMAKE_CURRENT_SOURCE_DIR}/public_headers.txt)
+  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${list})
+  file(STRINGS ${list} headers REGEX "^[^#]")
+  foreach(header IN LISTS headers)
+    get_filename_component(directory ${header} DIRECTORY)
+    install(FILES ${header} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/diracstep/${folder}/${directory})
+  endforeach()
+endfunction()
+
 # diracstep_library(<folder> SOURCES ... PUBLIC ... PRIVATE ...)
-# Makes diracstep_<folder>, alias DiracStep::<folder>, and installs it with its headers.
+# Makes diracstep_<folder>, alias DiracStep::<folder>, and installs it with its public headers.
 # A folder without sources becomes a header-only library.
 function(diracstep_library folder)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "SOURCES;PUBLIC;PRIVATE")
@@ -86,6 +96,5 @@ function(diracstep_library folder)
     $<BUILD_INTERFACE:${include_root}> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
 
   diracstep_install_library(${target} ${folder})
-  install(DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR}/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/diracstep/${folder}
-    FILES_MATCHING PATTERN *.hpp PATTERN *.h)
+  diracstep_install_headers(${folder})
 endfunction()

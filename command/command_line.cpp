@@ -5,7 +5,7 @@
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
 #include <diracstep/command/command_line.hpp>
-#include <diracstep/command/verbs/verbs.hpp>
+#include <diracstep/command/verbs.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 
 namespace diracstep::command {

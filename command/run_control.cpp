@@ -8,6 +8,7 @@
 #include <diracstep/command/progress.hpp>
 #include <diracstep/command/run_control.hpp>
 #include <diracstep/core/runs/run_checks.hpp>
+#include <diracstep/core/runs/step_loop.hpp>
 #include <diracstep/validation/studies/convergence_study.hpp>
 
 namespace diracstep::command {
@@ -45,25 +46,17 @@ class Run {
   }
 
   void go() {
-    long k = integrator_.work().steps;
-    if (k == 0 || wanted(k)) keep();
-    while (k < steps_ && result_.failure.empty() && !interrupted()) {
-      doubt_.before_step(integrator_);
-      const StepReport report = integrator_.step();
-      if (!report.ok()) {
-        result_.failure = report.failure;
-        break;
-      }
-      doubt_.after_step(integrator_);
-      ++k;
-      if (k == steps_ || checkpoint_due(k)) save();
-      if (wanted(k))
-        keep();
-      else if (k % every_look_ == 0)
-        look();
-      if (k % steps_between_looks == 0) show(k);
-    }
-    if (result_.failure.empty() && k < steps_) {
+    const long first = integrator_.work().steps;
+    if (first == 0 || wanted(first)) keep();
+    CheckedSteps steps{integrator_, &doubt_};
+    const StepReport last = step_while(
+        steps, [&](long k) { return first + k < steps_ && result_.failure.empty() && !interrupted(); },
+        [&](long k) {
+          visit(first + k);
+          return true;
+        });
+    if (!last.ok()) result_.failure = last.failure;
+    if (result_.failure.empty() && integrator_.work().steps < steps_) {
       result_.failure = fmt::format("interrupted at t = {:.17g}", integrator_.time());
       save();
     }
@@ -73,6 +66,16 @@ class Run {
   }
 
  private:
+  /// What there is to do after step k.
+  void visit(long k) {
+    if (k == steps_ || checkpoint_due(k)) save();
+    if (wanted(k))
+      keep();
+    else if (k % every_look_ == 0)
+      look();
+    if (k % steps_between_looks == 0) show(k);
+  }
+
   bool wanted(long k) const { return k == steps_ || (keeping_.file != nullptr && k % keeping_.every == 0); }
 
   bool checkpoint_due(long k) const {

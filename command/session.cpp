@@ -5,15 +5,14 @@
 #include <cstdio>
 #include <cstring>
 #include <diracstep/command/session.hpp>
-#include <stdexcept>
+#include <diracstep/core/numerics/errors.hpp>
 
 namespace diracstep::command {
 
 namespace {
 
 [[noreturn]] void refuse_output() {
-  throw std::runtime_error(
-      fmt::format("standard output could not be written in full: {}", std::strerror(errno)));
+  throw Error(fmt::format("standard output could not be written in full: {}", std::strerror(errno)));
 }
 
 }  // namespace
@@ -36,14 +35,10 @@ void add_solver_options(CLI::App& verb, Session& session) {
 }
 
 void add_method_options(CLI::App& verb, MethodChoice& choice) {
-  verb.add_option_function<std::string>(
-          "--method",
-          [&choice](const std::string& name) {
-            choice.name = name;
-            choice.given = true;
-          },
+  verb.add_option(
+          "--method", choice.name,
           "A method; see diracstep list methods.  auto: GL(S) of the order asked for, or as plan says")
-      ->default_str(choice.name);
+      ->capture_default_str();
   verb.add_option("--order", choice.order,
                   "Order; methods of another one are composed to it.  0 keeps the method's own")
       ->capture_default_str();

@@ -45,7 +45,6 @@ std::vector<std::string> scene_names(const Session& session);
 /// What --method, --order and --rule say.
 struct MethodChoice {
   std::string name = automatic_method;
-  bool given = false;  ///< whether --method was
   int order = 0;
   std::optional<std::string> rule = {};  ///< for nonholonomic rows
 };
@@ -63,7 +62,7 @@ void add_solver_options(CLI::App& verb, Session& session);
 /// A message for a person, on standard error.
 void say(std::string_view message);
 
-/// Text for standard output, and the end of it.  Both throw std::runtime_error where it cannot be written.
+/// Text for standard output, and the end of it.  Both throw Error where it cannot be written.
 void print(std::string_view text);
 void finish_output();
 

@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 #include <diracstep/command/variable_steps.hpp>
+#include <diracstep/core/adaptive/rate_survey.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/reports/report.hpp>
 #include <utility>
@@ -17,7 +18,6 @@ constexpr std::array<std::pair<const char*, StepControl>, 3> controls{
      {"irreversible", StepControl::irreversible}}};
 
 constexpr long plan_survey_steps = 2000;
-constexpr double pays = 5.0;
 
 std::string short_number(double value) { return std::isnan(value) ? "" : fmt::format("{:.2e}", value); }
 
@@ -61,20 +61,23 @@ std::string search_table(const ErrorControlReport& search) {
                     short_number(run.difference), short_number(run.estimate),
                     std::isnan(run.observed_order) ? "" : fmt::format("{:.1f}", run.observed_order),
                     run.failure});
-  return fmt::format("{} steps with {}, order {}: {}\n{}", search.adaptive ? "variable" : "fixed",
-                     search.method, search.order, search.reason, aligned(rows));
+  std::string head = fmt::format("{} steps with {}, order {}", search.adaptive ? "variable" : "fixed",
+                                 search.method, search.order);
+  for (const std::string& reason : {search.method_reason, search.reason})
+    if (!reason.empty()) head += "; " + reason;
+  return fmt::format("{}\n{}", head, aligned(rows));
 }
 
 PlanLine rate_line(const Scene& given, const SolverFactory& solvers, double end) {
   const auto scene = completed(std::make_shared<const Scene>(given));
-  if (scene->lagrangian->structure().y_hessian_zero)
+  if (!has_accelerations(*scene))
     return {"variable steps", "not offered", "L is linear in v: no accelerations to choose them by"};
   const RateSurvey survey = survey_rate(*scene, solvers, end, plan_survey_steps);
   if (!survey.failure.empty()) return {"variable steps", "not known", survey.failure};
   const std::string reason =
       fmt::format("max ω / min ω = {:.2g} over the first {:.3g} of {:.3g} units of time", survey.ratio(),
                   survey.covered, std::abs(end - scene->start.time));
-  if (survey.ratio() > pays) return {"variable steps", "pay: --adaptive", reason};
+  if (survey.variable_steps_pay()) return {"variable steps", "pay: --adaptive", reason};
   return {"variable steps", "left out", reason + ", they pay above 5"};
 }
 

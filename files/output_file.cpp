@@ -9,7 +9,6 @@
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/files/output_file.hpp>
 #include <filesystem>
-#include <stdexcept>
 #include <utility>
 
 namespace diracstep {
@@ -86,7 +85,7 @@ std::string OutputFile::beginning(long count) const {
 }
 
 void OutputFile::refuse(const char* what) const {
-  throw std::runtime_error(fmt::format("'{}' {}: {}", path_, what, std::strerror(errno)));
+  throw Error(fmt::format("'{}' {}: {}", path_, what, std::strerror(errno)));
 }
 
 namespace {
@@ -110,12 +109,12 @@ void replace_file(const std::string& given, std::string_view bytes) {
   const std::string fresh = path + ".new";
   try {
     write_once(fresh, bytes, true);
-  } catch (const std::runtime_error&) {
+  } catch (const Error&) {
     fs::remove(fresh, none);
     throw;
   }
   if (std::rename(fresh.c_str(), path.c_str()) != 0)
-    throw std::runtime_error(fmt::format("'{}' could not be replaced: {}", path, std::strerror(errno)));
+    throw Error(fmt::format("'{}' could not be replaced: {}", path, std::strerror(errno)));
   sync_folder_of(path);
 }
 

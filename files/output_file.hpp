@@ -23,7 +23,7 @@ class OutputFile {
 
   const std::string& path() const { return path_; }
 
-  /// All throw std::runtime_error, naming the path and the reason: a full disk, a quota, an unplugged device.
+  /// All throw Error, naming the path and the reason: a full disk, a quota, an unplugged device.
   void write(std::string_view bytes);  ///< all or, where the file can be cut, none of them
   void sync();                         ///< on the disk, not only in the system's memory
   void close();

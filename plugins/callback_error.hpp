@@ -1,16 +1,16 @@
 #pragma once
 
+#include <diracstep/core/numerics/errors.hpp>
 #include <exception>
-#include <stdexcept>
 #include <string>
 
 namespace diracstep {
 
 /// A callback of a plugin or of a program in another language returned an error or threw.  Says whose
 /// callback it was, which one, and what it said.
-class CallbackError : public std::runtime_error {
+class CallbackError : public Error {
  public:
-  using std::runtime_error::runtime_error;
+  using Error::Error;
 };
 
 /// Calls `callback()`, which returns 0 or an error number.  `explain(status)` tells what the number means.

@@ -4,9 +4,9 @@
 
 #include <cstddef>
 #include <deque>
+#include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/numerics/jet.hpp>
 #include <span>
-#include <stdexcept>
 #include <type_traits>
 #include <vector>
 
@@ -61,7 +61,7 @@ class HostFunction {
   template <class X, class Y>
   T operator()(double t, X x, Y y) {
     if (function_ == nullptr || function_->value == nullptr)
-      throw std::runtime_error("the host gives no such function; a Hamiltonian must be asked for");
+      throw Error("the host gives no such function; a Hamiltonian must be asked for");
     for (std::size_t i = 0; i < n_; ++i) {
       x_[i] = x(static_cast<int>(i));
       y_[i] = y(static_cast<int>(i));
@@ -106,7 +106,7 @@ class HostFunction {
       if (status == 0 && Variables<T>::order == 2)
         status = f.hessian(f.data, t, x, y, h, h + entries_, h + 2 * entries_);
     }
-    if (status != 0) throw std::runtime_error("the host's function failed");
+    if (status != 0) throw Error("the host's function failed");
   }
 
   double expand(const Answer& a) const requires std::is_same_v<T, double> { return a.f; }

@@ -15,8 +15,8 @@ namespace {
 
 constexpr double shown_error = 1e-6;
 constexpr long max_numbers = 60'000;  // positions kept of a run, give or take half
-constexpr long finer_track = 4;        // points of a motion to those of the other curves
-constexpr long fewest_points = 50;     // … and the points kept of the largest scene
+constexpr long finer_track = 4;       // points of a motion to those of the other curves
+constexpr long fewest_points = 50;    // … and the points kept of the largest scene
 
 /// Better: below the shown error, and there the least work; else the smaller error.
 bool better(const StudyRow& a, const StudyRow& b) {
@@ -150,13 +150,14 @@ void record_track(History& history, const Study& study, const StudyRow& row, lon
       std::clamp(max_numbers / std::max(drawn, 1L), std::min(fewest_points, points), finer_track * points);
   const StepGrid grid = grid_of(study, std::max(row.steps, kept / 2));
   Integrator integrator = integrator_of(grid.step);
-  const RunReport report =
-      run(integrator, grid.steps, study.momentum, std::max(1L, grid.steps / kept), [&](const Sample& sample) {
-        history.track_time.push_back(sample.time);
-        Vector& at = history.positions.emplace_back(drawn);
-        for (long i = 0; i < drawn; ++i) at[i] = sample.q[coordinates[static_cast<std::size_t>(i)].index];
-        return true;
-      });
+  const RunReport report = run_steps(integrator, grid.steps, study.momentum, std::max(1L, grid.steps / kept),
+                                     [&](const Sample& sample) {
+                                       history.track_time.push_back(sample.time);
+                                       Vector& at = history.positions.emplace_back(drawn);
+                                       for (long i = 0; i < drawn; ++i)
+                                         at[i] = sample.q[coordinates[static_cast<std::size_t>(i)].index];
+                                       return true;
+                                     });
   if (!report.ok()) history.failure = "the run for the picture of the motion: " + report.last.failure;
 }
 
@@ -179,11 +180,12 @@ History record_history(const CatalogueScene& entry, const Registry& registry, co
   history.error_against = error.against();
   Recorder recorder(entry, integrator.scene(), history);
   const long every = std::max(1L, grid.steps / points);
-  const RunReport report = run(integrator, grid.steps, study.momentum, every, [&](const Sample& sample) {
-    recorder.take(sample);
-    error.take(sample, std::lround((sample.time - study.t_start) / grid.step));
-    return true;
-  });
+  const RunReport report =
+      run_steps(integrator, grid.steps, study.momentum, every, [&](const Sample& sample) {
+        recorder.take(sample);
+        error.take(sample, std::lround((sample.time - study.t_start) / grid.step));
+        return true;
+      });
   history.error = error.relative();
   if (!report.ok()) history.failure = report.last.failure;
   return history;

@@ -7,7 +7,7 @@
 
 namespace diracstep {
 
-/// One run looked at on the way: how wrong it is, and what should stay, over time.
+/// The error of one run, and what should stay constant, over time.
 struct History {
   std::string method;  ///< empty where there is no run to look at
   int order = 0;

@@ -76,7 +76,7 @@ std::string render(const std::string& picture, const std::string& stem, std::siz
   for (const auto& [ending, settings] : terminals)
     script += fmt::format("reset\nset terminal {}\nset output {}\n{}unset output\n", settings(width, height),
                           gnuplot_text(stem + ending), picture);
-  const std::string failure = run_gnuplot(script);
+  std::string failure = run_gnuplot(script);
   if (!failure.empty()) return failure;
   for (const auto& [ending, settings] : terminals)
     if (std::error_code error; !std::filesystem::file_size(stem + ending, error))

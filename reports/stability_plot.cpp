@@ -114,7 +114,7 @@ std::vector<Curve> growth_curves(const std::vector<LinearStability>& linear,
   return curves;
 }
 
-/// One curve for each method and one for the best IDA at the dearest cost.
+/// One curve for each method and one for the best IDA at the highest CPU time.
 Picture group_picture(const std::string& group, const std::vector<const StabilityResult*>& results) {
   const auto with_errors = std::ranges::count_if(results, [](const StabilityResult* result) {
     return std::ranges::any_of(result->rows,
@@ -142,7 +142,7 @@ Picture group_picture(const std::string& group, const std::vector<const Stabilit
                                                          : row.watches.front().band);
     for (auto ida = result->ida.rbegin(); ida != result->ida.rend(); ++ida)
       if (ida->ok()) {
-        curve("IDA, at the dearest cost").add(result->that.value, errors ? ida->error : ida->deviation);
+        curve("IDA, at the highest CPU time").add(result->that.value, errors ? ida->error : ida->deviation);
         break;
       }
   }
@@ -153,7 +153,7 @@ Picture group_picture(const std::string& group, const std::vector<const Stabilit
 
 std::string draw_linear_stability(const std::vector<LinearStability>& linear,
                                   const std::filesystem::path& directory) {
-  const std::string failure =
+  std::string failure =
       draw({"oscillator", "hω", "spectral radius of a step",
             growth_curves(linear, [](const GrowthPoint& point) { return point.oscillator; }), 20},
            directory, "growth_oscillator");

@@ -1,7 +1,7 @@
 #include <diracstep/core/numerics/errors.hpp>
-#include <diracstep/scene_format/loader/scene_file.hpp>
 #include <diracstep/scene_format/loader/shipped_scenes.hpp>
 #include <diracstep/scene_format/scene_catalogue.hpp>
+#include <diracstep/scene_format/scene_file.hpp>
 
 namespace diracstep {
 

@@ -48,7 +48,7 @@ Iteration iteration(const std::string& name);
 
 /// Solves nonlinear problems with SUNDIALS KINSOL: Newton's method with exact Jacobians, and once more with a
 /// line search where that fails.  Full patterns are factored densely, others with KLU, or with full matrices
-/// and Eigen's sparse LU where the library was built without it.  The factory throws std::runtime_error where
+/// and Eigen's sparse LU where the library was built without it.  The factory throws Error where
 /// SUNDIALS cannot set itself up.
 SolverFactory kinsol(KinsolOptions options = {});
 

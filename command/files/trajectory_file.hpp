@@ -30,7 +30,7 @@ class TrajectoryFile {
   /// Writes what is still gathered where an exception ends the run; close() tells whether that was possible.
   ~TrajectoryFile();
 
-  /// All throw std::runtime_error where the system refuses to write.
+  /// All throw Error where the system refuses to write.
   void write(const Sample& sample);
   void close();
   /// Puts all lines so far on the disk.

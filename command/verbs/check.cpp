@@ -6,8 +6,8 @@
 #include <diracstep/command/arguments.hpp>
 #include <diracstep/command/interrupt.hpp>
 #include <diracstep/command/progress.hpp>
+#include <diracstep/command/verbs.hpp>
 #include <diracstep/command/verbs/published_check.hpp>
-#include <diracstep/command/verbs/verbs.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/reports/report.hpp>
 #include <diracstep/validation/laws/count_allocations.hpp>

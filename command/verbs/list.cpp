@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <diracstep/command/interrupt.hpp>
 #include <diracstep/command/progress.hpp>
-#include <diracstep/command/verbs/verbs.hpp>
+#include <diracstep/command/verbs.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/reports/report.hpp>
 #include <diracstep/validation/studies/convergence_study.hpp>
@@ -115,7 +115,8 @@ std::string method_table(const Session& session, const std::vector<Measurements>
     const MethodInfo info = session.registry.method(names[i]).info;
     rows.push_back({info.name, fmt::format("{}", static_cast<int>(info.type)), fmt::format("{}", info.order),
                     measured.empty() ? "see --measure" : range(measured[i]),
-                    fmt::format("{}", fmt::join(possible_orders(info), " ")), info.summary});
+                    fmt::format("{}", fmt::join(possible_orders(info), " ")),
+                    info.solved_as.empty() ? info.summary : info.summary + "; " + info.solved_as});
   }
   return aligned(rows);
 }
@@ -135,7 +136,8 @@ Json method_json(const Session& session, const std::vector<Measurements>& measur
                        {"orders", possible_orders(info)},
                        {"self_adjoint", info.self_adjoint},
                        {"constraint_rule", name(info.constraint_rule)},
-                       {"summary", info.summary}});
+                       {"summary", info.summary},
+                       {"solved_as", info.solved_as}});
   }
   return methods;
 }

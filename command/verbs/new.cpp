@@ -2,7 +2,7 @@
 
 #include <CLI/App.hpp>
 #include <cstdio>
-#include <diracstep/command/verbs/verbs.hpp>
+#include <diracstep/command/verbs.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/scene_format/loader/scene_template.hpp>
 #include <memory>
@@ -27,7 +27,7 @@ void write_new(const std::string& path, const std::string& text) {
   const bool written = std::fwrite(text.data(), 1, text.size(), file) == text.size();
   if (std::fclose(file) == 0 && written) return;
   std::remove(path.c_str());
-  throw std::runtime_error(fmt::format("'{}' could not be written in full", path));
+  throw Error(fmt::format("'{}' could not be written in full", path));
 }
 
 void make(const Options& options) {

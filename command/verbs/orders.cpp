@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <diracstep/command/interrupt.hpp>
-#include <diracstep/command/verbs/verbs.hpp>
+#include <diracstep/command/verbs.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/validation/laws/order_table.hpp>
 #include <fstream>
@@ -42,7 +42,7 @@ constexpr const char* explanation =
     "before\n"
     "it dominates those of higher order, so slopes of 9 to 15 are seen here; in extended precision the order "
     "is 10\n"
-    "(`tests/core/composition_test.cpp`, with all order conditions).\n\n";
+    "(`tests/core/methods/composition_test.cpp`, with all order conditions).\n\n";
 
 nlohmann::ordered_json number(double x) {
   return std::isfinite(x) ? nlohmann::ordered_json(x) : nlohmann::ordered_json();

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <diracstep/command/arguments.hpp>
 #include <diracstep/command/variable_steps.hpp>
-#include <diracstep/command/verbs/verbs.hpp>
+#include <diracstep/command/verbs.hpp>
 #include <diracstep/core/integrator/integrator.hpp>
 #include <diracstep/reports/report.hpp>
 #include <diracstep/scene_format/scene_catalogue.hpp>

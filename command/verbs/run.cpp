@@ -7,9 +7,10 @@
 #include <diracstep/command/interrupt.hpp>
 #include <diracstep/command/progress.hpp>
 #include <diracstep/command/run_control.hpp>
-#include <diracstep/command/verbs/verbs.hpp>
-#include <diracstep/core/adaptive/adaptive_integrator.hpp>
+#include <diracstep/command/verbs.hpp>
+#include <diracstep/core/adaptive/adaptive_run.hpp>
 #include <diracstep/core/adaptive/error_control.hpp>
+#include <diracstep/core/adaptive/rate_monitor.hpp>
 #include <diracstep/core/adaptive/variable_run_checks.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/runs/run.hpp>
@@ -141,9 +142,9 @@ void run_variable(const Options& options, const CatalogueScene& entry, AdaptiveI
     return !interrupted();
   };
   const std::vector<double> times = options.at.empty() ? std::vector<double>{} : numbers("--at", options.at);
-  const RunReport report =
-      times.empty() ? diracstep::run(integrator, end, result.momentum, options.every, keep, &checks)
-                    : run_at(integrator, times, result.momentum, keep, &checks);
+  const RunReport report = times.empty()
+                               ? run_until(integrator, end, result.momentum, options.every, keep, &checks)
+                               : run_at(integrator, times, result.momentum, keep, &checks);
   result.failure = report.last.failure;
   if (result.failure.empty() && interrupted())
     result.failure = fmt::format("interrupted at t = {:.17g}", integrator.time());
@@ -195,13 +196,13 @@ IntegratorOptions run_once(const Options& options, const CatalogueScene& entry, 
 ErrorControlReport search(const Options& options, const CatalogueScene& entry, const Session& session,
                           double end, const IntegratorOptions& chosen) {
   ErrorControlOptions wanted{.error = *options.error};
-  if (options.method.given) wanted.method = options.method.name;
+  wanted.method = options.method.name;
   wanted.order = options.method.order;
   if (options.adaptive || options.fixed) wanted.adaptive = options.adaptive;
   wanted.control = step_control(options.control);
   if (options.step)
     wanted.first_step = std::abs(*options.step);
-  else if (entry.scene->lagrangian && entry.scene->lagrangian->structure().y_hessian_zero)
+  else if (!has_accelerations(*completed(entry.scene)))
     wanted.first_step = std::abs(entry.natural_step);
   wanted.integrator = chosen;
   wanted.max_solves = options.max_solves;

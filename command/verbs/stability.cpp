@@ -6,7 +6,7 @@
 #include <diracstep/command/files/written_file.hpp>
 #include <diracstep/command/interrupt.hpp>
 #include <diracstep/command/progress.hpp>
-#include <diracstep/command/verbs/verbs.hpp>
+#include <diracstep/command/verbs.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/reports/stability_report.hpp>
 #include <diracstep/validation/studies/convergence_study.hpp>

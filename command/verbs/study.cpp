@@ -7,7 +7,7 @@
 #include <diracstep/command/interrupt.hpp>
 #include <diracstep/command/progress.hpp>
 #include <diracstep/command/scene_selection.hpp>
-#include <diracstep/command/verbs/verbs.hpp>
+#include <diracstep/command/verbs.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/reports/build_facts.hpp>
 #include <diracstep/reports/plot.hpp>

@@ -1,10 +1,11 @@
 #include <algorithm>
 #include <cmath>
 #include <diracstep/core/adaptive/adaptive_integrator.hpp>
-#include <diracstep/core/adaptive/variable_run_checks.hpp>
+#include <diracstep/core/adaptive/pointwise_motion.hpp>
+#include <diracstep/core/adaptive/rate_survey.hpp>
 #include <diracstep/core/methods/composition.hpp>
+#include <diracstep/core/methods/default_method.hpp>
 #include <diracstep/core/numerics/errors.hpp>
-#include <sstream>
 #include <utility>
 
 namespace diracstep {
@@ -13,14 +14,8 @@ namespace {
 
 constexpr double lowest_ratio = 0.8, highest_ratio = 1.25;  // of z to ω before the guard acts
 constexpr double size_tolerance = 1e-10;  // relative, of an equation in the step: below it is round-off
-constexpr int max_sizes = 30;            // tried for one step
+constexpr int max_sizes = 30;             // tried for one step
 constexpr long survey_steps = 120;
-
-std::string text(double value) {
-  std::ostringstream stream;
-  stream << value;
-  return stream.str();
-}
 
 /// The options of the integrator under the control: a step that solves for its size is no composition itself.
 IntegratorOptions inner_options(IntegratorOptions options, const Registry& registry, StepControl control) {
@@ -39,7 +34,7 @@ IntegratorOptions inner_options(IntegratorOptions options, const Registry& regis
 IntegratorOptions with_method(IntegratorOptions options, const Scene& scene) {
   if (options.method != automatic_method) return options;
   const DefaultMethod choice =
-      default_method(scene, options.order, options.constraint_rule, large_from(options.dense_limit));
+      default_method(scene, {options.order, 0.0, options.constraint_rule, large_from(options.dense_limit)});
   options.method = choice.method;
   options.order = choice.order;
   return options;
@@ -53,7 +48,7 @@ std::vector<double> eps_fractions(const IntegratorOptions& given, int inner_orde
 
 const AdaptiveOptions& checked(const AdaptiveOptions& adaptive) {
   if (!(adaptive.eps > 0.0) || !std::isfinite(adaptive.eps))
-    throw Misuse("eps = " + text(adaptive.eps) + "; radians of a step, above 0, are needed");
+    throw Misuse("eps = " + to_text(adaptive.eps) + "; radians of a step, above 0, are needed");
   return adaptive;
 }
 
@@ -145,7 +140,7 @@ StepReport AdaptiveIntegrator::failed(const std::string& what) const {
   report.solve.status = SolveStatus::no_convergence;
   report.step = work().steps;
   report.time = time();
-  report.failure = "step " + std::to_string(report.step) + " from t = " + text(report.time) + ": " + what;
+  report.failure = "step " + std::to_string(report.step) + " from t = " + to_text(report.time) + ": " + what;
   return report;
 }
 
@@ -230,7 +225,7 @@ StepReport AdaptiveIntegrator::solve_size(double eps, double guess, double& size
 StepReport AdaptiveIntegrator::sample_at(double t, Momentum momentum, Sample& sample) {
   const double size = t - time();
   if (!(std::abs(size) <= 2.0 * std::abs(next_size_)))
-    throw Misuse("t = " + text(t) + " is more than two steps from the last node, t = " + text(time()));
+    throw Misuse("t = " + to_text(t) + " is more than two steps from the last node, t = " + to_text(time()));
   StepReport report;
   if (size == 0.0) {
     report.solve = main_.sample(momentum, sample);
@@ -243,7 +238,7 @@ StepReport AdaptiveIntegrator::sample_at(double t, Momentum momentum, Sample& sa
     sample.time = t;
   }
   if (!report.ok())
-    report.failure = "reading the state at t = " + text(t) + ": " + describe(report.solve.status);
+    report.failure = "reading the state at t = " + to_text(t) + ": " + describe(report.solve.status);
   return report;
 }
 
@@ -254,81 +249,12 @@ std::vector<PlanLine> AdaptiveIntegrator::plan() const {
                    integrating                                 ? "integrating controller"
                    : adaptive_.control == StepControl::in_step ? "equation in the step"
                                                                : "eps/ω at the node",
-                   "eps = " + text(adaptive_.eps) + " radians"});
+                   "eps = " + to_text(adaptive_.eps) + " radians"});
   lines.push_back({"monitor", meter_.generic() ? "generic" : "the user's own",
-                   meter_.generic()
-                       ? "ω0 = " + text(meter_.scales().typical) + ", ω_min = " + text(meter_.scales().lowest)
-                       : "even in v at the start"});
+                   meter_.generic() ? "ω0 = " + to_text(meter_.scales().typical) +
+                                          ", ω_min = " + to_text(meter_.scales().lowest)
+                                    : "even in v at the start"});
   return lines;
-}
-
-namespace {
-
-/// Whether `size` leads from t to `end` or beyond, in its own direction; within round-off counts.
-bool reaches(double t, double size, double end) {
-  const double left = end - t;
-  return size > 0.0 ? size >= left * (1.0 - 1e-12) : size <= left * (1.0 - 1e-12);
-}
-
-void require_ahead(double from, double to, double direction) {
-  if (std::isfinite(to) && (to - from) * direction >= 0.0) return;
-  throw Misuse("t = " + text(to) + " does not lie ahead of t = " + text(from));
-}
-
-StepReport checked_step(AdaptiveIntegrator& integrator, VariableRunChecks* checks) {
-  if (checks != nullptr) checks->before_step();
-  StepReport report = integrator.step();
-  if (checks != nullptr && report.ok()) checks->after_step();
-  return report;
-}
-
-/// Shows a point to the checks and to the observer; whether the run goes on.
-bool shown(const Sample& sample, const Observer& observer, VariableRunChecks* checks) {
-  if (checks != nullptr) checks->see(sample);
-  return !observer || observer(sample);
-}
-
-}  // namespace
-
-RunReport run_at(AdaptiveIntegrator& integrator, std::span<const double> times, Momentum momentum,
-                 const Observer& observer, VariableRunChecks* checks) {
-  double last = integrator.time();
-  for (const double t : times) {
-    require_ahead(last, t, integrator.next_size());
-    last = t;
-  }
-  RunReport report;
-  Sample sample;
-  for (const double t : times) {
-    while (!reaches(integrator.time(), integrator.next_size(), t)) {
-      report.last = checked_step(integrator, checks);
-      if (!report.last.ok()) return report;
-    }
-    report.last = integrator.sample_at(t, momentum, sample);
-    if (!report.last.ok() || !shown(sample, observer, checks)) return report;
-  }
-  return report;
-}
-
-RunReport run(AdaptiveIntegrator& integrator, double end, Momentum momentum, long every,
-              const Observer& observer, VariableRunChecks* checks) {
-  if (every < 1) throw Misuse("every = " + std::to_string(every) + "; 1 or more is needed");
-  require_ahead(integrator.time(), end, integrator.next_size());
-  RunReport report;
-  Sample sample;
-  for (long k = 0;; ++k) {
-    if (k % every == 0) {
-      report.last = integrator.sample_at(integrator.time(), momentum, sample);
-      if (!report.last.ok() || !shown(sample, observer, checks)) return report;
-    }
-    if (reaches(integrator.time(), integrator.next_size(), end)) break;
-    report.last = checked_step(integrator, checks);
-    if (!report.last.ok()) return report;
-  }
-  if (integrator.time() == end && integrator.work().steps % every == 0) return report;
-  report.last = integrator.sample_at(end, momentum, sample);
-  if (report.last.ok()) shown(sample, observer, checks);
-  return report;
 }
 
 }  // namespace diracstep

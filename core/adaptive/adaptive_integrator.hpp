@@ -1,11 +1,8 @@
 #pragma once
 
 #include <diracstep/core/adaptive/rate_monitor.hpp>
-#include <diracstep/core/adaptive/rate_survey.hpp>
 #include <diracstep/core/integrator/integrator.hpp>
-#include <diracstep/core/runs/run.hpp>
 #include <optional>
-#include <span>
 #include <string>
 #include <vector>
 
@@ -35,8 +32,9 @@ struct AdaptiveOptions {
   MonitorScales scales = {};       ///< of the generic monitor; zeros are taken from a survey towards `end`
   std::optional<double> end = {};  ///< where the motion will end, for the survey; 100 steps of the options'
                                    ///< size without it
-  double smallest_step = 0.0;    ///< without sign: ω counts as at most eps over it; 0: 1e-9 of the time to `end`
-  long max_steps = 10'000'000;   ///< the next one fails
+  double smallest_step =
+      0.0;  ///< without sign: ω counts as at most eps over it; 0: 1e-9 of the time to `end`
+  long max_steps = 10'000'000;  ///< the next one fails
 };
 
 /// What the control did since the start.
@@ -113,17 +111,5 @@ class AdaptiveIntegrator {
   };
   std::vector<Sizes> last_sizes_;  ///< of each part
 };
-
-class VariableRunChecks;
-
-/// Steps to `end` and shows the start, every `every`-th node and the end itself, which a side step reaches.
-/// `checks`, where given, see the same points and every step.
-RunReport run(AdaptiveIntegrator& integrator, double end, Momentum momentum, long every,
-              const Observer& observer, VariableRunChecks* checks = nullptr);
-
-/// Shows the motion at the given times, which must run from the start in the direction of the motion, by side
-/// steps.  Throws Misuse for times out of order.
-RunReport run_at(AdaptiveIntegrator& integrator, std::span<const double> times, Momentum momentum,
-                 const Observer& observer, VariableRunChecks* checks = nullptr);
 
 }  // namespace diracstep

@@ -1,26 +1,21 @@
 #include <algorithm>
 #include <cmath>
 #include <diracstep/core/adaptive/error_control.hpp>
+#include <diracstep/core/adaptive/rate_survey.hpp>
 #include <diracstep/core/adaptive/refinement_search.hpp>
+#include <diracstep/core/methods/default_method.hpp>
 #include <diracstep/core/numerics/errors.hpp>
-#include <sstream>
 
 namespace diracstep {
 namespace {
 
 using detail::RefinementSearch;
 
-constexpr double pays = 5.0;               // max ω / min ω from which variable steps are tried
 constexpr double cost_of_variable = 1.4;   // of a variable step beside a fixed one of the same method
 constexpr double most_over_median = 30.0;  // of the rate that the first fixed step follows
 constexpr long survey_steps = 400;
 
-std::string text(double value) {
-  std::ostringstream stream;
-  stream.precision(3);
-  stream << value;
-  return stream.str();
-}
+std::string text(double value) { return to_text(value, 3); }
 
 /// Adds the work of a search that was given up.
 void add_work(Work& all, const Work& part) {
@@ -84,19 +79,26 @@ ErrorControlReport search_both(const RefinementSearch::Motion& motion, const Err
   return fixed;
 }
 
-}  // namespace
-
-std::string method_for(const Scene& scene, double error) {
-  const int size = scene.dimension() + scene.rows();
-  int stages = 2;
-  if (size <= 12)
-    stages = error > 1e-5 ? 3 : error > 1e-9 ? 4 : 6;
-  else if (size <= 30)
-    stages = error > 1e-8 ? 3 : 4;
-  else
-    stages = error > 1e-7 ? 2 : 3;
-  return "type1/gl:" + std::to_string(stages);
+/// The method and its order, and whether sums are compensated: for small errors, where the library chooses.
+void choose_method(const Scene& scene, const Registry& registry, const ErrorControlOptions& options,
+                   ErrorControlReport& report) {
+  if (options.method != automatic_method) {
+    const MethodInfo info = registry.method(options.method).info;
+    report.method = info.name;
+    report.order = options.order == 0 ? info.order : options.order;
+    report.compensated_sums = options.compensated_sums.value_or(false);
+    return;
+  }
+  const DefaultMethod choice = default_method(scene, {.order = options.order, .error = options.error});
+  const bool has_compensated_sums = registry.method(choice.method).info.stages > 0;
+  report.method = choice.method;
+  report.order = choice.order;
+  report.method_reason = choice.reason;
+  report.compensated_sums = options.compensated_sums.value_or(
+      has_compensated_sums && has_accelerations(scene) && options.error < 1e-8);
 }
+
+}  // namespace
 
 ErrorControlReport solve_to_error(const std::shared_ptr<const Scene>& given, const Registry& registry,
                                   const SolverFactory& solvers, double end,
@@ -104,23 +106,19 @@ ErrorControlReport solve_to_error(const std::shared_ptr<const Scene>& given, con
   if (!(options.error > 0.0) || !(options.error < 1.0))
     throw Misuse("error = " + text(options.error) + "; a relative error between 0 and 1 is needed");
   const auto scene = completed(given);
-  const bool accelerates = !scene->lagrangian->structure().y_hessian_zero;
+  const bool accelerates = has_accelerations(*scene);
   ErrorControlReport report;
-  report.method = options.method.empty() ? method_for(*scene, options.error) : options.method;
-  const Method method = registry.method(report.method);
-  report.order = options.order == 0 ? method.info.order : options.order;
+  choose_method(*scene, registry, options, report);
   RateSurvey survey;
   if (accelerates) survey = survey_rate(*scene, solvers, end, survey_steps);
-  report.compensated_sums =
-      options.compensated_sums.value_or(options.method.empty() && accelerates && options.error < 1e-8);
   const FirstSteps first = first_steps(options, survey, report.order, std::abs(end - scene->start.time));
   const RefinementSearch::Motion motion{
       scene, registry, solvers, end, options, survey.scales, RefinementSearch::Clock::now()};
-  const double ratio = options.monitor.rate ? pays + 1.0 : survey.ratio();
   report.reason = options.adaptive       ? "as asked for"
                   : options.monitor.rate ? "a monitor is given"
-                                         : "max ω / min ω = " + text(ratio);
-  const bool may_pay = accelerates && survey.failure.empty() && ratio > pays;
+                                         : "max ω / min ω = " + text(survey.ratio());
+  const bool may_pay =
+      accelerates && survey.failure.empty() && (options.monitor.rate || survey.variable_steps_pay());
   if (!options.adaptive && may_pay) return search_both(motion, report, first);
   report.adaptive = options.adaptive.value_or(false);
   RefinementSearch(motion, report, report.adaptive ? first.eps : first.fixed).go();

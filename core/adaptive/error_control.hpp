@@ -4,6 +4,7 @@
 #include <diracstep/core/adaptive/step_plan.hpp>
 #include <functional>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -12,9 +13,9 @@ namespace diracstep {
 
 /// The error asked for, and how far the search may go.
 struct ErrorControlOptions {
-  double error = 0.0;       ///< asked for at the end of the motion, see ErrorControlReport::estimate
-  std::string method = {};  ///< empty: chosen by the size of the scene and the error
-  int order = 0;            ///< composes a given method to this order
+  double error = 0.0;  ///< asked for at the end of the motion, see ErrorControlReport::estimate
+  std::string method = automatic_method;  ///< "auto": default_method() for this error
+  int order = 0;  ///< as in IntegratorOptions; without a method, the one of default_method()
   std::optional<bool> adaptive = {};  ///< empty: where a survey finds max ω > 5 min ω and coarse runs of both
                                       ///< kinds measure that variable steps need fewer solves
   Monitor monitor = {};  ///< for variable steps; empty: the generic one
@@ -23,7 +24,7 @@ struct ErrorControlOptions {
   std::optional<bool> compensated_sums = {};  ///< empty: where the library chooses the method and the error
                                               ///< is below 1e-8
   IntegratorOptions integrator = {};          ///< the rule of rows and all else that is not said above
-  long max_solves = 1'000'000;                ///< nonlinear systems in all
+  long max_solves = 1'000'000;                ///< nonlinear systems in all, or explicit steps
   double max_time = 30.0;                     ///< seconds on the clock in all
   std::function<bool()> go_on = {};           ///< asked within each run; false ends the search
 };
@@ -44,9 +45,10 @@ struct ErrorControlReport {
   std::string refusal;  ///< empty, or why the error asked for was not reached
   std::string warning;  ///< empty, or why the estimate deserves less trust
   std::string method;
+  std::string method_reason;  ///< of default_method(), empty where a method was given
   int order = 0;
   bool adaptive = false;
-  std::string reason;    ///< of these choices
+  std::string reason;    ///< why steps vary or do not
   std::string division;  ///< empty, or where the motion was divided for what the forces do there
   double step = 0.0;     ///< of the accepted run, with its sign, the mean where it is not one; eps for
                          ///< variable steps
@@ -94,9 +96,5 @@ ErrorControlReport solve_to_error(const std::shared_ptr<const Scene>& scene, con
 RunReport run_again(const std::shared_ptr<const Scene>& scene, const Registry& registry,
                     const SolverFactory& solvers, const ErrorControlReport& report, Momentum momentum,
                     long every, const Observer& observer);
-
-/// The method that solve_to_error chooses for a scene: GL(s), with s falling as the systems grow and rising
-/// with the accuracy.
-std::string method_for(const Scene& scene, double error);
 
 }  // namespace diracstep

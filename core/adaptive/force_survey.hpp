@@ -1,18 +1,12 @@
 #pragma once
 
+#include <diracstep/core/adaptive/force_polynomial.hpp>
 #include <diracstep/core/adaptive/step_plan.hpp>
-#include <diracstep/core/system/constraint_distribution.hpp>
-#include <diracstep/core/system/scene.hpp>
-#include <string>
+#include <memory>
+#include <utility>
 #include <vector>
 
 namespace diracstep {
-
-/// A point of a run: what it steps over is looked for between such points.
-struct PathPoint {
-  double time;
-  Vector q, v;
-};
 
 /// What a survey of the forces along a run found.
 struct ForceSurveyReport {
@@ -47,37 +41,22 @@ class ForceSurvey {
   ForceSurveyReport along(const std::vector<PathPoint>& path, long parts = 1);
 
  private:
-  struct Cubic;
-  struct Fit {
-    double excess = 0.0;     ///< of the worst point over what is allowed; above 1 the polynomial misses F
-    double time = 0.0;       ///< of that point
-    double deviation = 0.0;  ///< there, in parts of the momentum over time
-  };
-
-  void read(const Cubic& path, double t, VectorRef f);
-  void find_scales(const std::vector<PathPoint>& path);
-  Fit fit(const Cubic& path, double a, double b, long points, const std::vector<double>& known);
-  std::vector<double> known_times(const Cubic& path, double a, double b);
-  void crossings(const Cubic& path, double a, double b, std::vector<double>& times);
-  double crossing(const Cubic& path, double a, double b, int number, bool sign);
-  void examine(const Cubic& path, double a, double b, ForceSurveyReport& report);
-  void divide(const Cubic& path, double a, double b, const std::vector<double>& known,
+  std::vector<double> known_times(const PathCubic& path, double a, double b);
+  void crossings(const PathCubic& path, double a, double b, std::vector<double>& times);
+  double crossing(const PathCubic& path, double a, double b, int number, bool sign);
+  void examine(const PathCubic& path, double a, double b, ForceSurveyReport& report);
+  void divide(const PathCubic& path, double a, double b, const std::vector<double>& known,
               ForceSurveyReport& report);
-  void count_missed(const Cubic& path, double a, double b, std::size_t first, ForceSurveyReport& report);
-  std::pair<double, double> narrow(const Cubic& path, double a, double b);
-  bool jumps(const Cubic& before, const Cubic& after);
+  void count_missed(const PathCubic& path, double a, double b, std::size_t first, ForceSurveyReport& report);
+  std::pair<double, double> narrow(const PathCubic& path, double a, double b);
 
-  const Scene& scene_;
-  double error_;
-  Eigen::Index n_, m_;
-  ConstraintsAtPoint rows_;
-  Vector allowed_, weights_;  ///< of each component of F, and what turns it into parts of the momentum
-  bool smooth_;               ///< as far as is known: no force, no time, no kinks
+  std::shared_ptr<const Kinks> kinks_;
+  long size_;
+  ForcePolynomial force_;
   std::vector<Kinks::Instant> instants_;
-  Vector q_, v_, external_, local_, value_, other_, switches_, before_;
-  Columns samples_;
-  double span_ = 0.0, most_missed_ = 0.0;
-  long points_ = 0, parts_ = 0, readings_ = 0;
+  Vector q_, v_, switches_, before_;
+  double most_missed_ = 0.0;
+  long points_ = 0, parts_ = 0;
   bool whole_ = false;  ///< the last stretch consists of undivided steps
 };
 

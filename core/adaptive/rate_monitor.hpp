@@ -1,8 +1,6 @@
 #pragma once
 
-#include <Eigen/LU>
 #include <diracstep/core/numerics/nonlinear_solver.hpp>
-#include <diracstep/core/system/saddle_point.hpp>
 #include <diracstep/core/system/scene.hpp>
 #include <functional>
 #include <memory>
@@ -17,35 +15,14 @@ struct Monitor {
   bool depends_on_velocity = true;  ///< false saves finding accelerations
 };
 
+/// Whether a scene has accelerations to choose variable steps by: not where its Lagrangian is linear in v.
+bool has_accelerations(const Scene& scene);
+
 /// Throws Misuse where the monitor is not positive and finite at the start, or not even in v there and at
 /// another velocity: names both values.
 void require_even(const Monitor& monitor, const Start& start);
 
-/// Velocities and accelerations of a scene at given points.  Owns what it needs; allocates nothing once made.
-class PointwiseMotion {
- public:
-  /// Throws Misuse for a Lagrangian that is linear in v, which has no accelerations.
-  PointwiseMotion(const Scene& scene, const SolverFactory& solvers, int dense_limit = 40);
-
-  /// v ∈ Δ_Q(q) of the class of p, from a guess in v.
-  SolveReport velocity(double t, ConstVectorRef q, ConstVectorRef p, Vector& v);
-
-  /// The acceleration a of the continuous system at (q, v).  Linear; dense systems are solved directly.
-  SolveReport acceleration(double t, ConstVectorRef q, ConstVectorRef v, VectorRef a);
-
-  long accelerations() const { return accelerations_; }
-
- private:
-  bool dense_;
-  Eigen::Index n_;
-  std::unique_ptr<VelocityProblem> velocity_problem_;
-  std::unique_ptr<AccelerationProblem> acceleration_problem_;
-  std::unique_ptr<NonlinearSolver> velocity_solver_, acceleration_solver_;
-  Eigen::PartialPivLU<Eigen::MatrixXd> factors_;
-  Columns matrix_;
-  Vector velocity_unknowns_, unknowns_, right_hand_side_;
-  long accelerations_ = 0;
-};
+class PointwiseMotion;
 
 /// ω and its change along the motion.
 struct Rate {
@@ -72,6 +49,8 @@ struct MonitorScales {
 class RateMeter {
  public:
   RateMeter(const Scene& scene, const SolverFactory& solvers, Monitor monitor, MonitorScales scales);
+  RateMeter(RateMeter&&) noexcept;
+  ~RateMeter();
 
   /// ω alone; `step` sets the width of the differences.
   Rate rate(double t, ConstVectorRef q, ConstVectorRef v, double step);

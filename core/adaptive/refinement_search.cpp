@@ -1,9 +1,9 @@
 #include <algorithm>
 #include <cmath>
 #include <diracstep/core/adaptive/refinement_search.hpp>
+#include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/core/runs/node_check.hpp>
-#include <sstream>
 #include <utility>
 
 namespace diracstep::detail {
@@ -16,7 +16,6 @@ constexpr std::size_t max_runs = 60;
 constexpr long fewest_steps = 4;        // of a run with variable steps that counts
 constexpr double missed_allowed = 0.1;  // by the forces surveyed, in parts of the error asked for
 constexpr long nodes_between_looks = 64;
-constexpr std::size_t most_known_cuts = 200;
 
 double relative_change(const Vector& a, const Vector& b) {
   const double size = max_norm(b), change = max_norm(a - b);
@@ -27,91 +26,12 @@ double relative_change(const Sample& a, const Sample& b) {
   return std::max(relative_change(a.q, b.q), relative_change(a.p, b.p));
 }
 
-std::string text(double value) {
-  std::ostringstream stream;
-  stream.precision(3);
-  stream << value;
-  return stream.str();
-}
+std::string text(double value) { return to_text(value, 3); }
 
-/// A time with enough digits to find the place again.
-std::string time_text(double t) {
-  std::ostringstream stream;
-  stream.precision(6);
-  stream << t;
-  return stream.str();
-}
-
-/// The whole motion, divided where the time alone makes a force of the scene switch.
-std::vector<Stretch> known_stretches(const Scene& scene, double end) {
-  const double start = scene.start.time;
-  std::vector<Stretch> stretches{{start, end}};
-  if (!scene.kinks) return stretches;
-  std::vector<Kinks::Instant> known = scene.kinks->instants(std::min(start, end), std::max(start, end));
-  std::erase_if(known, [](const Kinks::Instant& instant) { return instant.width > 0.0; });
-  if (known.size() > most_known_cuts) return stretches;
-  if (end < start) std::ranges::reverse(known);
-  for (const Kinks::Instant& instant : known) {
-    const double t = instant.time;
-    const double gap = std::copysign(8.0 * std::numeric_limits<double>::epsilon() * std::abs(t), end - start);
-    Stretch& last = stretches.back();
-    if (gap == 0.0 || (t - last.begin) / gap < 4.0 || (end - t) / gap < 4.0) continue;
-    last.end = t - gap;
-    stretches.push_back({t + gap, end});
-  }
-  return stretches;
-}
-
-StepReport run_fixed(Integrator& integrator, const ErrorControlReport::Steps& steps, const AtNode& at_node) {
-  const ReadNode read = [&](Momentum momentum, Sample& sample) {
-    return integrator.sample(momentum, sample);
-  };
-  if (!at_node(read, false)) return {};
-  long left = steps.plan.steps() * steps.refinement;
-  return steps.plan.run(integrator, steps.refinement, [&] { return at_node(read, --left == 0); });
-}
-
-StepReport run_variable(AdaptiveIntegrator& integrator, double end, const AtNode& at_node) {
-  const ReadNode read = [&](Momentum momentum, Sample& sample) {
-    return integrator.sample(momentum, sample);
-  };
-  for (;;) {
-    const double left = end - integrator.time(), size = integrator.next_size();
-    if (!at_node(read, false)) return {};
-    if (std::abs(size) >= std::abs(left) * (1.0 - 1e-12)) break;
-    const StepReport report = integrator.step();
-    if (!report.ok()) return report;
-  }
-  StepReport report;
-  const ReadNode read_end = [&](Momentum momentum, Sample& sample) {
-    report = integrator.sample_at(end, momentum, sample);
-    return report.solve;
-  };
-  at_node(read_end, true);
-  return report;
-}
+/// Explicit steps solve nothing.
+long effort(const ErrorControlRun& run) { return std::max(run.solves, run.steps); }
 
 }  // namespace
-
-StepReport run_steps_of(const std::shared_ptr<const Scene>& scene, const Registry& registry,
-                        const SolverFactory& solvers, const ErrorControlReport::Steps& steps, bool adaptive,
-                        double end, Work& work, const AtNode& at_node) {
-  StepReport report;
-  if (adaptive) {
-    AdaptiveIntegrator integrator(scene, registry, solvers, steps.integrator, steps.variable);
-    report = run_variable(integrator, end, at_node);
-    work = integrator.work();
-    work.solves += integrator.side_work().solves;
-    work.iterations += integrator.side_work().iterations;
-    work.residual_evaluations += integrator.side_work().residual_evaluations;
-    work.jacobian_evaluations += integrator.side_work().jacobian_evaluations;
-  } else {
-    Integrator integrator(scene, registry, solvers, steps.integrator);
-    report = run_fixed(integrator, steps, at_node);
-    work = integrator.work();
-  }
-  return report;
-}
 
 RefinementSearch::RefinementSearch(const Motion& motion, ErrorControlReport& report, double first)
     : motion_(motion),
@@ -126,7 +46,7 @@ ErrorControlReport::Steps RefinementSearch::steps_of(long refinement) const {
   ErrorControlReport::Steps steps;
   steps.integrator = motion_.options.integrator;
   steps.integrator.method = report_.method;
-  steps.integrator.order = motion_.options.order;
+  steps.integrator.order = report_.order;
   steps.integrator.compensated_sums = report_.compensated_sums;
   steps.refinement = refinement;
   if (report_.adaptive) {
@@ -153,10 +73,10 @@ bool RefinementSearch::time_is_up() const {
 
 /// Whether there will be no further run, which is then told.
 bool RefinementSearch::stopped(long max_solves) {
-  double expected = static_cast<double>(report_.work.solves);
+  double expected = static_cast<double>(std::max(report_.work.solves, report_.work.steps));
   if (!report_.runs.empty()) {
     const ErrorControlRun& last = report_.runs.back();
-    expected += static_cast<double>(last.solves * refinement_) / static_cast<double>(last_refinement_);
+    expected += static_cast<double>(effort(last) * refinement_) / static_cast<double>(last_refinement_);
   }
   const double limit = static_cast<double>(max_solves);
   const double needed = predicted_solves();
@@ -165,10 +85,11 @@ bool RefinementSearch::stopped(long max_solves) {
   else if (time_is_up())
     refuse("the time of " + text(motion_.options.max_time) + " s is used up (--max-time)");
   else if (expected > limit)
-    refuse("the next run would bring the work to " + text(expected) + " nonlinear systems (--max-solves)");
+    refuse("the next run would bring the work to " + text(expected) +
+           " nonlinear systems or explicit steps (--max-solves)");
   else if (convergence_.runs() >= 5 && needed > limit)
     refuse("at the rate of the runs so far it would take about " + text(needed) +
-           " nonlinear systems (--max-solves)");
+           " nonlinear systems or explicit steps (--max-solves)");
   else if (report_.runs.size() >= max_runs)
     refuse("no convergence in " + std::to_string(max_runs) + " runs");
   else
@@ -178,7 +99,7 @@ bool RefinementSearch::stopped(long max_solves) {
 
 double RefinementSearch::predicted_solves() const {
   if (report_.runs.empty()) return 0.0;
-  return convergence_.work_to_go() * static_cast<double>(report_.runs.back().solves);
+  return convergence_.work_to_go() * static_cast<double>(effort(report_.runs.back()));
 }
 
 void RefinementSearch::count(ErrorControlRun& now, const Work& work) {
@@ -321,7 +242,7 @@ bool RefinementSearch::survey(bool accepted) {
   const long parts = std::max(1L, std::lround(static_cast<double>(refinement_) / static_cast<double>(way)));
   const ForceSurveyReport found = forces.along(path, parts);
   if (found.missed <= missed_allowed * motion_.options.error) return true;
-  fast_ = "the force changes fast near t = " + time_text(found.time);
+  fast_ = "the force changes fast near t = " + to_text(found.time);
   if (!accepted && (!found.followed || report_.adaptive)) return true;  // finer steps may do
   if (!found.followed)
     refuse(fast_ + " and on much of the motion: steps that follow it would be too many");

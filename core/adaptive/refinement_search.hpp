@@ -4,18 +4,9 @@
 #include <diracstep/core/adaptive/convergence.hpp>
 #include <diracstep/core/adaptive/error_control.hpp>
 #include <diracstep/core/adaptive/force_survey.hpp>
+#include <diracstep/core/adaptive/search_run.hpp>
 
 namespace diracstep::detail {
-
-/// Reads the state at a node of a run.
-using ReadNode = std::function<SolveReport(Momentum, Sample&)>;
-/// Called at the start, at each node and at the end; false ends the run.
-using AtNode = std::function<bool(const ReadNode& read, bool last)>;
-
-/// One run with the steps of a report.  `work` receives what it took.
-StepReport run_steps_of(const std::shared_ptr<const Scene>& scene, const Registry& registry,
-                        const SolverFactory& solvers, const ErrorControlReport::Steps& steps, bool adaptive,
-                        double end, Work& work, const AtNode& at_node);
 
 /// Repeats one motion with finer and finer steps of one kind, fixed or variable.
 class RefinementSearch {

@@ -12,6 +12,10 @@ struct Stretch {
   long steps = 1;  ///< of the coarsest run
 };
 
+/// The whole motion, divided where the time alone makes a function of the scene switch, as far as its
+/// formulas show (Scene::kinks).
+std::vector<Stretch> known_stretches(const Scene& scene, double end);
+
 /// How a motion is divided into steps of given size: nodes that every run has, where forces switch or change
 /// fast, and between them a number of even steps that rises from run to run by one factor for all stretches,
 /// so that the runs have an order.

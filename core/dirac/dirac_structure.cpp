@@ -6,14 +6,6 @@
 
 namespace diracstep {
 
-namespace {
-
-double base_distance(const Covector& a, const Covector& b) {
-  return std::max(max_norm(a.x - b.x), max_norm(a.y - b.y));
-}
-
-}  // namespace
-
 Covector omega_flat(const PhaseVelocity& z) { return {z.q, z.p, -z.p_rate, z.q_rate}; }
 Covector kappa(const PhaseVelocity& z) { return {z.q, z.q_rate, z.p_rate, z.p}; }
 Covector gamma(const Covector& a) { return {a.x, a.eta, -a.xi, a.y}; }
@@ -71,17 +63,21 @@ double DiscreteDiracStructure::outside_annihilator(double t, const Vector& q, co
 Membership DiscreteDiracStructure::plus(Interval step, const PhasePoint& z0, const PhasePoint& z1,
                                         const Covector& alpha) {
   const Covector flat = omega_flat_plus(z0, z1);
-  const double outside = outside_annihilator(step.start, z0.q, alpha.xi - flat.xi);
-  return {constraint_norm(step, z0.q, z1.q),
-          std::max({outside, max_norm(alpha.eta - flat.eta), base_distance(alpha, flat)})};
+  const double outside = std::max({outside_annihilator(step.start, z0.q, alpha.xi - flat.xi),
+                                   max_norm(alpha.eta - flat.eta), max_norm(alpha.x - flat.x)});
+  const Vector momentum = alpha.y - flat.y;
+  return {constraint_norm(step, z0.q, z1.q), std::max(outside, max_norm(momentum)),
+          std::max(outside, outside_annihilator(step.end(), z1.q, momentum))};
 }
 
 Membership DiscreteDiracStructure::minus(Interval step, const PhasePoint& z0, const PhasePoint& z1,
                                          const Covector& alpha) {
   const Covector flat = omega_flat_minus(z0, z1);
-  const double outside = outside_annihilator(step.end(), z1.q, alpha.eta - flat.eta);
-  return {constraint_norm(step, z0.q, z1.q),
-          std::max({outside, max_norm(alpha.xi - flat.xi), base_distance(alpha, flat)})};
+  const double outside = std::max({outside_annihilator(step.end(), z1.q, alpha.eta - flat.eta),
+                                   max_norm(alpha.xi - flat.xi), max_norm(alpha.y - flat.y)});
+  const Vector momentum = alpha.x - flat.x;
+  return {constraint_norm(step, z0.q, z1.q), std::max(outside, max_norm(momentum)),
+          std::max(outside, outside_annihilator(step.start, z0.q, momentum))};
 }
 
 }  // namespace diracstep

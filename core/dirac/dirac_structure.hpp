@@ -77,11 +77,15 @@ Covector differential_minus(const DiscreteLagrangianAt& l);
 
 // --- Membership
 
-/// How far ((z0,z1),α) is from a discrete Dirac structure; both are zero for a member.
+/// How far ((z0,z1),α) is from a discrete Dirac structure.  There are two readings of (4.24): its base points
+/// must agree, so that p1 = D2L_d in a (+) step; or, with the annihilator as (4.22) writes it, they agree as
+/// momentum classes, so that p1 − D2L_d ∈ Δ°_Q(q1) as in (4.28) and (8.3).  The library's steps are members
+/// in the first sense, which implies the second.
 struct Membership {
   double constraint;  ///< maximum norm of c(q0,q1): (q0,q1) ∈ Δ^d_Q
   double
       annihilator;  ///< maximum norm of what α − Ω♭(z0,z1) has outside the annihilator, base point included
+  double annihilator_of_class;  ///< the same where momenta of the base point count as classes
 };
 
 /// The discrete Dirac structures D_{d+} (4.24) and D_{d−} (4.41) of a discrete constraint.
@@ -89,9 +93,11 @@ class DiscreteDiracStructure {
  public:
   DiscreteDiracStructure(const ConstraintBlocks& constraints, int dimension, const ConstraintRule& rule);
 
-  /// ((z0,z1),α) ∈ D_{d+}: (q0,q1) ∈ Δ^d_Q and α − Ω♭_{d+}(z0,z1) ∈ Δ°_Q(q0) × {0}.
+  /// ((z0,z1),α) ∈ D_{d+}: (q0,q1) ∈ Δ^d_Q and α − Ω♭_{d+}(z0,z1) ∈ Δ°_Q(q0) × {0}, at the same (q0,p1), or
+  /// at one whose p1 differs by Δ°_Q(q1).
   Membership plus(Interval step, const PhasePoint& z0, const PhasePoint& z1, const Covector& alpha);
-  /// ((z0,z1),α) ∈ D_{d−}: (q0,q1) ∈ Δ^d_Q and α − Ω♭_{d−}(z0,z1) ∈ {0} × Δ°_Q(q1).
+  /// ((z0,z1),α) ∈ D_{d−}: (q0,q1) ∈ Δ^d_Q and α − Ω♭_{d−}(z0,z1) ∈ {0} × Δ°_Q(q1), at the same (p0,q1), or
+  /// at one whose p0 differs by Δ°_Q(q0).
   Membership minus(Interval step, const PhasePoint& z0, const PhasePoint& z1, const Covector& alpha);
 
   /// Maximum norm of the part of a covector at q that lies outside Δ°_Q(q).

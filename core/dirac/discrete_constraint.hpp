@@ -11,7 +11,9 @@ namespace diracstep {
 ///   holonomic rows      φ(t1, q1), so that nothing drifts
 ///
 /// with the nodes of the rule (left, right: order 1; midpoint, trapezoidal: order 2), or nonholonomic rows of
-/// one's own.  It contains the diagonal and induces Δ_Q back (Leok and Ohsawa (4.17)–(4.19)).
+/// one's own.  It induces Δ_Q back (Leok and Ohsawa (4.18)–(4.19)), and contains the diagonal (4.17)
+/// for linear nonholonomic rows; φ(t1, q1) = 0 holds on the diagonal only over N = {φ = 0}, affine rows only
+/// where their drift vanishes.
 class DiscreteConstraint {
  public:
   DiscreteConstraint(const ConstraintBlocks& blocks, int dimension, const ConstraintRule& rule);

@@ -96,8 +96,8 @@ Integrator::Integrator(Preparation preparation, const Registry& registry, const 
 
 Method Integrator::choose_method(const Registry& registry) {
   if (options_.method == automatic_method) {
-    const DefaultMethod choice =
-        default_method(*scene_, options_.order, options_.constraint_rule, large_from(options_.dense_limit));
+    const DefaultMethod choice = default_method(
+        *scene_, {options_.order, 0.0, options_.constraint_rule, large_from(options_.dense_limit)});
     options_.method = choice.method;
     options_.order = choice.order;
     preparation_.push_back({"method", "by default", choice.reason});
@@ -112,7 +112,7 @@ Integrator::Part Integrator::make_part(const Method& method, bool mirror_rule,
   if (other_rule && given->own)
     throw Misuse("a discrete constraint of one's own has no adjoint; compose a method that is self-adjoint");
   const auto step = [&](const std::optional<ConstraintRule>& rule) {
-    return method.step(*scene_, matrices_.full, rule, options_.force_degenerate);
+    return method.make_step(*scene_, {matrices_.full, rule, options_.force_degenerate});
   };
   Part part{other_rule ? step(mirrored(given->nodes)) : step(given), nullptr, nullptr};
   if (part.problem->size() > 0) {
@@ -168,7 +168,8 @@ void Integrator::compensate() {
 
 void Integrator::reset() { reset(scene_->start); }
 
-void Integrator::reset(const Start& start) {
+void Integrator::reset(const Start& given) {
+  const Start start = completed_start(*scene_, given);
   require_consistent(*scene_, start);
   clock_ = {start.time, 0.0, 0};
   size_ = options_.step;

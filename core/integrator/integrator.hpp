@@ -6,8 +6,8 @@
 #include <diracstep/core/methods/registry.hpp>
 #include <diracstep/core/numerics/nonlinear_solver.hpp>
 #include <diracstep/core/numerics/snapshot.hpp>
+#include <diracstep/core/steps/gauss_lobatto/phase_space_step.hpp>
 #include <diracstep/core/steps/matrix_form.hpp>
-#include <diracstep/core/steps/phase_space_step.hpp>
 #include <diracstep/core/steps/step_problem.hpp>
 #include <diracstep/core/system/saddle_point.hpp>
 #include <diracstep/core/system/scene.hpp>

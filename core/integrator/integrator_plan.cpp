@@ -6,7 +6,9 @@ std::vector<PlanLine> Integrator::plan() const {
   const Part& part = parts_.front();
   const int m = scene_->rows(), size = part.problem->size();
   std::vector<PlanLine> lines = preparation_;
-  lines.push_back({"step", method_.info.name, method_.info.summary});
+  const MethodInfo& info = method_.info;
+  lines.push_back(
+      {"step", info.name, info.solved_as.empty() ? info.summary : info.summary + "; " + info.solved_as});
   lines.push_back({"unknowns", part.problem->unknowns(),
                    part.solver ? "one nonlinear system in each solve" : "the graph is solved for its end"});
   if (part.solver)
@@ -24,8 +26,8 @@ std::vector<PlanLine> Integrator::plan() const {
     lines.push_back({"projection", "left out", "every momentum is that of a velocity"});
   } else {
     const ConstraintRule rule = options_.constraint_rule.value_or(method_.info.constraint_rule);
-    lines.push_back({"multipliers", std::to_string(m) + (method_.rows_inside ? " a node" : ""),
-                     method_.rows_inside
+    lines.push_back({"multipliers", std::to_string(m) + (method_.info.rows_inside ? " a node" : ""),
+                     method_.info.rows_inside
                          ? "nonholonomic rows at the Gauss, holonomic rows at the Lobatto nodes"
                          : std::string("nonholonomic rows by the ") + rule.description() +
                                " rule, holonomic rows at the end of the step"});

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <diracstep/core/methods/composition.hpp>
 #include <diracstep/core/methods/default_method.hpp>
 #include <diracstep/core/numerics/errors.hpp>
@@ -16,26 +17,46 @@ bool explicit_at_the_ends(const Scene& scene) {
          !l.y_hessian_zero;
 }
 
+int order_for(double error, int size) {
+  if (size <= 12) return error > 1e-5 ? 6 : error > 1e-9 ? 8 : 12;
+  if (size <= 30) return error > 1e-8 ? 6 : 8;
+  return error > 1e-7 ? 4 : 6;
+}
+
+/// An order, and what it follows from.
+struct Order {
+  int p;
+  std::string reason;
+};
+
+Order order_of(const MethodRequest& request, int size) {
+  if (request.order > 0) return {request.order, "the order asked for"};
+  if (request.error > 0.0)
+    return {order_for(request.error, size),
+            "for an error of " + to_text(request.error, 3) + " with " + std::to_string(size) + " unknowns"};
+  return {usual_order, "near the least time for errors of 1e-3; order 8 for small ones"};
+}
+
 }  // namespace
 
-DefaultMethod default_method(const Scene& scene, int order, const std::optional<ConstraintRule>& rule,
-                             int large) {
-  if (rule)
-    return {"type1/midpoint", order,
-            std::string("the ") + rule->description() +
+DefaultMethod default_method(const Scene& scene, const MethodRequest& request) {
+  const int size = scene.dimension() + scene.rows();
+  const auto& [p, reason] = order_of(request, size);
+  if (request.rule) {
+    const int own_or_from_error = request.error > 0.0 ? std::min(p, composition_orders.back()) : 0;
+    return {"type1/midpoint", request.order != 0 ? request.order : own_or_from_error,
+            std::string("the ") + request.rule->description() +
                 " rule was asked for; GL(s) has its own nodes for the rows"};
-  if (order < 0 || order > highest_order || order % 2 != 0)
-    throw Misuse("order " + std::to_string(order) + " without a method: the orders are 2, 4, 6, 8, … " +
-                 std::to_string(highest_order) + "; type1/left and type2/euler are of order 1");
-  const int p = order > 0 ? order : usual_order;
-  const bool is_large = scene.dimension() + scene.rows() > large;
-  if (is_large && p <= composition_orders.back() && explicit_at_the_ends(scene))
+  }
+  if (request.order < 0 || p > highest_order || p % 2 != 0)
+    throw Misuse("order " + std::to_string(request.order) +
+                 " without a method: the orders are 2, 4, 6, 8, … " + std::to_string(highest_order) +
+                 "; type1/left and type2/euler are of order 1");
+  const std::string order = "order " + std::to_string(p) + ": " + reason;
+  if (size > request.large && p <= composition_orders.back() && explicit_at_the_ends(scene))
     return {"type1/trapezoidal", p,
-            "explicit here: more than " + std::to_string(large) + " unknowns, no rows"};
-  const std::string stages = std::to_string(p / 2);
-  return {"type1/gl:" + stages, p,
-          order > 0 ? "GL(" + stages + ") has the order asked for"
-                    : "GL(3): near the least time for errors of 1e-3; order 8 for small ones"};
+            "explicit here: more than " + std::to_string(request.large) + " unknowns, no rows; " + order};
+  return {"type1/gl:" + std::to_string(p / 2), p, order};
 }
 
 }  // namespace diracstep

@@ -1,20 +1,16 @@
 #include <algorithm>
 #include <diracstep/core/methods/adjoint.hpp>
 #include <diracstep/core/methods/euler.hpp>
-#include <diracstep/core/methods/gauss_lobatto.hpp>
 #include <diracstep/core/methods/legendre.hpp>
 #include <diracstep/core/methods/quadrature.hpp>
 #include <diracstep/core/methods/registry.hpp>
 #include <diracstep/core/numerics/errors.hpp>
-#include <diracstep/core/steps/gauss_lobatto/step.hpp>
-#include <diracstep/core/steps/gauss_lobatto/tableau.hpp>
-#include <diracstep/core/steps/phase_space_step.hpp>
+#include <optional>
+#include <utility>
 
 namespace diracstep {
 
 namespace {
-
-std::string prefix_of(GeneratingType type) { return "type" + std::to_string(static_cast<int>(type)) + "/"; }
 
 constexpr std::string_view letters = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_:.-";
 /// A name may hold names, which are read by recursion.
@@ -22,15 +18,9 @@ constexpr std::size_t longest_name = 1000;
 
 void add_quadrature(Registry& registry, StepRule rule, int order, std::string summary,
                     std::string adjoint = {}) {
-  // GL(1) is the midpoint step with the velocity as its unknown, which loses a factor h less to round-off.
-  StepFactory step;
-  if (rule == StepRule::midpoint)
-    step = [](const Scene& scene, bool dense) { return gauss_lobatto_step(1, scene, dense); };
-  registry.add(
-      {std::string("type1/") + name(rule), GeneratingType::one, order, order == 2, rule, std::move(summary),
-       std::move(adjoint), 0, true},
-      [rule](const Scene& scene) { return quadrature_lagrangian(scene.lagrangian, rule); }, std::move(step),
-      rule == StepRule::midpoint ? 1 : 0);
+  registry.add({std::string("type1/") + name(rule), GeneratingType::one, order, order == 2, rule,
+                std::move(summary), std::move(adjoint), 0, true},
+               [rule](const Scene& scene) { return quadrature_lagrangian(scene.lagrangian, rule); });
 }
 
 /// "typeN/word(inner)" taken apart.
@@ -60,50 +50,22 @@ bool parse_transform(std::string_view name, Transform& transform) {
 }
 
 /// "typeN/gl:S", N = 1, 2, 3.
-std::optional<Method> gauss_lobatto_method(const std::string& name) {
-  std::string_view stages = name;
-  const auto type = take_type(stages, 3);
-  if (!type || !stages.starts_with("gl:")) return std::nullopt;
-  stages.remove_prefix(3);
-  if (stages.empty() || stages.size() > 4 || stages.find_first_not_of("0123456789") != stages.npos)
+std::optional<Method> read_gauss_lobatto(std::string_view name) {
+  const auto type = take_type(name, 3);
+  if (!type || !name.starts_with("gl:")) return std::nullopt;
+  name.remove_prefix(3);
+  if (name.empty() || name.size() > 4 || name.find_first_not_of("0123456789") != name.npos)
     return std::nullopt;
-  const int s = std::stoi(std::string(stages));
-  gauss_lobatto_tableau(s);  // throws for a number of stages that is not allowed
-  const MethodInfo info{name,
-                        static_cast<GeneratingType>(*type),
-                        2 * s,
-                        true,
-                        StepRule::midpoint,
-                        "Gauss-Lobatto Dirac step, " + std::to_string(s) + (s == 1 ? " stage" : " stages")};
-  return Method{
-      info,
-      [s, type = info.type](const Scene& scene) { return gauss_lobatto_function(type, s, scene.lagrangian); },
-      [s](const Scene& scene, bool dense) { return gauss_lobatto_step(s, scene, dense); }, s, true};
+  return gauss_lobatto_method(static_cast<GeneratingType>(*type), std::stoi(std::string(name)));
 }
 
 }  // namespace
-
-std::unique_ptr<StepProblem> Method::step(const Scene& scene, bool dense, std::optional<ConstraintRule> rule,
-                                          bool force_degenerate) const {
-  if (scene.lagrangian->structure().phase_space() && !force_degenerate) {
-    if (stages > 0) return phase_space_step(stages, scene, dense);
-    throw Misuse("scene '" + scene.name + "': its Lagrangian is linear in v, where '" + info.name +
-                 "' is unstable or leaves p = ∂L/∂v; use type1/midpoint or typeN/gl:S");
-  }
-  const bool stated_rule = !rule || (!rule->own && rule->nodes == info.constraint_rule);
-  if (make_step && stated_rule) return make_step(scene, dense);
-  ConstraintRule applied = info.constraint_rule;
-  if (rule && rule->own) applied.own = rule->own;  // forces keep the method's nodes
-  if (rule && !rule->own) applied.nodes = rule->nodes;
-  if (make && !rows_inside) return dirac_step(make(scene), scene, applied, dense);
-  throw Misuse("method '" + info.name + "' has its own nodes for the constraint; no other rule applies");
-}
 
 Registry Registry::with_built_ins() {
   Registry registry;
   add_quadrature(registry, StepRule::left, 1, "L_d = h L(q0, (q1-q0)/h)", "type1/right");
   add_quadrature(registry, StepRule::right, 1, "L_d = h L(q1, (q1-q0)/h)", "type1/left");
-  add_quadrature(registry, StepRule::midpoint, 2, "L_d = h L((q0+q1)/2, (q1-q0)/h)");
+  registry.add(midpoint_method());
   add_quadrature(registry, StepRule::trapezoidal, 2, "L_d = h/2 [L(q0, (q1-q0)/h) + L(q1, (q1-q0)/h)]");
   registry.add({"type2/euler", GeneratingType::two, 1, false, StepRule::left, "H_d+ = p1 q0 + h H(q0, p1)",
                 "type3/euler"},
@@ -114,14 +76,19 @@ Registry Registry::with_built_ins() {
   return registry;
 }
 
-void Registry::add(MethodInfo info, GeneratingFunctionFactory make, StepFactory make_step, int stages) {
-  const std::string name = info.name;
-  const std::string prefix = prefix_of(info.type);
+void Registry::add(Method method) {
+  const std::string name = method.info.name, prefix = prefix_of(method.info.type);
   const bool well_formed = name.starts_with(prefix) && name.size() > prefix.size() &&
                            name.find_first_not_of(letters, prefix.size()) == name.npos;
   if (!well_formed) throw Misuse("method name '" + name + "' is not of the form " + prefix + "construction");
-  if (!methods_.emplace(name, Method{std::move(info), std::move(make), std::move(make_step), stages}).second)
-    throw Misuse("method '" + name + "' is already registered");
+  if (methods_.contains(name)) throw Misuse("method '" + name + "' is already registered");
+  if (!method.make_step) throw Misuse("method '" + name + "' has neither a generating function nor a step");
+  methods_.emplace(name, std::move(method));
+}
+
+void Registry::add(MethodInfo info, GeneratingFunctionFactory generating_function) {
+  add(generating_function ? method_of(std::move(info), std::move(generating_function))
+                          : Method{std::move(info), nullptr});
 }
 
 Method Registry::method(const std::string& name) const {
@@ -130,7 +97,7 @@ Method Registry::method(const std::string& name) const {
                  std::to_string(longest_name) + " are read");
   const auto found = methods_.find(name);
   if (found != methods_.end()) return found->second;
-  if (const auto gauss_lobatto = gauss_lobatto_method(name)) return *gauss_lobatto;
+  if (auto gauss_lobatto = read_gauss_lobatto(name)) return *std::move(gauss_lobatto);
   return transformed(name);
 }
 
@@ -157,7 +124,7 @@ Method Registry::transformed(const std::string& name) const {
     throw Misuse(message + " typeN/gl:S typeN/adjoint(...)");
   }
   const Method inner = method(transform.inner);
-  if (!inner.make || inner.rows_inside)
+  if (!inner.generating_function || inner.info.rows_inside)
     throw Misuse(
         "'" + name + "': " + transform.inner +
         " keeps the rows at nodes inside the step, so no function of its end points makes it; typeN/gl:S "
@@ -166,19 +133,22 @@ Method Registry::transformed(const std::string& name) const {
   info.name = name;
   info.type = transform.type;
   info.adjoint.clear();
+  info.stages = 0;
+  info.solved_as.clear();
   if (transform.word == "legendre") {
     if (inner.info.type != GeneratingType::one || transform.type == GeneratingType::one)
       throw Misuse("'" + name + "': the discrete Legendre transform leads from type 1 to types 2, 3 and 4");
     info.summary = "discrete Legendre transform of " + transform.inner;
-    return {info,
-            [inner, type = transform.type](const Scene& scene) { return legendre(type, inner.make(scene)); }};
+    return method_of(info, [s = inner.generating_function, type = transform.type](const Scene& scene) {
+      return legendre(type, s(scene));
+    });
   }
   if (transform.type != adjoint_type(inner.info.type))
     throw Misuse("'" + name + "': the adjoint is of another type; use " +
                  prefix_of(adjoint_type(inner.info.type)) + "adjoint(" + transform.inner + ")");
   info.summary = "adjoint of " + transform.inner;
   info.constraint_rule = mirrored(inner.info.constraint_rule);
-  return {info, [inner](const Scene& scene) { return adjoint(inner.make(scene)); }};
+  return method_of(info, [s = inner.generating_function](const Scene& scene) { return adjoint(s(scene)); });
 }
 
 Method Registry::adjoint_of(const Method& original) const {

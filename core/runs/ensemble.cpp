@@ -2,6 +2,7 @@
 #include <atomic>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/runs/ensemble.hpp>
+#include <diracstep/core/runs/step_loop.hpp>
 #include <exception>
 #include <mutex>
 #include <thread>
@@ -13,7 +14,7 @@ namespace {
 EnsembleMember run_member(Integrator& integrator, const Start& start, long steps, Momentum momentum) {
   EnsembleMember member;
   integrator.reset(start);
-  for (long k = 0; k < steps && member.last.ok(); ++k) member.last = integrator.step();
+  member.last = take_steps(integrator, steps);
   const SolveReport read = integrator.sample(momentum, member.end);
   if (member.last.ok() && !read.ok()) {
     member.last.solve = read;

@@ -13,8 +13,8 @@ struct EnsembleMember {
   Sample end;
 };
 
-/// Takes `steps` steps from each of the starts, which must be consistent, and reads the ends, in the order of
-/// the starts.
+/// Takes `steps` steps from each of the starts, which must be consistent (with a velocity or a momentum), and
+/// reads the ends, in the order of the starts.
 ///
 /// Each of `threads` threads (0: one for each processor) has an integrator of its own, made once and reset
 /// for each start, so the results are the same bits for every number of threads.  Throws Misuse as the

@@ -1,55 +1,65 @@
+#include <algorithm>
 #include <cmath>
-#include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/runs/run.hpp>
-#include <sstream>
+#include <diracstep/core/runs/run_points.hpp>
 
 namespace diracstep {
 
-RunReport run(Integrator& integrator, long steps, Momentum momentum, long every, const Observer& observer,
-              RunChecks* doubt) {
-  Sample sample;
-  RunReport report;
-  const auto observed = [&](long k) {
-    if ((!observer && doubt == nullptr) || (k % every != 0 && k != steps)) return true;
-    report.last.solve = integrator.sample(momentum, sample);
-    if (!report.last.ok()) {
-      std::ostringstream message;
-      message << "reading the state at t = " << integrator.time() << ": "
-              << describe(report.last.solve.status);
-      report.last.failure = message.str();
-      return false;
-    }
-    if (doubt != nullptr) doubt->see(sample);
-    return !observer || observer(sample);
-  };
-  if (every < 1) throw Misuse("every = " + std::to_string(every) + "; 1 or more is needed");
-  if (!observed(0)) return report;
-  for (long k = 1; k <= steps; ++k) {
-    if (doubt != nullptr) doubt->before_step(integrator);
-    report.last = integrator.step();
-    if (!report.last.ok()) break;
-    if (doubt != nullptr) doubt->after_step(integrator);
-    if (!observed(k)) break;
+namespace {
+
+detail::RunOf<Integrator, CheckedSteps, RunChecks> run_of(Integrator& integrator, Momentum momentum, long every,
+                                               const Observer& observer, RunChecks* checks) {
+  return {integrator, {integrator, checks}, momentum, every, observer, checks};
+}
+
+auto size_of(const Integrator& integrator) {
+  return [&integrator] { return integrator.options().step; };
+}
+
+}  // namespace
+
+RunReport run_steps(Integrator& integrator, long steps, Momentum momentum, long every,
+                    const Observer& observer, RunChecks* checks) {
+  return run_of(integrator, momentum, every, observer, checks).steps(steps);
+}
+
+RunReport run_until(Integrator& integrator, double end, Momentum momentum, long every,
+                    const Observer& observer, RunChecks* checks) {
+  return run_of(integrator, momentum, every, observer, checks).until(end, size_of(integrator));
+}
+
+RunReport run_at(Integrator& integrator, std::span<const double> times, Momentum momentum,
+                 const Observer& observer) {
+  return run_of(integrator, momentum, 1, observer, nullptr).at(times, size_of(integrator));
+}
+
+StepReport sample_at(Integrator& integrator, double t, Momentum momentum, Sample& sample) {
+  StepReport report;
+  if (const double size = t - integrator.time(); size != 0.0) {
+    const Snapshot here = integrator.save();
+    report = integrator.step(size);
+    if (report.ok()) report.solve = integrator.sample(momentum, sample);
+    integrator.restore(here);
+    sample.time = t;
+  } else {
+    report.solve = integrator.sample(momentum, sample);
   }
+  if (!report.ok() && report.failure.empty())
+    report.failure = "reading the state at t = " + to_text(t) + ": " + describe(report.solve.status);
   return report;
 }
 
 StepGrid fit_steps(double start, double end, double step) {
   require_step(step);
   const double ratio = (end - start) / step;
-  if (!(ratio > 0.0) || !std::isfinite(ratio)) {
-    std::ostringstream message;
-    message << "no steps of size " << step << " lead from t = " << start << " to t = " << end;
-    throw Misuse(message.str());
-  }
+  if (!(ratio > 0.0) || !std::isfinite(ratio))
+    throw Misuse("no steps of size " + to_text(step) + " lead from t = " + to_text(start) +
+                 " to t = " + to_text(end));
   const double nearest = std::max(1.0, std::round(ratio));
   const double count = std::abs(ratio - nearest) <= 1e-9 * nearest ? nearest : std::ceil(ratio);
-  if (count > 1e15) {
-    std::ostringstream message;
-    message << "the step size " << step << " is too small: " << count
-            << " steps would be needed, at most 1e15 are taken";
-    throw Misuse(message.str());
-  }
+  if (count > 1e15)
+    throw Misuse("the step size " + to_text(step) + " is too small: " + to_text(count) +
+                 " steps would be needed, at most 1e15 are taken");
   return {static_cast<long>(count), (end - start) / count};
 }
 

@@ -17,7 +17,7 @@ inline std::string joined_doubts(const std::vector<std::string>& lines) {
   return all;
 }
 
-/// All that tells when a run of fixed steps is not to be believed although every step was solved.  run()
+/// All that tells when a run of fixed steps is not to be believed although every step was solved. run_steps()
 /// takes one along; a loop of one's own calls it around each step and shows it points on the way, the start
 /// first.
 class RunChecks {
@@ -59,6 +59,19 @@ class RunChecks {
   BranchCheck branch_;
   long step_number_ = 0;
   Sample node_;
+};
+
+/// The steps of an integrator, with the checks around each where there are any.
+struct CheckedSteps {
+  Integrator& integrator;
+  RunChecks* checks;
+
+  StepReport step() const {
+    if (checks != nullptr) checks->before_step(integrator);
+    StepReport report = integrator.step();
+    if (checks != nullptr && report.ok()) checks->after_step(integrator);
+    return report;
+  }
 };
 
 }  // namespace diracstep

@@ -1,6 +1,5 @@
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/system/constraint_rows.hpp>
-#include <stdexcept>
 
 namespace diracstep {
 
@@ -14,7 +13,7 @@ ConstraintRows::ConstraintRows(bool holonomic, SparsityPattern pattern, Sparsity
 }
 
 void ConstraintRows::position(double, ConstVectorRef, VectorRef) const {
-  throw std::logic_error("these constraint rows have no position form φ(t,q)");
+  throw Misuse("these constraint rows have no position form φ(t,q)");
 }
 
 int row_count(const ConstraintBlocks& blocks) {

@@ -37,7 +37,7 @@ class ConstraintRows {
   /// that is not known.
   virtual bool workless() const { return false; }
 
-  /// φ(t,q), m values.  Holonomic rows only; the default throws std::logic_error.
+  /// φ(t,q), m values.  Holonomic rows only; the default throws Misuse.
   virtual void position(double t, ConstVectorRef q, VectorRef phi) const;
 
   /// A(t,q) on pattern(), and b(t,q).

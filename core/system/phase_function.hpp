@@ -50,7 +50,7 @@ class PhaseFunction {
   virtual void gradient_rate(double t, ConstVectorRef x, ConstVectorRef y, VectorRef fyt) const = 0;
 
   /// ∂(f_x)/∂t with x and y held fixed.  Asked for of degenerate Lagrangians only; the default throws
-  /// std::logic_error.
+  /// Misuse.
   virtual void position_gradient_rate(double t, ConstVectorRef x, ConstVectorRef y, VectorRef fxt) const;
 
  private:

@@ -61,28 +61,36 @@ void require_well_formed(const Scene& scene) {
   }
 }
 
+Start completed_start(const Scene& scene, Start start) {
+  if (start.v.size() > 0) return start;
+  if (scene.lagrangian && scene.lagrangian->structure().y_hessian_zero) {
+    start.v = Vector::Zero(scene.dimension());
+    return start;
+  }
+  if (start.p.size() == 0) return start;
+  const std::string prefix = "scene '" + scene.name + "': ";
+  require_size(prefix + "the start q", start.q.size(), scene.dimension());
+  require_size(prefix + "the start p", start.p.size(), scene.dimension());
+  start.v.setZero(scene.dimension());  // where the Lagrangian is tested for a Hamiltonian
+  const auto hamiltonian = scene.hamiltonian
+                               ? scene.hamiltonian
+                               : hamiltonian_from(scene.lagrangian, start.time, start.q, start.v);
+  Vector hq(start.q.size());
+  hamiltonian->gradient(start.time, start.q, start.p, hq, start.v);
+  return start;
+}
+
 std::shared_ptr<const Scene> completed(std::shared_ptr<const Scene> scene) {
   if (!scene) throw Misuse("no scene was given");
   require_well_formed(*scene);
-  const Start& start = scene->start;
-  if (scene->lagrangian && start.v.size() == 0 && scene->lagrangian->structure().y_hessian_zero) {
-    auto with_velocity = std::make_shared<Scene>(*scene);
-    with_velocity->start.v = Vector::Zero(scene->dimension());  // the motion has but one velocity at each q
-    return with_velocity;
-  }
-  const bool from_momentum = start.v.size() == 0 && start.p.size() > 0;
-  if (scene->lagrangian && !from_momentum) return scene;
-  const std::string prefix = "scene '" + scene->name + "': ";
-  require_size(prefix + "the start q", start.q.size(), scene->dimension());
+  const Start start = completed_start(*scene, scene->start);
+  if (scene->lagrangian && start.v.size() == scene->start.v.size()) return scene;
   auto complete = std::make_shared<Scene>(*scene);
-  if (from_momentum) {
-    require_size(prefix + "the start p", start.p.size(), scene->dimension());
-    Vector hq(start.q.size());
-    complete->start.v.setZero(start.q.size());  // where the Lagrangian is tested for a Hamiltonian
-    hamiltonian_of(*complete)->gradient(start.time, start.q, start.p, hq, complete->start.v);
-  }
+  complete->start = start;
   if (!scene->lagrangian) {
-    const Vector& p = from_momentum ? start.p : start.v;  // regularity is tested there
+    const std::string prefix = "scene '" + scene->name + "': ";
+    const Vector& p = scene->start.v.size() == 0 ? start.p : start.v;  // regularity is tested there
+    require_size(prefix + "the start q", start.q.size(), scene->dimension());
     require_size(prefix + "the start v", p.size(), scene->dimension());
     complete->lagrangian = lagrangian_from(scene->hamiltonian, start.time, start.q, p);
   }
@@ -94,8 +102,9 @@ std::shared_ptr<const Hamiltonian> hamiltonian_of(const Scene& scene) {
   return hamiltonian_from(scene.lagrangian, scene.start.time, scene.start.q, scene.start.v);
 }
 
-void require_consistent(const Scene& scene, const Start& start) {
+void require_consistent(const Scene& scene, const Start& given) {
   const std::string prefix = "scene '" + scene.name + "': ";
+  const Start start = completed_start(scene, given);
   require_size(prefix + "the start q", start.q.size(), scene.dimension());
   require_size(prefix + "the start v", start.v.size(), scene.dimension());
   require_finite(scene, "q", start.q);

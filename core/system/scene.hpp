@@ -50,6 +50,12 @@ struct Scene {
 /// Throws Misuse where sizes disagree or a part is missing.
 void require_well_formed(const Scene& scene);
 
+/// The start with its velocity: itself where v is given; else v = ∂H/∂p with the scene's Hamiltonian or that
+/// of its Lagrangian, and v = 0 where the Lagrangian is linear in v, so that the motion has but one velocity
+/// at each q.  Everything that takes a Start completes it by this.  Throws Misuse for q or p of the wrong
+/// size, and where the Lagrangian is degenerate in another way.
+Start completed_start(const Scene& scene, Start start);
+
 /// The scene itself if it has a Lagrangian and a starting velocity; else a copy with both derived from its
 /// Hamiltonian.  Throws Misuse where it is not well formed or the Hamiltonian is degenerate.
 std::shared_ptr<const Scene> completed(std::shared_ptr<const Scene> scene);
@@ -57,9 +63,9 @@ std::shared_ptr<const Scene> completed(std::shared_ptr<const Scene> scene);
 /// The scene's Hamiltonian, or the one derived from its Lagrangian.  Throws Misuse where that is degenerate.
 std::shared_ptr<const Hamiltonian> hamiltonian_of(const Scene& scene);
 
-/// Throws Misuse where the start is of the wrong size, is not finite, violates φ(q) = 0, or has a velocity
-/// off the distribution; names the coordinate or the row, and the amount.  A row counts as violated when its
-/// residual exceeds 1e-10 of the terms that cancel in it.
+/// Throws Misuse where the start, completed, is of the wrong size, is not finite, violates φ(q) = 0, or has a
+/// velocity off the distribution; names the coordinate or the row, and the amount.  A row counts as violated
+/// when its residual exceeds 1e-10 of the terms that cancel in it.
 void require_consistent(const Scene& scene, const Start& start);
 
 }  // namespace diracstep

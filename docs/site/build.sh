@@ -18,12 +18,15 @@ done
 ln -s "$katex/katex.min.css" "$katex/katex.min.js" "$katex/contrib/auto-render.js" "$katex/fonts" \
   "$site/site.css" "$work/static"
 
-HEADERS="$SOURCES/core $SOURCES/constraints $SOURCES/solvers $SOURCES/scene_format/scene_catalogue.hpp $SOURCES/validation $SOURCES/reports $SOURCES/c_interface \
-  $SOURCES/plugins/diracstep_plugin.h $SOURCES/plugins/diracstep_scene.h $SOURCES/plugins/plugin.hpp \
-  $SOURCES/plugins/loaded_plugin.hpp"
+# The headers that are installed; formula_system.hpp is a part of plugin.hpp.
+HEADERS="$SOURCES/library/diracstep.hpp $SOURCES/c_interface/diracstep.h"
+for list in "$SOURCES"/*/public_headers.txt; do
+  HEADERS="$HEADERS $(sed "/^#/d; /^formula_system/d; s|^|$(dirname "$list")/|" "$list" | tr '\n' ' ')"
+done
 READABLE_HEADER="$site/readable_header.py" OUTPUT="$work"
 export SOURCES HEADERS READABLE_HEADER OUTPUT
 doxygen "$site/Doxyfile"
+python3 "$site/public_members.py" "$work/xml"
 mkdir "$work/source/api"
 python3 "$site/reference_pages.py" "$work/xml" "$work/source/api"
 

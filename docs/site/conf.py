@@ -12,7 +12,9 @@ language = "en"
 
 extensions = ["myst_parser", "breathe"]
 root_doc = "docs/README"
-exclude_patterns = ["tests/**", "examples/**"]
+# The folders' own READMEs are for those who read the code; core's belongs to the mathematics.
+exclude_patterns = ["core/*/**"] + [f"{path.name}/**" for path in pathlib.Path(__file__).parents[2].iterdir()
+                                    if path.is_dir() and path.name not in ("core", "docs")]
 myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 4
 breathe_projects = {"DiracStep": os.environ["DIRACSTEP_XML"]}

@@ -13,12 +13,16 @@ FOLDERS = {
     "solvers": "SUNDIALS KINSOL behind the interface of a nonlinear solver.",
     "plugins": "The interface of plugins in C and C++, and what loads them.",
     "c_interface": "DiracStep for other languages.",
-    "validation": "Reference solutions, the catalogue, studies, and checks of methods and scenes.",
+    "scene_format": "Scenes from text files, and the catalogue.",
+    "validation": "Reference solutions, studies, and checks of methods and scenes.",
+    "reports": "Studies as tables, pictures and pages.",
+    "files": "Files that are written whole or not at all.",
 }
 INTRODUCTION = """\
-Every public header, by folder. Names are in the namespace ``diracstep``; include a header as
-``<diracstep/core/integrator/integrator.hpp>`` and link the library of its folder, ``DiracStep::core``. Misuse throws ``Misuse``; a
-numerical failure is a report. What is in a namespace ``detail`` is no interface and not here.
+Every header that is installed, by folder, with what is public in it. Names are in the namespace ``diracstep``. Most programs
+include ``<diracstep/diracstep.hpp>`` and link ``DiracStep::diracstep``: core, constraints and solvers. Any header may be included
+by its own name, as ``<diracstep/core/runs/run.hpp>``, with the library of its folder, ``DiracStep::core``. Misuse throws
+``Misuse``, and every exception of the library is an ``Error``; a numerical failure is a report.
 
 Start with :ref:`Scene <scene_8hpp>`, :ref:`Integrator <integrator_8hpp>` and :ref:`kinsol() <kinsol__solver_8hpp>`.
 """

@@ -1,9 +1,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <diracstep/constraints/pfaffian.hpp>
-#include <diracstep/core/runs/run.hpp>
-#include <diracstep/solvers/kinsol_solver.hpp>
+#include <diracstep/diracstep.hpp>
 
 using namespace diracstep;
 
@@ -24,7 +22,7 @@ int main() {
   // The Gauss-Lobatto Dirac step with three stages, order 6.
   Integrator integrator(std::make_shared<const Scene>(skate), Registry::with_built_ins(), kinsol(),
                         {.method = "type1/gl:3", .step = 0.1});
-  const RunReport report = run(integrator, 100, Momentum::projected, 20, [](const Sample& s) {
+  const RunReport report = run_steps(integrator, 100, Momentum::projected, 20, [](const Sample& s) {
     std::printf("t = %4.1f  x = %.9f  y = %.9f  force across the blade = %+.6f\n", s.time, s.q[0], s.q[1],
                 s.lambda[0]);
     return true;

@@ -210,7 +210,7 @@ int main() {
     std::printf("%-18s %-22s %s\n", line.item.c_str(), line.decision.c_str(), line.reason.c_str());
   double first_energy = 0.0, drift = 0.0, open = 0.0;
   Vector phi(scene->rows());
-  const RunReport report = run(integrator, 200, Momentum::projected, 20, [&](const Sample& s) {
+  const RunReport report = run_steps(integrator, 200, Momentum::projected, 20, [&](const Sample& s) {
     if (s.time == 0.0) first_energy = s.energy;
     drift = std::max(drift, std::abs(s.energy - first_energy));
     scene->constraints.front()->position(s.time, s.q, phi);

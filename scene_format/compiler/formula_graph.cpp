@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <diracstep/scene_format/compiler/formula_graph.hpp>
 #include <diracstep/scene_format/compiler/operations.hpp>
-#include <stdexcept>
 
 namespace diracstep::scene_compiler {
 
@@ -73,7 +72,8 @@ Known FormulaGraph::known_of(const NodeData& node) const {
 Node FormulaGraph::insert(const NodeData& node) {
   const auto found = index_.find(node);
   if (found != index_.end()) return found->second;
-  if (nodes_.size() >= size_limit) throw std::length_error("formula graph");
+  if (nodes_.size() >= size_limit)
+    throw TooLarge("a formula graph of more than " + std::to_string(size_limit) + " nodes");
   const Node id = static_cast<Node>(nodes_.size());
   known_.push_back(known_of(node));
   nodes_.push_back(node);
@@ -244,7 +244,7 @@ Node FormulaGraph::partial(Node node, bool second) {
     case Op::sign:
       return number(0.0);
     default:
-      throw std::logic_error("a function without a derivative was differentiated");
+      throw Error("a function without a derivative was differentiated");
   }
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <diracstep/core/numerics/errors.hpp>
 #include <span>
 #include <string>
 #include <unordered_map>
@@ -83,7 +84,10 @@ struct NodeData {
 /// give the same graph: no result depends on addresses or hashes.
 class FormulaGraph {
  public:
-  static constexpr std::size_t size_limit = 400'000;  ///< nodes; more throws std::length_error
+  static constexpr std::size_t size_limit = 400'000;  ///< nodes; more throw TooLarge
+  class TooLarge : public Error {
+    using Error::Error;
+  };
 
   Node number(double value) { return insert({Op::number, none, none, 0, value}); }
   Node parameter(int id) { return insert({Op::parameter, id}); }

@@ -5,7 +5,6 @@
 #include <diracstep/scene_format/compiler/piece_builder.hpp>
 #include <diracstep/scene_format/compiler/scene_program.hpp>
 #include <diracstep/scene_format/compiler/sum_terms.hpp>
-#include <stdexcept>
 
 namespace diracstep::scene_compiler {
 
@@ -379,7 +378,7 @@ std::unique_ptr<SceneProgram> compile_scene(const std::string& file, const std::
   auto program = std::make_unique<SceneProgram>(read_document(file, text));
   try {
     SceneCompiler(*program).compile();
-  } catch (const std::length_error&) {
+  } catch (const FormulaGraph::TooLarge&) {
     throw SceneError(
         file, {},
         fmt::format("the formulas and their derivatives have more than {} parts, the limit; write "

@@ -1,9 +1,9 @@
 #include <algorithm>
 #include <cmath>
+#include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/solvers/detail/linear_solver.hpp>
 #include <limits>
-#include <stdexcept>
 #include <vector>
 #ifdef DIRACSTEP_WITH_KLU
 #include <klu.h>
@@ -31,7 +31,7 @@ class Klu final : public LinearSolver {
     common_.ordering = 0;
     common_.tol = 0.1;
     symbolic_ = klu_analyze(pattern.rows(), starts(), rows(), &common_);
-    if (symbolic_ == nullptr) throw std::runtime_error("KLU could not analyse the pattern of the Jacobian");
+    if (symbolic_ == nullptr) throw Error("KLU could not analyse the pattern of the Jacobian");
   }
   Klu(const Klu&) = delete;
   Klu& operator=(const Klu&) = delete;

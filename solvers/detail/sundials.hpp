@@ -8,8 +8,8 @@
 #include <sundials/sundials_matrix.h>
 
 #include <cstdio>
+#include <diracstep/core/numerics/errors.hpp>
 #include <memory>
-#include <stdexcept>
 #include <string>
 
 /// The few lines that depend on the version of SUNDIALS, and owning handles for its objects.
@@ -17,13 +17,12 @@ namespace diracstep::detail {
 
 /// Throws where a SUNDIALS set-up call fails; every return code is checked in every build type.
 inline void require(int code, const char* call) {
-  if (code < 0)
-    throw std::runtime_error(std::string("SUNDIALS: ") + call + " returned " + std::to_string(code));
+  if (code < 0) throw Error(std::string("SUNDIALS: ") + call + " returned " + std::to_string(code));
 }
 
 template <class T>
 T* require(T* object, const char* call) {
-  if (object == nullptr) throw std::runtime_error(std::string("SUNDIALS: ") + call + " returned no object");
+  if (object == nullptr) throw Error(std::string("SUNDIALS: ") + call + " returned no object");
   return object;
 }
 

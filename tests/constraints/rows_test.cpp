@@ -69,7 +69,7 @@ TEST(Rows, HolonomicCoefficientsAreTheDerivativesOfThePosition) {
 
 TEST(Rows, OnlyHolonomicRowsHaveAPosition) {
   Vector phi(2);
-  EXPECT_THROW(testing::moving_affine()->position(t, q, phi), std::logic_error);
+  EXPECT_THROW(testing::moving_affine()->position(t, q, phi), Misuse);
 }
 
 TEST(Rows, DerivativeIsThatOfTheFormAlongAVelocity) {

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/files/output_file.hpp>
 #include <filesystem>
 #include <fstream>
@@ -29,7 +30,7 @@ TEST(OutputFile, ReplacesAFileAtOnceAndKeepsTheOldOneWhereItCannot) {
 
 TEST(OutputFile, AFullDeviceIsAnError) {
   OutputFile file("/dev/full", OutputFile::Mode::existing);
-  EXPECT_THROW(file.write("x"), std::runtime_error);
+  EXPECT_THROW(file.write("x"), Error);
 }
 
 }  // namespace

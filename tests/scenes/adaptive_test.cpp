@@ -2,7 +2,7 @@
 
 #include <array>
 #include <cmath>
-#include <diracstep/core/adaptive/adaptive_integrator.hpp>
+#include <diracstep/core/adaptive/adaptive_run.hpp>
 #include <diracstep/core/adaptive/error_control.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
 #include <diracstep/validation/studies/study_run.hpp>
@@ -24,7 +24,7 @@ Fifths energy_errors(const std::string& name, const std::string& method, double 
                                 {.eps = eps, .control = control, .end = end});
   const double energy = scene->energy(0.0, scene->start.q, scene->start.v);
   Fifths found;
-  const RunReport report = run(integrator, end, Momentum::projected, 1, [&](const Sample& sample) {
+  const RunReport report = run_until(integrator, end, Momentum::projected, 1, [&](const Sample& sample) {
     const double error = std::abs(sample.energy - energy);
     if (sample.time < 0.2 * end) found.first = std::max(found.first, error);
     if (sample.time > 0.8 * end) found.last = std::max(found.last, error);

@@ -27,7 +27,7 @@ TEST_P(Iterations, OfComposedMidpointStepsAreThoseOfAGoodPredictor) {
   Integrator integrator(entry.scene, Registry::with_built_ins(),
                         kinsol({.tolerance = 1e-13, .accept = 1e-12, .jacobian = JacobianPolicy::fresh}),
                         {.method = "type1/midpoint", .order = c.order, .step = c.step});
-  ASSERT_TRUE(run(integrator, 400, Momentum::plus, 400, nullptr).ok());
+  ASSERT_TRUE(run_steps(integrator, 400, Momentum::plus, 400, nullptr).ok());
   const double mean =
       static_cast<double>(integrator.work().iterations) / static_cast<double>(integrator.work().solves);
   RecordProperty("iterations", std::to_string(mean));
@@ -62,7 +62,7 @@ TEST(LargeScenes, HangingChainOfManyLinksTakesFewIterations) {
     Work before;
     for (const int steps : {20, 20}) {  // the first ones have nothing to predict from
       before = integrator.work();
-      const RunReport report = run(integrator, steps, Momentum::plus, steps, nullptr);
+      const RunReport report = run_steps(integrator, steps, Momentum::plus, steps, nullptr);
       ASSERT_TRUE(report.ok()) << c.method << ": " << report.last.failure;
     }
     const Work& after = integrator.work();

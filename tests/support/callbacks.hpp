@@ -75,7 +75,7 @@ class AsCallbacks {
 
 inline Sample end_of(const std::shared_ptr<const Scene>& scene, const char* method) {
   Integrator integrator(scene, Registry::with_built_ins(), kinsol(), {.method = method, .step = 0.05});
-  const RunReport report = run(integrator, 20, Momentum::projected, 20, nullptr);
+  const RunReport report = run_steps(integrator, 20, Momentum::projected, 20, nullptr);
   EXPECT_TRUE(report.ok()) << report.last.failure;
   Sample end;
   EXPECT_TRUE(integrator.sample(Momentum::projected, end).ok());

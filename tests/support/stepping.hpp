@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "single_step.hpp"
+
 namespace diracstep::testing {
 
 /// Kept points of a run; fails the test where the run fails.
@@ -15,7 +17,7 @@ inline std::vector<Sample> samples_of(const std::shared_ptr<const Scene>& scene,
                                       const Registry& registry = Registry::with_built_ins()) {
   Integrator integrator(scene, registry, kinsol(), std::move(options));
   std::vector<Sample> samples;
-  const RunReport report = run(integrator, steps, momentum, 1, [&](const Sample& sample) {
+  const RunReport report = run_steps(integrator, steps, momentum, 1, [&](const Sample& sample) {
     samples.push_back(sample);
     return true;
   });
@@ -23,40 +25,7 @@ inline std::vector<Sample> samples_of(const std::shared_ptr<const Scene>& scene,
   return samples;
 }
 
-inline Vector join(const Vector& a, const Vector& b) {
-  Vector c(a.size() + b.size());
-  c << a, b;
-  return c;
-}
-
-/// A single step of a method, from any (q0,p0), with the impulse; NaN where it fails.
-class SingleStep {
- public:
-  SingleStep(const Method& method, const Scene& scene) : problem_(method.step(scene, true)) {
-    if (problem_->size() > 0) solver_ = kinsol()(*problem_);
-  }
-
-  struct Result {
-    Vector q1, p1, impulse;
-  };
-
-  Result operator()(Interval step, const Vector& q0, const Vector& p0, const Vector& v0) {
-    Result result{q0, p0, Vector()};
-    Vector x(problem_->size());
-    problem_->begin(step, q0, p0);
-    problem_->guess(v0, x);
-    if (solver_ && !solver_->solve(x).ok()) {
-      result.q1.setConstant(std::nan(""));
-      result.p1.setConstant(std::nan(""));
-      return result;
-    }
-    problem_->finish(x, result.q1, result.p1, result.impulse);
-    return result;
-  }
-
- private:
-  std::unique_ptr<StepProblem> problem_;
-  std::unique_ptr<NonlinearSolver> solver_;
-};
+using laws::join;
+using laws::SingleStep;
 
 }  // namespace diracstep::testing

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <diracstep/core/runs/step_loop.hpp>
 #include <diracstep/plugins/callback_error.hpp>
 #include <diracstep/validation/laws/law_scenes.hpp>
 #include <diracstep/validation/laws/method_check_parts.hpp>
@@ -10,7 +11,7 @@
 namespace diracstep::checks {
 
 Check allocation(const Subject& subject) {
-  if (!subject.method.make) return not_applicable("no generating function of its end points");
+  if (!subject.method.generating_function) return not_applicable("no generating function is stated");
   if (!subject.method.info.allocation_free) return not_applicable("not claimed");
   if (!subject.options.allocations) return not_applicable("this program does not count allocations");
   Point point = point_of(subject, laws::unconstrained(), usual_step);
@@ -124,7 +125,7 @@ Check two_instances(const Subject& subject) {
   const std::array<Vector, 2> short_runs{alone(subject, two_steps[0], 20), alone(subject, two_steps[1], 20)};
   if (in_turn(subject) != short_runs)
     return pass_if(false, nothing, nothing, "two instances used in turn disturb each other");
-  if (subject.method.make && disturbed_in_the_middle(subject))
+  if (subject.method.generating_function && disturbed_in_the_middle(subject))
     return pass_if(false, nothing, nothing,
                    "an instance changes when another is evaluated in the middle of it");
   const std::array<Vector, 2> long_runs{alone(subject, two_steps[0], 60), alone(subject, two_steps[1], 60)};
@@ -166,17 +167,14 @@ bool hands_on_nan(const Subject& subject) {
 }  // namespace
 
 Check not_a_number(const Subject& subject) {
-  if (subject.method.make && !hands_on_nan(subject))
+  if (subject.method.generating_function && !hands_on_nan(subject))
     return pass_if(false, nothing, nothing, "the gradient is finite where an argument is not a number");
   const auto integrator = subject.integrator(ending_scene());
   std::array<long, 2> steps_taken{};
   for (long& taken : steps_taken) {
     integrator->reset();
-    StepReport report;
-    while (report.ok() && taken < 20) {
-      report = integrator->step();
-      if (report.ok()) ++taken;
-    }
+    const StepReport report = take_steps(*integrator, 20);
+    taken = integrator->work().steps;
     if (report.ok()) return pass_if(false, 20.0, nothing, "20 steps succeeded where L is not a number");
   }
   return pass_if(steps_taken[0] == steps_taken[1] && integrator->position().allFinite(),

@@ -1,11 +1,13 @@
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <diracstep/core/dirac/discrete_action.hpp>
 #include <diracstep/core/runs/run.hpp>
+#include <diracstep/core/runs/step_loop.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
 #include <diracstep/validation/laws/conformance.hpp>
 #include <diracstep/validation/laws/law_scenes.hpp>
+#include <diracstep/validation/laws/single_step.hpp>
+#include <diracstep/validation/laws/stage_membership.hpp>
 
 namespace diracstep {
 
@@ -34,19 +36,15 @@ double slope_of(const std::vector<Point>& points) {
   return xy / xx;
 }
 
-Vector join(const Vector& a, const Vector& b) {
-  Vector c(a.size() + b.size());
-  c << a, b;
-  return c;
-}
+using laws::join;
 
 /// The state after a number of steps; throws nothing, returns the failure.
 std::string end_of(const Registry& registry, const std::shared_ptr<const Scene>& scene,
                    const IntegratorOptions& options, long steps, Momentum momentum, Sample& end,
                    long* solves = nullptr) {
   Integrator integrator(scene, registry, kinsol(), options);
-  const RunReport report = run(integrator, steps, momentum, 1, nullptr);
-  if (!report.ok()) return report.last.failure;
+  const StepReport last = take_steps(integrator, steps);
+  if (!last.ok()) return last.failure;
   if (solves != nullptr) *solves = integrator.work().solves;
   const SolveReport read = integrator.sample(momentum, end);
   return read.ok() ? "" : std::string("reading the state: ") + describe(read.status);
@@ -95,7 +93,7 @@ OrderScene degenerate_order_scene() {
 }
 
 bool takes(const Method& method, const OrderScene& scene) {
-  if (scene.scene->lagrangian->structure().y_hessian_zero) return method.stages > 0;
+  if (scene.scene->lagrangian->structure().y_hessian_zero) return method.info.stages > 0;
   return !(scene.scene->force && method.info.type == GeneratingType::four);
 }
 
@@ -159,51 +157,27 @@ double reversal_defect(const Registry& registry, const std::shared_ptr<const Sce
 
 double symplecticity_defect(const Registry& registry, const std::shared_ptr<const Scene>& scene,
                             const IntegratorOptions& options) {
-  const int n = scene->dimension();
-  const auto problem = registry.method(options.method).step(*scene, true);
-  const auto solver = problem->size() > 0 ? kinsol()(*problem) : nullptr;
-  const auto map = [&](const Vector& z) -> Vector {
-    Vector x(problem->size()), q1(n), p1(n), impulse;
-    problem->begin({scene->start.time, options.step}, z.head(n), z.tail(n));
-    problem->guess(scene->start.v, x);
-    if (solver && !solver->solve(x).ok()) return Vector::Constant(2 * n, std::nan(""));
-    problem->finish(x, q1, p1, impulse);
-    return join(q1, p1);
-  };
-  Vector lq(n), p(n);
-  scene->lagrangian->gradient(scene->start.time, scene->start.q, scene->start.v, lq, p);
-  const Vector z = join(scene->start.q, p);
-  constexpr double delta = 1e-2;
-  constexpr std::array<double, 3> weights{45.0 / 60.0, -9.0 / 60.0, 1.0 / 60.0};
-  Columns m = Columns::Zero(2 * n, 2 * n);
-  for (int j = 0; j < 2 * n; ++j)
-    for (int k = 1; k <= 3; ++k) {
-      const Vector shift = k * delta * Vector::Unit(2 * n, j);
-      m.col(j) += weights[static_cast<std::size_t>(k - 1)] * (map(z + shift) - map(z - shift)) / delta;
-    }
-  Columns omega = Columns::Zero(2 * n, 2 * n);
-  omega.topRightCorner(n, n).setIdentity();
-  omega.bottomLeftCorner(n, n) = -Columns::Identity(n, n);
-  return (m.transpose() * omega * m - omega).cwiseAbs().maxCoeff();
+  return laws::symplecticity_defect(registry.method(options.method), *scene, options.step);
 }
 
 double membership_residual(const Registry& registry, const std::shared_ptr<const Scene>& scene,
                            const IntegratorOptions& options, long steps) {
   const Method method = registry.method(options.method);
-  const bool no_function_of_end_points = !method.make || (method.rows_inside && scene->rows() > 0);
-  if (no_function_of_end_points || method.info.type == GeneratingType::four) return std::nan("");
+  if (!method.generating_function || method.info.type == GeneratingType::four) return std::nan("");
+  if (!laws::generating_function_determines(method, *scene))
+    return stage_membership_residual(registry, scene, options, steps);
   std::vector<Vector> q, plus, minus;
   for (const Momentum momentum : {Momentum::plus, Momentum::minus}) {
     Integrator integrator(scene, registry, kinsol(), options);
     q.clear();
-    const RunReport report = run(integrator, steps, momentum, 1, [&](const Sample& sample) {
+    const RunReport report = run_steps(integrator, steps, momentum, 1, [&](const Sample& sample) {
       q.push_back(sample.q);
       (momentum == Momentum::plus ? plus : minus).push_back(sample.p);
       return true;
     });
     if (!report.ok()) return std::nan("");
   }
-  const auto s = method.make(*scene);
+  const auto s = method.generating_function(*scene);
   const ConstraintRule rule = options.constraint_rule.value_or(method.info.constraint_rule);
   DiscreteDiracStructure structure(scene->constraints, scene->dimension(), rule);
   const GraphOf graph = graph_of(s->type());

@@ -58,7 +58,8 @@ double reversal_defect(const Registry& registry, const std::shared_ptr<const Sce
 double symplecticity_defect(const Registry& registry, const std::shared_ptr<const Scene>& scene,
                             const IntegratorOptions& options);
 
-/// Largest residual of membership in D_{d+} and D_{d−} over `steps` steps; NaN for a method for which none is
+/// Largest residual of membership in D_{d+} and D_{d−} over `steps` steps, of a method with rows inside the
+/// step in the Dirac structure of its stage space (stage_membership.hpp); NaN for a method for which none is
 /// stated.
 double membership_residual(const Registry& registry, const std::shared_ptr<const Scene>& scene,
                            const IntegratorOptions& options, long steps);

@@ -10,7 +10,7 @@
 namespace diracstep::checks {
 
 Point point_of(const Subject& subject, const std::shared_ptr<const Scene>& scene, double h) {
-  Point point{subject.method.make(*completed(scene)), {scene->start.time, h}, {}};
+  Point point{subject.method.generating_function(*completed(scene)), {scene->start.time, h}, {}};
   GeneratingFunction& s = *point.s;
   const Vector& q = scene->start.q;
   const Vector& v = scene->start.v;
@@ -88,7 +88,7 @@ Columns hessian_by_differences(Point& at) {
 }  // namespace
 
 Check gradient(const Subject& subject) {
-  if (!subject.method.make) return not_applicable("no generating function of its end points");
+  if (!subject.method.generating_function) return not_applicable("no generating function is stated");
   double largest = 0.0;
   try {
     for (Point& point : points_of(subject)) largest = std::max(largest, gradient_deviation(point));
@@ -99,7 +99,7 @@ Check gradient(const Subject& subject) {
 }
 
 Check hessian(const Subject& subject) {
-  if (!subject.method.make) return not_applicable("no generating function of its end points");
+  if (!subject.method.generating_function) return not_applicable("no generating function is stated");
   double deviation = 0.0, asymmetry = 0.0;
   for (Point& point : points_of(subject)) {
     const Columns given = full_hessian(point), differences = hessian_by_differences(point);

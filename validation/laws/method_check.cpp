@@ -2,17 +2,18 @@
 #include <cmath>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/runs/run.hpp>
+#include <diracstep/core/runs/step_loop.hpp>
 #include <diracstep/validation/laws/law_scenes.hpp>
 #include <diracstep/validation/laws/method_check_parts.hpp>
-#include <sstream>
+#include <diracstep/validation/laws/single_step.hpp>
 
 namespace diracstep {
 
 Vector checks::state_after(Integrator& integrator, long steps) {
-  const RunReport report = run(integrator, steps, Momentum::projected, 1, nullptr);
-  if (!report.ok()) throw std::runtime_error(report.last.failure);
+  const StepReport last = take_steps(integrator, steps);
+  if (!last.ok()) throw Error(last.failure);
   Sample end;
-  if (!integrator.sample(Momentum::projected, end).ok()) throw std::runtime_error("the state cannot be read");
+  if (!integrator.sample(Momentum::projected, end).ok()) throw Error("the state cannot be read");
   Vector state(end.q.size() + end.p.size());
   state << end.q, end.p;
   return state;
@@ -23,8 +24,6 @@ namespace {
 using namespace checks;
 
 constexpr double order_tolerance = 0.2;  // as in the order table
-
-std::string text(double number) { return (std::ostringstream() << number).str(); }
 
 Check check_symplecticity(const Subject& subject) {
   const double defect = symplecticity_defect(subject.registry, laws::unconstrained(), subject.stepping());
@@ -69,7 +68,7 @@ Check check_self_adjointness(const Subject& subject) {
 }
 
 Check check_membership(const Subject& subject) {
-  if (!subject.method.make) return not_applicable("no generating function of its end points");
+  if (!subject.method.generating_function) return not_applicable("no generating function is stated");
   if (subject.method.info.type == GeneratingType::four) return not_applicable("none is stated for type 4");
   double largest = 0.0;
   for (const auto& scene : laws::every_constraint_class()) {
@@ -77,6 +76,22 @@ Check check_membership(const Subject& subject) {
     largest = std::isnan(residual) ? HUGE_VAL : std::max(largest, residual);
   }
   return at_most(largest, law_limit, "largest residual of membership in D_d+ and D_d-, 20 steps a class");
+}
+
+Check check_stated_step(const Subject& subject) {
+  if (!subject.method.generating_function) return not_applicable("no generating function is stated");
+  double largest = 0.0;
+  std::vector<std::shared_ptr<const Scene>> scenes{laws::driven()};
+  for (const auto& scene : laws::every_constraint_class()) {
+    scenes.push_back(scene);
+    if (subject.method.info.type != GeneratingType::four) scenes.push_back(laws::forced(scene));
+  }
+  for (const auto& scene : scenes) {
+    if (!laws::generating_function_determines(subject.method, *scene)) continue;
+    const double defect = laws::stated_step_defect(subject.method, *scene, usual_step);
+    largest = std::isnan(defect) ? HUGE_VAL : std::max(largest, defect);
+  }
+  return at_most(largest, law_limit, "a step ends so far from that of its generating function");
 }
 
 /// Largest violation along a run: of φ(q) = 0, or of A v + b = 0.
@@ -94,8 +109,8 @@ double violation(const Subject& subject, const std::shared_ptr<const Scene>& sce
     }
     return true;
   };
-  const RunReport report = run(*integrator, 100, Momentum::projected, 1, look);
-  if (!report.ok()) throw std::runtime_error(scene->name + ": " + report.last.failure);
+  const RunReport report = run_steps(*integrator, 100, Momentum::projected, 1, look);
+  if (!report.ok()) throw Error(scene->name + ": " + report.last.failure);
   return largest;
 }
 
@@ -145,6 +160,7 @@ ConformanceTable check_method(const Registry& registry, const std::string& metho
   for (const OrderScene& scene : scenes)
     add(table, options, "order, " + scene.constraint_class, [&] { return check_order(subject, scene); });
   perform("self-adjointness", check_self_adjointness);
+  perform("stated step", check_stated_step);
   perform("membership", check_membership);
   perform("holonomic rows", check_holonomic_rows);
   perform("nonholonomic rows", check_nonholonomic_rows);
@@ -168,7 +184,7 @@ ConformanceTable check_rule(const Registry& registry, const std::string& rule,
           measure_order(registry, scene, {.method = "type1/midpoint", .constraint_rule = looked_at});
       if (!measured.failure.empty()) return pass_if(false, measured.order, expected, measured.failure);
       return pass_if(std::abs(measured.order - expected) <= order_tolerance, measured.order, expected,
-                     "with type1/midpoint; " + text(expected) + " follows from the nodes");
+                     "with type1/midpoint; " + std::to_string(expected) + " follows from the nodes");
     });
   }
   return table;

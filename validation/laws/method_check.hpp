@@ -43,7 +43,8 @@ struct CheckOptions {
 ///   consistency       the error of one step falls faster than h
 ///   order, CLASS      measured within 0.2 of the claimed one, on every class of order_scenes()
 ///   self-adjointness  where claimed: Φ_{−h}(Φ_h(y)) = y
-///   membership        every step lies in D_{d+} and D_{d−}
+///   stated step       the step is that of the generating function, where no row acts inside the step
+///   membership        every step lies in D_{d+} and D_{d−}, with rows inside the step in its stage space
 ///   holonomic rows    φ(q_k) = 0 along a run
 ///   nonholonomic rows the velocities read lie in Δ_Q along a run
 ///   allocation        where claimed: evaluating S allocates nothing

@@ -24,7 +24,7 @@ inline Check not_applicable(std::string why, double figure = nothing) {
   return {{}, Check::Result::not_applicable, figure, nothing, std::move(why)};
 }
 
-/// The method looked at.
+/// The method that is checked.
 struct Subject {
   const Registry& registry;
   Method method;

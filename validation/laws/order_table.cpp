@@ -5,7 +5,6 @@
 #include <diracstep/core/methods/composition.hpp>
 #include <diracstep/validation/laws/law_scenes.hpp>
 #include <diracstep/validation/laws/order_table.hpp>
-#include <diracstep/validation/laws/stage_membership.hpp>
 
 namespace diracstep {
 
@@ -17,14 +16,6 @@ constexpr double defect_step = 0.05;
 constexpr int highest_visible_order = 8;
 
 bool degenerate(const OrderScene& scene) { return scene.scene->lagrangian->structure().y_hessian_zero; }
-
-double membership(const Registry& registry, const Method& method, const OrderScene& scene,
-                  const IntegratorOptions& options) {
-  constexpr long steps = 20;
-  if (method.rows_inside && scene.scene->rows() > 0)
-    return stage_membership_residual(registry, scene.scene, options, steps);
-  return membership_residual(registry, scene.scene, options, steps);
-}
 
 std::string number(double value) { return std::isfinite(value) ? fmt::format("{:.1e}", value) : "–"; }
 
@@ -62,7 +53,7 @@ OrderTableRow measure_row(const Registry& registry, const TableMethod& method,
     row.measured.push_back(measured);
     if (!composed && info.constrained_order > 0) row.claimed.push_back(claimed_order(info, *scene.scene));
     if (composed || scene.scene->force || degenerate(scene)) continue;
-    const double residual = membership(registry, known, scene, options);
+    const double residual = membership_residual(registry, scene.scene, options, 20);
     row.membership_residual = std::max(row.membership_residual, residual);
     if (std::isnan(residual)) row.membership_residual = residual;
   }

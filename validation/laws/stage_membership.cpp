@@ -5,7 +5,7 @@
 #include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/core/steps/gauss_lobatto/tableau.hpp>
 #include <diracstep/core/system/constraint_distribution.hpp>
-#include <diracstep/solvers/kinsol_solver.hpp>
+#include <diracstep/validation/laws/single_step.hpp>
 #include <diracstep/validation/laws/stage_membership.hpp>
 
 namespace diracstep {
@@ -17,11 +17,11 @@ class StageSpace {
  public:
   StageSpace(const Scene& scene, const Method& method)
       : scene_(scene),
-        table_(gauss_lobatto_tableau(method.stages)),
-        s_(method.stages),
+        table_(gauss_lobatto_tableau(method.info.stages)),
+        s_(method.info.stages),
         n_(scene.dimension()),
         m_(scene.rows()),
-        function_(method.make(scene)),
+        function_(method.generating_function(scene)),
         rows_(scene.constraints, n_) {}
 
   /// From the unknowns (V_1 … V_s, λ_0 … λ_{s−1}) of a step from (q0,p0) to (q1,p1).
@@ -98,23 +98,18 @@ class StageSpace {
 double stage_membership_residual(const Registry& registry, const std::shared_ptr<const Scene>& scene,
                                  const IntegratorOptions& options, long steps) {
   const Method method = registry.method(options.method);
-  if (!method.rows_inside || scene->force)
+  if (!method.info.rows_inside || scene->force)
     throw Misuse("membership in the stage space is for typeN/gl:S on scenes without forces");
-  const auto problem = method.step(*scene, true);
-  const auto solver = kinsol()(*problem);
+  laws::SingleStep take(method, *scene);
   StageSpace space(*scene, method);
-  PhasePoint start{scene->start.q, Vector::Zero(scene->dimension())};
-  Vector lq = start.p, x(problem->size()), impulse;
-  scene->lagrangian->gradient(scene->start.time, start.q, scene->start.v, lq, start.p);
+  PhasePoint start{scene->start.q, laws::start_momentum(*scene)};
   double largest = 0.0;
   for (long k = 0; k < steps; ++k) {
     const Interval step{scene->start.time + static_cast<double>(k) * options.step, options.step};
-    problem->begin(step, start.q, start.p);
-    problem->guess(scene->start.v, x);
-    if (!solver->solve(x).ok()) return std::nan("");
-    PhasePoint end = start;
-    problem->finish(x, end.q, end.p, impulse);
-    largest = std::max(largest, space.residual(step, x, start, end));
+    const auto taken = take(step, start.q, start.p, scene->start.v);
+    const PhasePoint end{taken.q1, taken.p1};
+    if (!end.q.allFinite()) return std::nan("");
+    largest = std::max(largest, space.residual(step, taken.unknowns, start, end));
     start = end;
   }
   return largest;

@@ -1,6 +1,6 @@
 #pragma once
 
-#include <diracstep/core/steps/phase_space_step.hpp>
+#include <diracstep/core/steps/gauss_lobatto/phase_space_step.hpp>
 #include <diracstep/core/system/saddle_point.hpp>
 #include <diracstep/solvers/detail/linear_solver.hpp>
 #include <diracstep/validation/references/reference_run.hpp>
@@ -8,7 +8,7 @@
 
 namespace diracstep {
 
-/// The continuous system with its index reduced to 0, as one would write it by hand: the rows enter only
+/// The continuous system with its index reduced to 0, in explicit form: the rows enter only
 /// differentiated, so that a numerical solution drifts off them.
 ///
 ///   L regular on Δ_Q   y = (q, v),   q̇ = v,   v̇ = a with  [∂²L/∂v² −Aᵀ; A 0] (a, Λ) = …

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/steps/gauss_lobatto/phase_space_step.hpp>
 #include <diracstep/core/system/hidden_rows.hpp>
 #include <diracstep/core/system/saddle_point.hpp>
 #include <diracstep/solvers/detail/linear_solver.hpp>
@@ -207,6 +208,13 @@ class IdaIntegration {
     return acceleration_solver_->solve(acceleration_);
   }
 
+  /// The velocity at the start that a Lagrangian linear in v determines, whatever the scene gives.
+  SolveReport solve_phase_space_velocity(VectorRef v) {
+    PhaseSpaceVelocityProblem problem(scene_, dae_.size() <= dense_limit);
+    problem.begin(scene_.start.time, scene_.start.q);
+    return kinsol()(problem)->solve(v);
+  }
+
   /// y and ẏ at the start: p = ∂L/∂v, Λ = M = 0, Ṁ = 0, of index 2 M = 0, and the rest from the acceleration
   /// system.
   std::string make_start() {
@@ -217,10 +225,14 @@ class IdaIntegration {
     rate.setZero();
     y.head(n) = start.q;
     y.segment(n, n) = start.v;
-    const SolveReport report = solve_acceleration(start.time, start.q, start.v);
-    if (!report.ok()) return std::string("start: acceleration and forces: ") + describe(report.status);
-    rate.head(n) = start.v;
-    rate.segment(n, n) = acceleration_.head(n);
+    const bool linear_in_v = scene_.lagrangian->structure().phase_space();
+    const SolveReport report = linear_in_v ? solve_phase_space_velocity(y.segment(n, n))
+                                           : solve_acceleration(start.time, start.q, start.v);
+    if (!report.ok())
+      return std::string(linear_in_v ? "start: velocity: " : "start: acceleration and forces: ") +
+             describe(report.status);
+    rate.head(n) = y.segment(n, n);
+    if (!linear_in_v) rate.segment(n, n) = acceleration_.head(n);  // v̇ appears nowhere: a prediction alone
     (options_.formulation == DaeFormulation::index_2 ? y : rate).segment(3 * n, m) = acceleration_.tail(m);
     Vector f(dae_.size());  // with p = 0 and ṗ = 0 the residual is what they must be
     dae_.residual(start.time, y, rate, f);
@@ -255,7 +267,8 @@ class IdaIntegration {
   /// seven of eleven.
   void set_error_control() {
     const int n = scene_.dimension(), multipliers = dae_.size() - 3 * n;
-    const bool loose = options_.formulation == DaeFormulation::rates_loose || options_.formulation == DaeFormulation::index_2;
+    const bool loose = options_.formulation == DaeFormulation::rates_loose ||
+                       options_.formulation == DaeFormulation::index_2;
     column(tolerance_).setConstant(atol_);
     if (loose) column(tolerance_).tail(multipliers).setConstant(loose_tolerance);
     require(IDASVtolerances(ida(), options_.rtol, tolerance_.get()), "IDASVtolerances");

@@ -19,10 +19,11 @@ std::string run_to_end(const CatalogueScene& entry, const Registry& registry, co
     Integrator integrator(
         entry.scene, registry, solvers,
         {.method = entry.recommended.method, .order = entry.recommended.order, .step = step});
-    const RunReport report = run(integrator, steps, Momentum::projected, steps, [&](const Sample& sample) {
-      end = sample;
-      return true;
-    });
+    const RunReport report =
+        run_steps(integrator, steps, Momentum::projected, steps, [&](const Sample& sample) {
+          end = sample;
+          return true;
+        });
     return report.last.failure;
   } catch (const Misuse& misuse) {
     return misuse.what();

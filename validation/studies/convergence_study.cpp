@@ -59,7 +59,7 @@ class StudyInProgress {
       for (; series_done_ < series_.size(); ++series_done_) run_series(series_[series_done_]);
       for (std::size_t i = 0; i < options_.baselines.size(); ++i)
         run_baseline_ladder(options_.baselines[i],
-                             static_cast<double>(i) / static_cast<double>(options_.baselines.size()));
+                            static_cast<double>(i) / static_cast<double>(options_.baselines.size()));
     } catch (const Interrupted&) {
       study_.interrupted = true;
     }
@@ -93,8 +93,8 @@ class StudyInProgress {
 
   Series chosen(const std::string& method, int order) const {
     if (method != automatic_method) return {method, order, false};
-    const DefaultMethod choice = default_method(*entry_.scene, order, options_.constraint_rule,
-                                                large_from(IntegratorOptions{}.dense_limit));
+    const DefaultMethod choice =
+        default_method(*completed(entry_.scene), {.order = order, .rule = options_.constraint_rule});
     return {choice.method, choice.order, false};
   }
 
@@ -207,12 +207,12 @@ class StudyInProgress {
   }
 
   std::vector<DaeFormulation> formulations(const std::string& baseline, const std::vector<double>& rtols,
-                              double part) const {
+                                           double part) const {
     if (baseline != ida_method) return {DaeFormulation::rates};  // it has none
     if (options_.ida_formulation) return {*options_.ida_formulation};
     if (!reference_.missing.empty()) return {DaeFormulation::rates};
     return best_formulations(*entry_.scene, study_.t_end, rtols, reference_, options_.run_budget,
-                        [&] { look(part, "the formulations of IDA"); });
+                             [&] { look(part, "the formulations of IDA"); });
   }
 
   void run_baseline_ladder(const std::string& baseline, double part) {
@@ -222,13 +222,13 @@ class StudyInProgress {
       run_baseline_ladder(baseline, formulation, rtols, part);
   }
 
-  void run_baseline_ladder(const std::string& baseline, DaeFormulation formulation, const std::vector<double>& rtols,
-                            double part) {
+  void run_baseline_ladder(const std::string& baseline, DaeFormulation formulation,
+                           const std::vector<double>& rtols, double part) {
     const std::size_t first = study_.rows.size();
     std::vector<Sample> ends(rtols.size());
     const auto run = [&](double rtol, int repeats, Sample& end) {
-      return run_baseline(baseline, *entry_.scene, study_.t_end, {.rtol = rtol, .formulation = formulation}, repeats,
-                           reference_, end);
+      return run_baseline(baseline, *entry_.scene, study_.t_end, {.rtol = rtol, .formulation = formulation},
+                          repeats, reference_, end);
     };
     for (std::size_t i = 0; i < rtols.size(); ++i) {
       look(part, fmt::format("{}, rtol {:g}", baseline, rtols[i]));

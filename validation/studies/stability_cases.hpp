@@ -15,7 +15,7 @@ namespace diracstep {
 ///                          stiff springs Σ (v_z² + ω² z²)/2
 ///   flyball_governor       steps 5e-3 … 1e-4 over its stiff dampers; the energy must not grow
 ///   kepler_e099            fixed steps through the pericentre, where the rate is 200 times faster
-///   n_four_bar             through poses where the rows depend on each other; watched for leaving the branch
+///   n_four_bar             through poses where constraints are redundant; watched for leaving the branch
 ///                          on which all uprights are parallel
 ///   near a flat pose       n_four_bar started 1e-1 … 1e-12 before such a pose, and in it
 ///   near a collision       Kepler started at a pericentre of 1e-2 … 1e-8

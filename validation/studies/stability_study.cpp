@@ -122,7 +122,12 @@ class CaseRun {
 
   void run(long steps) {
     const double before = thread_seconds();
-    const StepReport last = step_to(steps);
+    RunChecks checks(integrator_, steps);
+    const RunReport report = run_steps(
+        integrator_, steps, Momentum::projected, std::max(1L, steps / points_read),
+        [this](const Sample& sample) { return see(sample); }, &checks);
+    const StepReport& last = report.last;
+    doubt_ = checks.text();
     row_.cpu_seconds = thread_seconds() - before;
     row_.steps = integrator_.work().steps;
     row_.newton_iterations = integrator_.work().iterations;
@@ -136,35 +141,9 @@ class CaseRun {
  private:
   static constexpr double unwatched_bound = 0.5;  ///< of the error, where there is no watch
 
-  /// The steps, and some 400 points read on the way; what the last step or reading came to.
-  StepReport step_to(long steps) {
-    RunChecks doubt(integrator_, steps);
-    const long every = std::max(1L, steps / points_read);
-    StepReport last;
-    bool going_on = read(doubt, last);
-    for (long k = 1; going_on && k <= steps; ++k) {
-      doubt.before_step(integrator_);
-      last = integrator_.step();
-      going_on = last.ok();
-      if (going_on) doubt.after_step(integrator_);
-      if (going_on && (k % every == 0 || k == steps)) going_on = read(doubt, last);
-    }
-    doubt_ = doubt.text();
-    return last;
-  }
-
-  bool read(RunChecks& doubt, StepReport& last) {
-    last.solve = integrator_.sample(Momentum::projected, end_);
-    if (!last.ok()) {
-      last.failure =
-          fmt::format("reading the state at t = {}: {}", integrator_.time(), describe(last.solve.status));
-      return false;
-    }
-    doubt.see(end_);
-    return see(end_);
-  }
-
+  /// One of some 400 points on the way.
   bool see(const Sample& sample) {
+    end_ = sample;
     for (Watching& watching : watching_) watching.see(sample);
     const StudyRow here = judged(integrator_.scene(), sample, nothing_);
     row_.constraint =
@@ -222,12 +201,12 @@ IdaBeside run_ida_beside(const StabilityCase& that, const ReferenceEnd& referenc
   return beside;
 }
 
-std::vector<IdaBeside> ida_ladder(const StabilityCase& that, double dearest) {
+std::vector<IdaBeside> ida_ladder(const StabilityCase& that, double most_seconds) {
   const ReferenceEnd reference = reference_of(that);
   std::vector<IdaBeside> runs;
   for (int decade = 3; decade <= 12; ++decade) {
     runs.push_back(run_ida_beside(that, reference, std::pow(10.0, -decade)));
-    if (!(runs.back().cpu_seconds <= std::max(dearest, ida_least_budget))) break;
+    if (!(runs.back().cpu_seconds <= std::max(most_seconds, ida_least_budget))) break;
   }
   return runs;
 }
@@ -250,17 +229,17 @@ StabilityResult run_case(const StabilityCase& that, const Registry& registry, co
                          const std::vector<StabilityMethod>& methods, bool with_ida,
                          const std::function<bool(const std::string&)>& look) {
   StabilityResult result{that, {}, {}};
-  double dearest = 0.0;
+  double most_seconds = 0.0;
   for (const StabilityMethod& method : methods) {
     const auto going_on = [&] { return look(that.name + ": " + method.name); };
     if (!going_on()) return result;
     StabilityRow row = run_stability_case(that, registry, solvers, method, going_on);
     if (!going_on()) return result;
     result.rows.push_back(std::move(row));
-    if (result.rows.back().cpu_seconds > dearest) dearest = result.rows.back().cpu_seconds;
+    if (result.rows.back().cpu_seconds > most_seconds) most_seconds = result.rows.back().cpu_seconds;
   }
   if (!with_ida || !look(that.name + ": IDA")) return result;
-  result.ida = ida_ladder(that, dearest);
+  result.ida = ida_ladder(that, most_seconds);
   for (StabilityRow& row : result.rows)
     if (std::isfinite(row.cpu_seconds)) row.ida = at_cost(result.ida, row.cpu_seconds);
   return result;

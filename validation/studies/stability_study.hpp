@@ -38,10 +38,10 @@ struct StabilityCase {
 enum class StabilityOutcome {
   accurate,  ///< at the end, and right there to the case's accuracy
   bounded,   ///< at the end, every watch within its bound
-  doubted,   ///< at the end, and told that the result is not to be believed: RunChecks
+  doubted,   ///< at the end, and RunChecks doubts the result
   stopped,   ///< a step or the reading of a point failed and said so
   refused,   ///< not begun: the library threw Misuse, or the method does not take the scene
-  wrong      ///< at the end without a word, and none of the above
+  wrong      ///< at the end without a warning, and none of the above
 };
 const char* name(StabilityOutcome outcome);
 
@@ -108,8 +108,8 @@ StabilityRow run_stability_case(const StabilityCase& that, const Registry& regis
                                 const SolverFactory& solvers, const StabilityMethod& method,
                                 const std::function<bool()>& going_on = {});
 
-/// Every method on every case, and IDA at tolerances 1e-3, 1e-4, … as long as a run costs no more than the
-/// dearest of ours.
+/// Every method on every case, and IDA at tolerances 1e-3, 1e-4, … as long as a run takes no more CPU time than
+/// the longest of ours.
 std::vector<StabilityResult> stability_study(const std::vector<StabilityCase>& cases,
                                              const Registry& registry, const SolverFactory& solvers,
                                              const std::vector<StabilityMethod>& methods, bool with_ida,

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <diracstep/core/adaptive/adaptive_run.hpp>
+#include <diracstep/core/runs/step_loop.hpp>
 #include <diracstep/validation/references/explicit_reference.hpp>
 #include <diracstep/validation/references/ida_reference.hpp>
 #include <diracstep/validation/studies/study_run.hpp>
@@ -47,7 +49,8 @@ double violation(const ConstraintRows& rows, const Sample& end) {
 ReferenceEnd true_end_by_ida(const Scene& scene, double t_end) {
   ReferenceRun fine;
   ReferenceOptions options{.rtol = reference_rtol};
-  for (const DaeFormulation formulation : {DaeFormulation::rates, DaeFormulation::rates_loose, DaeFormulation::index_2}) {
+  for (const DaeFormulation formulation :
+       {DaeFormulation::rates, DaeFormulation::rates_loose, DaeFormulation::index_2}) {
     options.formulation = formulation;
     fine = integrate_with_ida(scene, t_end, options);
     if (fine.ok() || scene.rows() == 0) break;
@@ -55,11 +58,12 @@ ReferenceEnd true_end_by_ida(const Scene& scene, double t_end) {
   options.rtol *= 10.0;
   const ReferenceRun coarse = fine.ok() ? integrate_with_ida(scene, t_end, options) : ReferenceRun{};
   ReferenceEnd reference{.kind = ida_method,
-              .how = fmt::format("IDA at rtol {:g}, beside {:g}", reference_rtol, options.rtol),
-              .missing = fine.ok() ? "" : "no reference: IDA stopped: " + fine.failure,
-              .q = fine.end.q,
-              .p = fine.end.p};
-  if (options.formulation != DaeFormulation::rates) reference.how += std::string(", formulation ") + name(options.formulation);
+                         .how = fmt::format("IDA at rtol {:g}, beside {:g}", reference_rtol, options.rtol),
+                         .missing = fine.ok() ? "" : "no reference: IDA stopped: " + fine.failure,
+                         .q = fine.end.q,
+                         .p = fine.end.p};
+  if (options.formulation != DaeFormulation::rates)
+    reference.how += std::string(", formulation ") + name(options.formulation);
   if (fine.ok() && coarse.ok()) reference.self_error = reference.distance(coarse.end);
   return reference;
 }
@@ -69,14 +73,16 @@ ReferenceEnd true_end_by_ida(const Scene& scene, double t_end) {
 std::string run_once(Integrator& integrator, long steps, Momentum momentum, const Look& look, Sample& end,
                      double& looking) {
   integrator.reset();
-  for (long k = 1; k <= steps; ++k) {
-    const StepReport report = integrator.step();
-    if (!report.ok()) return report.failure;
-    if (!look || k % steps_between_looks != 0) continue;
+  const auto look_around = [&](long k) {
+    if (!look || k % steps_between_looks != 0) return true;
     const double before = thread_seconds();
     look();
     looking += thread_seconds() - before;
-  }
+    return true;
+  };
+  const StepReport last = step_while(
+      integrator, [steps](long k) { return k < steps; }, look_around);
+  if (!last.ok()) return last.failure;
   const SolveReport reading = integrator.sample(momentum, end);
   if (reading.ok()) return {};
   return fmt::format("reading the state at t = {}: {}", integrator.time(), describe(reading.status));
@@ -98,11 +104,11 @@ std::optional<ReferenceEnd> known_point(const CatalogueScene& scene, double t) {
   const auto point = scene.reference.at ? scene.reference.at(t) : std::nullopt;
   if (!point) return std::nullopt;
   ReferenceEnd reference{.kind = scene.reference.kind,
-              .how = scene.reference.how,
-              .self_error = scene.reference.self_error,
-              .missing = {},
-              .q = point->q,
-              .p = Vector::Zero(point->q.size())};
+                         .how = scene.reference.how,
+                         .self_error = scene.reference.self_error,
+                         .missing = {},
+                         .q = point->q,
+                         .p = Vector::Zero(point->q.size())};
   Vector force = reference.p;
   completed(scene.scene)->lagrangian->gradient(t, point->q, point->v, force, reference.p);
   return reference;
@@ -146,8 +152,8 @@ void conclude(StudyRow& row, const Work& work, const std::string& failure, const
 
 }  // namespace
 
-StudyRow run_ours(Integrator& integrator, long steps, Momentum momentum, int repeats, const ReferenceEnd& reference,
-                  const Look& look) {
+StudyRow run_ours(Integrator& integrator, long steps, Momentum momentum, int repeats,
+                  const ReferenceEnd& reference, const Look& look) {
   Sample end;
   std::string failure;
   const auto once = [&] {
@@ -172,13 +178,14 @@ StudyRow run_variable(AdaptiveIntegrator& integrator, double t_end, Momentum mom
     long observed = 0;
     const double before = thread_seconds();
     integrator.reset();
-    const RunReport report = run(integrator, t_end, momentum, steps_between_looks, [&](const Sample& sample) {
-      end = sample;
-      const double pause = thread_seconds();
-      if (look && observed++ > 0) look();
-      looking += thread_seconds() - pause;
-      return true;
-    });
+    const RunReport report =
+        run_until(integrator, t_end, momentum, steps_between_looks, [&](const Sample& sample) {
+          end = sample;
+          const double pause = thread_seconds();
+          if (look && observed++ > 0) look();
+          looking += thread_seconds() - pause;
+          return true;
+        });
     failure = report.last.failure;
     return failure.empty() ? thread_seconds() - before - looking : -1.0;
   };
@@ -191,7 +198,8 @@ StudyRow run_variable(AdaptiveIntegrator& integrator, double t_end, Momentum mom
 }
 
 StudyRow run_baseline(const std::string& method, const Scene& scene, double t_end,
-                       const ReferenceOptions& options, int repeats, const ReferenceEnd& reference, Sample& end) {
+                      const ReferenceOptions& options, int repeats, const ReferenceEnd& reference,
+                      Sample& end) {
   const auto integrate = method == erk_method ? integrate_explicitly : integrate_with_ida;
   ReferenceRun run;
   const auto once = [&] {

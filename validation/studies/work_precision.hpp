@@ -6,7 +6,7 @@
 
 namespace diracstep {
 
-/// One run: how fine, how wrong, how dear.
+/// One run: its step or tolerance, its error and its CPU time.
 struct WorkPoint {
   double step = 0.0;
   double error = 0.0;
@@ -32,7 +32,7 @@ struct OrderFit {
 /// of these the finest four are taken.
 std::optional<OrderFit> measure_order(std::vector<WorkPoint> points);
 
-/// The points that no other one beats in both error and time, from cheap to dear, so with falling errors.
+/// The points that no other one beats in both error and time, by growing time, so with falling errors.
 std::vector<WorkPoint> lower_envelope(std::vector<WorkPoint> points);
 
 /// CPU time at which the lower envelope reaches an error, by log–log interpolation between its points.  Empty

@@ -2,7 +2,8 @@
 
 #include <array>
 #include <cmath>
-#include <diracstep/core/adaptive/adaptive_integrator.hpp>
+#include <diracstep/core/adaptive/adaptive_run.hpp>
+#include <diracstep/core/adaptive/rate_survey.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
 #include <vector>
 
@@ -43,10 +44,11 @@ AdaptiveIntegrator adaptive(const std::shared_ptr<const Scene>& scene, const std
 
 Sample end_of(AdaptiveIntegrator integrator, double end) {
   Sample last;
-  const RunReport report = run(integrator, end, Momentum::projected, 1'000'000, [&](const Sample& sample) {
-    last = sample;
-    return true;
-  });
+  const RunReport report =
+      run_until(integrator, end, Momentum::projected, 1'000'000, [&](const Sample& sample) {
+        last = sample;
+        return true;
+      });
   EXPECT_TRUE(report.ok()) << report.last.failure;
   EXPECT_EQ(last.time, end);
   return last;
@@ -135,7 +137,7 @@ TEST(AdaptiveIntegrator, TakesFarFewerStepsThanAFixedOneOnAnEccentricOrbit) {
     AdaptiveIntegrator integrator =
         adaptive(scene, "type1/gl:4", {.eps = 0.35, .monitor = monitor, .end = end});
     Sample last;
-    ASSERT_TRUE(run(integrator, end, Momentum::projected, 1'000'000, [&](const Sample& s) {
+    ASSERT_TRUE(run_until(integrator, end, Momentum::projected, 1'000'000, [&](const Sample& s) {
                   last = s;
                   return true;
                 }).ok());
@@ -146,7 +148,7 @@ TEST(AdaptiveIntegrator, TakesFarFewerStepsThanAFixedOneOnAnEccentricOrbit) {
     const long steps = integrator.work().steps;  // a fixed step with as many fails or is far off
     Integrator fixed(scene, Registry::with_built_ins(), kinsol(),
                      {.method = "type1/gl:4", .step = end / static_cast<double>(steps)});
-    const RunReport report = run(fixed, steps, Momentum::projected, steps, {});
+    const RunReport report = run_steps(fixed, steps, Momentum::projected, steps, {});
     EXPECT_TRUE(!report.ok() || (fixed.position() - scene->start.q).lpNorm<Eigen::Infinity>() > 1e-3);
   }
 }
@@ -155,7 +157,7 @@ double energy_error(AdaptiveIntegrator& integrator, double end) {
   double largest = 0.0;
   const double energy = integrator.integrator().scene().energy(0.0, integrator.integrator().scene().start.q,
                                                                integrator.integrator().scene().start.v);
-  const RunReport report = run(integrator, end, Momentum::projected, 1, [&](const Sample& sample) {
+  const RunReport report = run_until(integrator, end, Momentum::projected, 1, [&](const Sample& sample) {
     largest = std::max(largest, std::abs(sample.energy - energy));
     return largest < 1.0;
   });
@@ -264,7 +266,7 @@ TEST(AdaptiveIntegrator, RefusesWhatWouldNotBeReversible) {
   Sample sample;
   expect_misuse([&] { (void)integrator.sample_at(100.0, Momentum::projected, sample); },
                 {"t = 100", "two steps"});
-  expect_misuse([&] { (void)run(integrator, -1.0, Momentum::projected, 1, {}); }, {"t = -1", "ahead"});
+  expect_misuse([&] { (void)run_until(integrator, -1.0, Momentum::projected, 1, {}); }, {"t = -1", "ahead"});
   const std::vector<double> unsorted{0.2, 0.1};
   expect_misuse([&] { (void)run_at(integrator, unsorted, Momentum::projected, {}); }, {"t = 0.1", "ahead"});
 }

@@ -1,5 +1,6 @@
 /// What must hold for every registered method on every constraint class; a new method is covered by being
-/// registered.
+/// registered.  Where rows act inside the step, its membership is in the Dirac structure of the stage space:
+/// tests/validation/laws holds that, for every method and class as well.
 #include <gtest/gtest.h>
 
 #include <diracstep/core/dirac/discrete_action.hpp>
@@ -39,30 +40,26 @@ std::vector<std::string> methods_where(Condition holds) {
   return names;
 }
 
-Vector momentum_at(const Scene& scene, const Vector& q, const Vector& v) {
-  Vector lq(q.size()), p(q.size());
-  scene.lagrangian->gradient(0.0, q, v, lq, p);
-  return p;
-}
-
-/// Largest entry of MᵀΩM − Ω for the Jacobian M of (q,p) ↦ step.
-double symplecticity_defect(const Method& method, const Scene& scene) {
-  const int n = scene.dimension();
-  SingleStep step(method, scene);
-  const auto map = [&](const Vector& z) {
-    const auto end = step({0.0, h}, z.head(n), z.tail(n), scene.start.v);
-    return join(end.q1, end.p1);
-  };
-  const Vector z = join(scene.start.q, momentum_at(scene, scene.start.q, scene.start.v));
-  const Eigen::MatrixXd m = testing::difference_jacobian(map, z);
-  Eigen::MatrixXd omega = Eigen::MatrixXd::Zero(2 * n, 2 * n);
-  omega.topRightCorner(n, n).setIdentity();
-  omega.bottomLeftCorner(n, n) = -Eigen::MatrixXd::Identity(n, n);
-  return (m.transpose() * omega * m - omega).cwiseAbs().maxCoeff();
-}
+using laws::generating_function_determines;
 
 TEST_P(DiracLaws, UnconstrainedStepIsSymplectic) {
-  EXPECT_LT(symplecticity_defect(method(), *testing::unconstrained()), 1e-8);
+  EXPECT_LT(laws::symplecticity_defect(method(), *testing::unconstrained(), h), 1e-10);
+}
+
+TEST_P(DiracLaws, TakeTheStepOfTheGeneratingFunctionThatTheyState) {
+  const Method stated = method();
+  std::vector<std::shared_ptr<const Scene>> scenes{testing::driven()};
+  for (const auto& scene : testing::every_constraint_class()) {
+    scenes.push_back(scene);
+    if (stated.info.type != GeneratingType::four) scenes.push_back(testing::forced(scene));
+  }
+  int compared = 0;
+  for (const auto& scene : scenes) {
+    if (!generating_function_determines(stated, *scene)) continue;
+    EXPECT_LT(laws::stated_step_defect(stated, *scene, h), 1e-13) << scene->name;
+    ++compared;
+  }
+  EXPECT_GE(compared, 1);
 }
 
 TEST_P(LawsOfTransforms, GiveTheTrajectoryOfTheirDiscreteLagrangian) {
@@ -134,7 +131,8 @@ Covector differential(GeneratingFunction& s, const Trajectory& t, std::size_t k,
 TEST_P(LawsOfTypesOneToThree, EveryStepIsAMemberOfTheDiscreteDiracStructure) {
   const auto type = method().info.type;
   for (const auto& scene : testing::every_constraint_class()) {
-    const auto s = method().make(*scene);
+    if (!generating_function_determines(method(), *scene)) continue;
+    const auto s = method().generating_function(*scene);
     const Trajectory t = trajectory_of(scene, options());
     DiscreteDiracStructure structure(scene->constraints, scene->dimension(), method().info.constraint_rule);
     for (std::size_t k = 0; k < steps; ++k) {
@@ -149,15 +147,52 @@ TEST_P(LawsOfTypesOneToThree, EveryStepIsAMemberOfTheDiscreteDiracStructure) {
       for (const Membership& m : memberships) {
         EXPECT_LT(m.constraint, 1e-14) << scene->name << " " << k;
         EXPECT_LT(m.annihilator, 5e-12) << scene->name << " " << k;
+        EXPECT_LE(m.annihilator_of_class, m.annihilator) << scene->name << " " << k;
       }
     }
+  }
+}
+
+/// Moved by an element of the annihilator at its far end, a (+) or (−) step is a member in the sense of
+/// (4.28) and (8.3), which look at momentum classes, and not in that of equal momenta; moved by another
+/// covector, in neither.
+TEST(DiscreteDiracStructure, ReadsTheBasePointAsAMomentumOrAsItsClass) {
+  const auto scene = testing::every_constraint_class().at(1);
+  ASSERT_GT(scene->rows(), 0);
+  const auto method = Registry::with_built_ins().method("type1/midpoint");
+  DiscreteDiracStructure structure(scene->constraints, scene->dimension(), method.info.constraint_rule);
+  const Trajectory t = trajectory_of(scene, {.method = "type1/midpoint", .step = h});
+  const auto s = method.generating_function(*scene);
+  const Interval step{0.0, h};
+  const auto row_at = [&](double time, const Vector& q) {
+    ConstraintsAtPoint rows(scene->constraints, scene->dimension());
+    rows.evaluate(time, q);
+    Vector covector = Vector::Zero(q.size());
+    rows.add_annihilator(Vector::Ones(scene->rows()), covector);
+    return covector;
+  };
+  const Vector other = Vector::LinSpaced(scene->dimension(), 1.0, 2.0);
+  const auto plus = [&](const Vector& change) {
+    return structure.plus(step, {t.q[0], t.plus[0]}, {t.q[1], t.plus[1] + change},
+                          differential(*s, t, 0, true));
+  };
+  const auto minus = [&](const Vector& change) {
+    return structure.minus(step, {t.q[0], t.minus[0] + change}, {t.q[1], t.minus[1]},
+                           differential(*s, t, 0, false));
+  };
+  for (const auto& [in_class, outside] : {std::pair(plus(row_at(step.end(), t.q[1])), plus(other)),
+                                          std::pair(minus(row_at(step.start, t.q[0])), minus(other))}) {
+    EXPECT_GT(in_class.annihilator, 0.1);
+    EXPECT_LT(in_class.annihilator_of_class, 5e-12);
+    EXPECT_GT(outside.annihilator_of_class, 0.1);
   }
 }
 
 TEST_P(LawsOfTypesOneToThree, TrajectoriesAreStationaryForTheirPrinciple) {
   const auto type = method().info.type;
   for (const auto& scene : testing::every_constraint_class()) {
-    const auto s = method().make(*scene);
+    if (!generating_function_determines(method(), *scene)) continue;
+    const auto s = method().generating_function(*scene);
     Trajectory t = trajectory_of(scene, options());
     DiscreteDiracStructure structure(scene->constraints, scene->dimension(), method().info.constraint_rule);
     const auto residual = [&](const std::vector<Vector>& p) {
@@ -179,32 +214,39 @@ double error_at(const std::shared_ptr<const Scene>& scene, const IntegratorOptio
                 const Sample& reference) {
   const StepGrid grid = fit_steps(0.0, 1.0, options.step);
   Integrator integrator(scene, Registry::with_built_ins(), kinsol(), options);
-  EXPECT_TRUE(run(integrator, grid.steps, Momentum::projected, 1, nullptr).ok());
+  EXPECT_TRUE(run_steps(integrator, grid.steps, Momentum::projected, 1, nullptr).ok());
   Sample end;
   EXPECT_TRUE(integrator.sample(Momentum::projected, end).ok());
   return (join(end.q, end.p) - join(reference.q, reference.p)).lpNorm<Eigen::Infinity>();
 }
 
 double measured_order(const std::shared_ptr<const Scene>& scene, IntegratorOptions options, double coarse) {
-  const auto reference =
-      samples_of(scene, {.method = "type1/midpoint", .order = 8, .step = 1.0 / 128.0}, 128).back();
+  const auto reference = samples_of(scene, {.method = "type1/gl:6", .step = 1.0 / 32.0}, 32).back();
   options.step = coarse;
   const double first = error_at(scene, options, reference);
   options.step = coarse / 2.0;
   return std::log2(first / error_at(scene, options, reference));
 }
 
+/// A step small enough for the order to show, with an error that lies above round-off.
+double step_to_measure(int order) {
+  if (order <= 2) return 1.0 / 160.0;
+  return order <= 4 ? 1.0 / 20.0 : order <= 6 ? 1.0 / 6.0 : 1.0 / 3.0;
+}
+
 TEST_P(DiracLaws, MeasuredOrderIsTheStatedOne) {
+  const int stated = method().info.order;
   for (const auto& scene : testing::every_constraint_class()) {
-    const double order = measured_order(scene, options(), 1.0 / 160.0);
-    EXPECT_NEAR(order, method().info.order, 0.1) << scene->name;
+    const double order = measured_order(scene, options(), step_to_measure(stated));
+    EXPECT_NEAR(order, stated, stated <= 2 ? 0.1 : 0.4) << scene->name;
   }
 }
 
 TEST_P(LawsOfTypesOneToThree, ForcesKeepTheStatedOrder) {
   for (const auto& scene : testing::every_constraint_class()) {
-    const double order = measured_order(testing::forced(scene), options(), 1.0 / 160.0);
-    EXPECT_NEAR(order, method().info.order, 0.1) << scene->name;
+    const int stated = method().info.order;
+    const double order = measured_order(testing::forced(scene), options(), step_to_measure(stated));
+    EXPECT_NEAR(order, stated, stated <= 2 ? 0.1 : 0.4) << scene->name;
   }
 }
 
@@ -289,7 +331,7 @@ TEST(DiracStructure, MapsComposeAsStated) {
 TEST(DiracStructure, LegendreTransformsAndEnergiesOfADiscreteLagrangian) {
   const auto scene = testing::unconstrained();
   const Interval step{0.0, h};
-  const auto l_d = Registry::with_built_ins().method("type1/midpoint").make(*scene);
+  const auto l_d = Registry::with_built_ins().method("type1/midpoint").generating_function(*scene);
   Columns y(3, 2);
   y.col(0) = scene->start.q;
   y.col(1) = scene->start.q + h * scene->start.v;
@@ -298,7 +340,7 @@ TEST(DiracStructure, LegendreTransformsAndEnergiesOfADiscreteLagrangian) {
   for (const bool plus : {true, false}) {
     const auto h_d = Registry::with_built_ins()
                          .method(plus ? "type2/legendre(type1/midpoint)" : "type3/legendre(type1/midpoint)")
-                         .make(*scene);
+                         .generating_function(*scene);
     Columns z(3, 3);
     z.col(0) = plus ? l.q0 : legendre_minus(l).p;
     z.col(1) = plus ? legendre_plus(l).p : l.q1;
@@ -312,7 +354,9 @@ TEST(DiracStructure, LegendreTransformsAndEnergiesOfADiscreteLagrangian) {
 
 TEST(DiscreteAction, SumsOfLagrangianAndHamiltonianAgreeOnATrajectory) {
   const auto scene = testing::nonholonomic();
-  const auto make = [&](const char* name) { return Registry::with_built_ins().method(name).make(*scene); };
+  const auto make = [&](const char* name) {
+    return Registry::with_built_ins().method(name).generating_function(*scene);
+  };
   const Trajectory t = trajectory_of(scene, {.method = "type1/midpoint", .step = h});
   const auto curve = curve_of(0.0, h, t.q, t.plus), curve_minus = curve_of(0.0, h, t.q, t.minus);
   const double sum = hamilton_pontryagin_sum(*make("type1/midpoint"), curve);

@@ -209,7 +209,7 @@ TEST(Integrator, SmoothScenesTakeAtMostTwoIterationsASolve) {
   for_every_combination([](const ScenePointer& scene, IntegratorOptions options) {
     options.step = 0.01;
     Integrator integrator = integrator_for(scene, options);
-    ASSERT_TRUE(run(integrator, 200, Momentum::plus, 1, nullptr).ok());
+    ASSERT_TRUE(run_steps(integrator, 200, Momentum::plus, 1, nullptr).ok());
     EXPECT_LE(integrator.work().iterations, 2 * integrator.work().solves);
     EXPECT_GE(integrator.work().solves, 200);
   });

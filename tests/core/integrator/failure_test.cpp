@@ -146,7 +146,7 @@ TEST(Failure, SingularJacobianIsReported) {
 TEST(Failure, RunKeepsWhatWasObservedBefore) {
   Integrator integrator = integrator_for(vanishing_circle(), {.method = "type1/midpoint", .step = 0.4});
   std::vector<double> times;
-  const RunReport report = run(integrator, 10, Momentum::projected, 1, [&](const Sample& sample) {
+  const RunReport report = run_steps(integrator, 10, Momentum::projected, 1, [&](const Sample& sample) {
     times.push_back(sample.time);
     return true;
   });
@@ -160,7 +160,7 @@ TEST(Failure, StateThatCannotBeReadIsReportedByRun) {
   // The third step is evaluated at its middle, t = 0.9375, and succeeds; its end is beyond t = 1.
   Integrator integrator = integrator_for(expiring_oscillator(), {.method = "type1/midpoint", .step = 0.375});
   std::vector<double> times;
-  const RunReport report = run(integrator, 3, Momentum::projected, 1, [&](const Sample& sample) {
+  const RunReport report = run_steps(integrator, 3, Momentum::projected, 1, [&](const Sample& sample) {
     times.push_back(sample.time);
     return true;
   });

@@ -76,7 +76,7 @@ TEST(Momentum, PlusAndMinusAreTheTwoDiscreteLegendreTransforms) {
   const IntegratorOptions options{.method = "type1/midpoint", .step = 0.05};
   const auto plus = samples_of(scene, options, 3, Momentum::plus);
   const auto minus = samples_of(scene, options, 3, Momentum::minus);
-  const auto l_d = Registry::with_built_ins().method("type1/midpoint").make(*scene);
+  const auto l_d = Registry::with_built_ins().method("type1/midpoint").generating_function(*scene);
   Columns y(3, 2), g(3, 2);
   y << plus[1].q, plus[2].q;
   l_d->gradient({plus[1].time, options.step}, y, g);
@@ -154,7 +154,7 @@ TEST(Integrator, WhatIsReadDoesNotDependOnEarlierReadings) {
 
 std::vector<Sample> run_of(Integrator& integrator) {
   std::vector<Sample> samples;
-  const RunReport report = run(integrator, 20, Momentum::minus, 1, [&](const Sample& sample) {
+  const RunReport report = run_steps(integrator, 20, Momentum::minus, 1, [&](const Sample& sample) {
     samples.push_back(sample);
     return true;
   });

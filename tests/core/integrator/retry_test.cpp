@@ -65,10 +65,11 @@ TEST(OtherSolution, FreeFlightPastTheCentreIsRefused) {
 double energy_change(Integrator& integrator, double h) {
   const StepGrid grid = fit_steps(0.0, 29.7, h);
   double largest = 0.0;
-  const RunReport report = run(integrator, grid.steps, Momentum::projected, 1, [&](const Sample& sample) {
-    largest = std::max(largest, std::abs(sample.energy));
-    return true;
-  });
+  const RunReport report =
+      run_steps(integrator, grid.steps, Momentum::projected, 1, [&](const Sample& sample) {
+        largest = std::max(largest, std::abs(sample.energy));
+        return true;
+      });
   EXPECT_TRUE(report.ok()) << report.last.failure;
   return largest;
 }
@@ -86,7 +87,7 @@ TEST(OtherSolution, SmoothMotionsAreNotLookedAtTwice) {
   for (const auto& scene : testing::every_constraint_class())
     for (const IntegratorOptions& options : testing::every_kind_of_step()) {
       Integrator integrator = integrator_for(scene, options);
-      ASSERT_TRUE(run(integrator, 100, Momentum::plus, 1, nullptr).ok());
+      ASSERT_TRUE(run_steps(integrator, 100, Momentum::plus, 1, nullptr).ok());
       EXPECT_EQ(integrator.work().retries.total(), 0) << testing::describe(scene, options);
     }
 }

@@ -41,20 +41,21 @@ std::shared_ptr<const Scene> separable() {
 
 TEST(DefaultMethod, IsGaussLobattoWithThreeStagesOrTheOrderAskedFor) {
   for (const auto& scene : testing::every_constraint_class()) {
-    EXPECT_EQ(default_method(*scene, 0, {}, 40).method, "type1/gl:3") << scene->name;
-    EXPECT_EQ(default_method(*scene, 8, {}, 40).method, "type1/gl:4") << scene->name;
-    EXPECT_EQ(default_method(*scene, 12, {}, 1).method, "type1/gl:6")
+    EXPECT_EQ(default_method(*scene, {}).method, "type1/gl:3") << scene->name;
+    EXPECT_EQ(default_method(*scene, {.order = 8}).method, "type1/gl:4") << scene->name;
+    EXPECT_EQ(default_method(*scene, {.order = 12, .large = 1}).method, "type1/gl:6")
         << scene->name;  // large, and not explicit
   }
 }
 
 TEST(DefaultMethod, IsTheExplicitStepOnLargeSeparableScenesWithoutRows) {
-  const DefaultMethod large = default_method(*separable<3>(), 0, {}, 2);
+  const DefaultMethod large = default_method(*separable<3>(), {.large = 2});
   EXPECT_EQ(large.method, "type1/trapezoidal");
   EXPECT_EQ(large.order, 6);
-  EXPECT_EQ(default_method(*separable<3>(), 0, {}, 3).method, "type1/gl:3");
-  EXPECT_EQ(default_method(*separable<3>(), 12, {}, 2).method, "type1/gl:6") << "no composition has order 12";
-  EXPECT_EQ(default_method(*coupled_oscillators(), 0, {}, 2).method, "type1/gl:3");
+  EXPECT_EQ(default_method(*separable<3>(), {.large = 3}).method, "type1/gl:3");
+  EXPECT_EQ(default_method(*separable<3>(), {.order = 12, .large = 2}).method, "type1/gl:6")
+      << "no composition has order 12";
+  EXPECT_EQ(default_method(*coupled_oscillators(), {.large = 2}).method, "type1/gl:3");
   Integrator integrator(separable<3>(), Registry::with_built_ins(), kinsol(),
                         {.step = 0.1, .dense_limit = 2});
   ASSERT_TRUE(integrator.step().ok());
@@ -62,15 +63,46 @@ TEST(DefaultMethod, IsTheExplicitStepOnLargeSeparableScenesWithoutRows) {
 }
 
 TEST(DefaultMethod, LeavesARuleForTheRowsToTheMidpointStep) {
-  const DefaultMethod choice = default_method(*testing::nonholonomic(), 4, StepRule::trapezoidal, 40);
+  const DefaultMethod choice =
+      default_method(*testing::nonholonomic(), {.order = 4, .rule = StepRule::trapezoidal});
   EXPECT_EQ(choice.method, "type1/midpoint");
   EXPECT_EQ(choice.order, 4);
   EXPECT_NE(choice.reason.find("trapezoidal"), std::string::npos);
+  const auto order_with_rule = [](int order, double error) {
+    return default_method(*testing::nonholonomic(),
+                          {.order = order, .error = error, .rule = StepRule::trapezoidal})
+        .order;
+  };
+  EXPECT_EQ(order_with_rule(0, 0.0), 0) << "the method's own";
+  EXPECT_EQ(order_with_rule(0, 1e-7), 8);
+  EXPECT_EQ(order_with_rule(0, 1e-11), 10) << "no composition has order 12";
+  EXPECT_EQ(order_with_rule(4, 1e-11), 4) << "the order asked for goes before the error";
+}
+
+TEST(DefaultMethod, AnErrorDecidesTheOrderAndTheOrderTheMethod) {
+  const auto with_error = [](const Scene& scene, double error, int large = 40) {
+    return default_method(scene, {.error = error, .large = large});
+  };
+  for (const auto& scene : testing::every_constraint_class()) {
+    EXPECT_EQ(with_error(*scene, 1e-4).method, "type1/gl:3") << scene->name;
+    EXPECT_EQ(with_error(*scene, 1e-8).method, "type1/gl:4") << scene->name;
+    EXPECT_EQ(with_error(*scene, 1e-10).method, "type1/gl:6") << scene->name;
+  }
+  EXPECT_EQ(with_error(*separable<20>(), 1e-7).order, 6);
+  EXPECT_EQ(with_error(*separable<20>(), 1e-9).order, 8);
+  for (const double error : {1e-3, 1e-6, 1e-9}) {
+    const DefaultMethod choice = with_error(*separable<45>(), error);
+    EXPECT_EQ(choice.method, "type1/trapezoidal") << "an error asked for is no reason for an implicit step";
+    EXPECT_EQ(choice.order, error > 1e-7 ? 4 : 6);
+    const DefaultMethod same = default_method(*separable<45>(), {.order = choice.order});
+    EXPECT_EQ(same.method, choice.method);
+  }
+  EXPECT_EQ(with_error(*separable<45>(), 1e-6, 50).method, "type1/gl:2");
 }
 
 TEST(DefaultMethod, RefusesOrdersThatItHasNoMethodFor) {
   for (const int order : {-2, 1, 3, 42})
-    testing::expect_misuse([&] { (void)default_method(*testing::mixed(), order, {}, 40); },
+    testing::expect_misuse([&] { (void)default_method(*testing::mixed(), {.order = order}); },
                            {"order " + std::to_string(order), "2, 4, 6, 8, … 40"});
 }
 

@@ -40,7 +40,8 @@ TEST(GaussLobattoFunction, TheStepOfEveryTypeIsTheGaussLobattoStep) {
   const Scene& scene = *kept;
   const PhasePoint start{scene.start.q, start_momentum(scene)};
   for (const int s : {1, 2, 3, 4}) {
-    const auto stages = Registry::with_built_ins().method("type1/gl:" + std::to_string(s)).step(scene, true);
+    const auto stages =
+        Registry::with_built_ins().method("type1/gl:" + std::to_string(s)).make_step(scene, {true});
     const PhasePoint expected = end_of(*stages, start, scene.start.v);
     for (const GeneratingType type : types) {
       const auto graph = dirac_step(function(type, s), scene, StepRule::midpoint, true);
@@ -68,7 +69,8 @@ TEST(GaussLobattoFunction, TypesTwoAndThreeAreTheLegendreTransformsOfTypeOne) {
   const Scene& scene = *kept;
   const PhasePoint start{scene.start.q, start_momentum(scene)};
   for (const int s : {1, 2, 3}) {
-    const auto problem = Registry::with_built_ins().method("type1/gl:" + std::to_string(s)).step(scene, true);
+    const auto problem =
+        Registry::with_built_ins().method("type1/gl:" + std::to_string(s)).make_step(scene, {true});
     const PhasePoint end = end_of(*problem, start, scene.start.v);
     double value[3];
     for (const GeneratingType type : types) {
@@ -86,7 +88,8 @@ TEST(GaussLobattoFunction, EveryStepIsAMemberOfTheDiscreteDiracStructure) {
   const PhasePoint start{scene.start.q, start_momentum(scene)};
   DiscreteDiracStructure structure(scene.constraints, 3, StepRule::midpoint);
   for (const int s : {2, 3}) {
-    const auto problem = Registry::with_built_ins().method("type1/gl:" + std::to_string(s)).step(scene, true);
+    const auto problem =
+        Registry::with_built_ins().method("type1/gl:" + std::to_string(s)).make_step(scene, {true});
     PhasePoint end = end_of(*problem, start, scene.start.v);
     for (const GeneratingType type : types) {
       const auto f = function(type, s);

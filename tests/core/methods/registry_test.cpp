@@ -51,7 +51,7 @@ TEST(Registry, EveryListedNameIsKnownAndSaysItsOwnName) {
     EXPECT_EQ(info.name, name);
     EXPECT_EQ(static_cast<int>(info.type), name[4] - '0') << name;
     EXPECT_FALSE(info.summary.empty()) << name;
-    EXPECT_GE(built_ins().method(name).step(*testing::unconstrained(), true)->size(), 3) << name;
+    EXPECT_GE(built_ins().method(name).make_step(*testing::unconstrained(), {true})->size(), 3) << name;
   }
 }
 
@@ -146,8 +146,11 @@ TEST(Registry, GaussLobattoStepsRefuseStagesTransformsAndRulesThatTheyLack) {
   expect_unknown("type3/gl:21", {"GL(21)", "1 to 20"});
   expect_unknown("type2/legendre(type1/gl:2)", {"type1/gl:2", "nodes inside the step", "typeN/gl:S"});
   expect_unknown("type1/adjoint(type1/gl:2)", {"type1/gl:2", "nodes inside the step", "typeN/gl:S"});
-  expect_misuse([] { (void)built_ins().method("type1/gl:2").step(*testing::mixed(), true, StepRule::left); },
-                {"type1/gl:2", "its own nodes"});
+  expect_misuse(
+      [] {
+        (void)built_ins().method("type1/gl:2").make_step(*testing::mixed(), {true, StepRule::left});
+      },
+      {"type1/gl:2", "its own nodes"});
 }
 
 /// Type 1 generating function of the exact flow of q'' = −q:  ((q0² + q1²) cos h − 2 q0 q1) / (2 sin h).
@@ -198,7 +201,8 @@ TEST(Registry, MethodsThatNeedAHamiltonianRefuseADegenerateLagrangian) {
       [](const auto& q, const auto& v) { return q[0] * v[1] - 0.5 * (q[0] * q[0] + q[1] * q[1]); });
   scene.start = {0.0, Vector::Ones(2), Vector::Zero(2)};
   for (const char* name : {"type2/euler", "type3/euler", "type3/adjoint(type2/euler)"})
-    expect_misuse([&] { (void)built_ins().method(name).make(scene); }, {"degenerate", "method of type 1"});
+    expect_misuse([&] { (void)built_ins().method(name).generating_function(scene); },
+                  {"degenerate", "method of type 1"});
 }
 
 }  // namespace

@@ -50,6 +50,27 @@ TEST(Ensemble, IsTheSameBitsOnAnyNumberOfThreads) {
     }
 }
 
+TEST(Ensemble, StartsMayHaveAMomentumInPlaceOfAVelocity) {
+  for (const auto& scene : testing::every_constraint_class()) {
+    std::vector<Start> with_velocity = starts_of(scene, 3), with_momentum = with_velocity;
+    for (Start& start : with_momentum) {
+      Vector lq(3);
+      start.p.setZero(3);
+      scene->lagrangian->gradient(start.time, start.q, start.v, lq, start.p);
+      start.v.resize(0);
+    }
+    const auto ends = [&](const std::vector<Start>& starts) {
+      return run_ensemble(scene, Registry::with_built_ins(), kinsol(), {.step = 0.05}, starts, 5);
+    };
+    const auto expected = ends(with_velocity), found = ends(with_momentum);
+    for (std::size_t k = 0; k < expected.size(); ++k) {
+      ASSERT_TRUE(found[k].last.ok()) << found[k].last.failure;
+      EXPECT_LT((found[k].end.q - expected[k].end.q).norm(), 1e-12) << scene->name;
+      EXPECT_LT((found[k].end.p - expected[k].end.p).norm(), 1e-12) << scene->name;
+    }
+  }
+}
+
 TEST(Ensemble, WithoutStartsIsEmpty) {
   EXPECT_TRUE(
       run_ensemble(testing::mixed(), Registry::with_built_ins(), kinsol(), {.step = 0.1}, {}, 3).empty());

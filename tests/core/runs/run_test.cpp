@@ -61,7 +61,7 @@ TEST(Run, ShowsTheStartEveryKthPointAndTheLast) {
   const auto times_of = [](long steps, long every) {
     Integrator integrator = integrator_for(testing::nonholonomic(), {.step = 0.125});
     std::vector<double> times;
-    EXPECT_TRUE(run(integrator, steps, Momentum::plus, every, [&](const Sample& sample) {
+    EXPECT_TRUE(run_steps(integrator, steps, Momentum::plus, every, [&](const Sample& sample) {
                   times.push_back(sample.time / 0.125);
                   return true;
                 }).ok());
@@ -77,7 +77,7 @@ TEST(Run, ShowsTheStartEveryKthPointAndTheLast) {
 TEST(Run, EndsWhereTheObserverSaysSo) {
   Integrator integrator = integrator_for(testing::nonholonomic(), {.step = 0.125});
   int shown = 0;
-  EXPECT_TRUE(run(integrator, 10, Momentum::plus, 1, [&](const Sample&) { return ++shown < 4; }).ok());
+  EXPECT_TRUE(run_steps(integrator, 10, Momentum::plus, 1, [&](const Sample&) { return ++shown < 4; }).ok());
   EXPECT_EQ(shown, 4);
   EXPECT_EQ(integrator.work().steps, 3);
 }
@@ -87,7 +87,7 @@ TEST(Run, KeepingLessThanEveryPointIsRefusedBeforeAnythingIsDone) {
   for (const long every : {0L, -3L})
     expect_misuse(
         [&] {
-          (void)run(integrator, 2, Momentum::plus, every, [](const Sample&) {
+          (void)run_steps(integrator, 2, Momentum::plus, every, [](const Sample&) {
             ADD_FAILURE() << "a point was shown";
             return true;
           });
@@ -108,8 +108,8 @@ std::string doubts_of(Formula formula, const char* method, double step) {
   const IntegratorOptions options{.method = method, .step = step};
   Integrator watched = integrator_for(shared, options), alone = integrator_for(shared, options);
   RunChecks doubt(watched, 40);
-  EXPECT_TRUE(run(watched, 40, Momentum::projected, 10, nullptr, &doubt).ok());
-  EXPECT_TRUE(run(alone, 40, Momentum::projected, 10, nullptr).ok());
+  EXPECT_TRUE(run_steps(watched, 40, Momentum::projected, 10, nullptr, &doubt).ok());
+  EXPECT_TRUE(run_steps(alone, 40, Momentum::projected, 10, nullptr).ok());
   EXPECT_EQ(watched.position(), alone.position());
   EXPECT_EQ(watched.work().solves, alone.work().solves);
   return doubt.text();
@@ -134,13 +134,13 @@ TEST(Run, SaysWhyItsResultIsNotToBeBelieved) {
 /// The same integrator for a second run, from another start: the doubt is of that run alone.
 TEST(Run, DoubtsBeginWhereTheRunDoes) {
   Integrator integrator = integrator_for(testing::unconstrained(), {.method = "type1/gl:2", .step = 0.05});
-  EXPECT_TRUE(run(integrator, 20, Momentum::projected, 1, nullptr).ok());
+  EXPECT_TRUE(run_steps(integrator, 20, Momentum::projected, 1, nullptr).ok());
   Start start = integrator.scene().start;
   start.v *= 10.0;
   integrator.reset(start);
   for (int k = 0; k < 2; ++k) {
     RunChecks doubt(integrator, 20);
-    EXPECT_TRUE(run(integrator, 20, Momentum::projected, 1, nullptr, &doubt).ok());
+    EXPECT_TRUE(run_steps(integrator, 20, Momentum::projected, 1, nullptr, &doubt).ok());
     EXPECT_EQ(doubt.text(), "");
   }
 }

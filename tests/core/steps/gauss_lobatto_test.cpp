@@ -52,7 +52,7 @@ TEST(GaussLobattoStep, JacobianAgreesWithDifferences) {
     for (const auto& plain : testing::every_constraint_class())
       for (const auto& scene : {plain, testing::forced(plain)})
         for (const bool dense : {true, false}) {
-          const auto problem = Registry::with_built_ins().method(gl(s)).step(*scene, dense);
+          const auto problem = Registry::with_built_ins().method(gl(s)).make_step(*scene, {dense});
           Vector p(3), lq(3), x(problem->size());
           scene->lagrangian->gradient(0.0, scene->start.q, scene->start.v, lq, p);
           problem->begin({0.0, 0.2}, scene->start.q, p);
@@ -68,7 +68,7 @@ Registry with_plain_midpoint() {
   Registry registry = Registry::with_built_ins();
   MethodInfo info = registry.method("type1/midpoint").info;
   info.name = "type1/plain_midpoint";
-  registry.add(info, registry.method("type1/midpoint").make);
+  registry.add(info, registry.method("type1/midpoint").generating_function);
   return registry;
 }
 

@@ -47,10 +47,36 @@ double error_at_ten(const std::shared_ptr<const Scene>& scene, const std::string
   return (end.q - reference).lpNorm<Eigen::Infinity>();
 }
 
+/// θ = (q1 + sin t, 0), H = |q|²/2: q0' = q1, q1' = −q0 − cos t, a resonance in closed form.
+TEST(PhaseSpaceStep, VelocityOfAOneFormThatDependsOnTimeIsTheClosedForm) {
+  Scene scene;
+  scene.name = "moving one-form";
+  scene.coordinates = {"q0", "q1"};
+  scene.lagrangian =
+      lagrangian<2>([]<class T>(const std::array<T, 2>& q, const std::array<T, 2>& v, const T& t) {
+        using std::sin;
+        return (q[1] + sin(t)) * v[0] - 0.5 * (q[0] * q[0] + q[1] * q[1]);
+      });
+  scene.start.q = Vector::Ones(2);
+  scene.start.v = Vector::Zero(2);  // free: what is determined is read
+  const auto samples =
+      samples_of(std::make_shared<const Scene>(scene), {.method = "type1/gl:4", .step = 0.05}, 20);
+  for (const Sample& at : {samples.front(), samples.back()}) {
+    const double t = at.time, s = std::sin(t), c = std::cos(t);
+    const double q0 = c + s - 0.5 * t * s, q1 = c - 1.5 * s - 0.5 * t * c;
+    EXPECT_NEAR(at.q[0], q0, 1e-12);
+    EXPECT_NEAR(at.q[1], q1, 1e-12);
+    EXPECT_NEAR(at.v[0], q1, 1e-12);
+    EXPECT_NEAR(at.v[1], -q0 - c, 1e-12);
+    EXPECT_NEAR(at.p[0], at.q[1] + s, 1e-12);
+    EXPECT_NEAR(at.energy, 0.5 * at.q.squaredNorm(), 1e-12);
+  }
+}
+
 TEST(PhaseSpaceStep, JacobianAgreesWithDifferences) {
   const auto scene = completed(lotka_volterra<0>());
   for (const int s : {1, 2, 3}) {
-    const auto problem = Registry::with_built_ins().method(gl(s)).step(*scene, true);
+    const auto problem = Registry::with_built_ins().method(gl(s)).make_step(*scene, {true});
     Vector x = Vector::LinSpaced(problem->size(), -0.1, 0.15), p(2), lq(2);
     scene->lagrangian->gradient(0.0, scene->start.q, scene->start.v, lq, p);
     problem->begin({0.0, 0.2}, scene->start.q, p);
@@ -156,7 +182,7 @@ std::pair<double, double> energy_bands(const std::shared_ptr<const Scene>& scene
   Integrator integrator(scene, Registry::with_built_ins(), kinsol(), options);
   double first = 0.0, last = 0.0, start = std::nan("");
   long k = 0;
-  const RunReport report = run(integrator, steps, Momentum::projected, 10, [&](const Sample& sample) {
+  const RunReport report = run_steps(integrator, steps, Momentum::projected, 10, [&](const Sample& sample) {
     if (std::isnan(start)) start = sample.energy;
     const double change = std::abs(sample.energy - start);
     if (k < steps / 10) first = std::max(first, change);

@@ -21,7 +21,7 @@ TEST_P(StepJacobian, AgreesWithDifferencesForEveryConstraintClass) {
   }
   for (const auto& scene : scenes)
     for (const bool dense : {true, false}) {
-      const auto problem = method.step(*scene, dense);
+      const auto problem = method.make_step(*scene, {dense});
       if (problem->size() == 0) continue;
       Vector p(3), lq(3), x(problem->size());
       scene->lagrangian->gradient(0.0, scene->start.q, scene->start.v, lq, p);
@@ -44,16 +44,16 @@ TEST(StepProblem, ExplicitGraphsLeaveOnlyMultipliers) {
   for (const char* name : {"type1/left", "type1/right", "type1/trapezoidal", "type2/euler", "type3/euler"}) {
     const Method method = registry.method(name);
     scene.constraints.clear();
-    EXPECT_EQ(method.step(scene, true)->size(), 0) << name;
+    EXPECT_EQ(method.make_step(scene, {true})->size(), 0) << name;
     scene.constraints = testing::nonholonomic()->constraints;
-    const auto constrained = method.step(scene, true);
+    const auto constrained = method.make_step(scene, {true});
     EXPECT_EQ(constrained->size(), 1) << name;
     Vector x = Vector::Constant(1, 0.1);
     constrained->begin({0.0, 0.2}, scene.start.q, scene.start.v);
     EXPECT_LT(testing::jacobian_error(*constrained, x), 1e-8) << name;
   }
   const Method midpoint = registry.method("type1/midpoint");
-  EXPECT_EQ(midpoint.step(scene, true)->size(), 4);
+  EXPECT_EQ(midpoint.make_step(scene, {true})->size(), 4);
 }
 
 }  // namespace

@@ -31,6 +31,22 @@ TEST(Scene, EveryTestSceneIsConsistent) {
   for (const auto& scene : testing::every_constraint_class()) EXPECT_NO_THROW(check(*scene)) << scene->name;
 }
 
+TEST(Scene, AStartIsCompletedByItsMomentum) {
+  const auto scene = testing::nonholonomic();
+  Start start = scene->start;
+  Vector lq(3), p(3);
+  scene->lagrangian->gradient(start.time, start.q, start.v, lq, p);
+  start.v.resize(0);
+  start.p = p;
+  EXPECT_LT((completed_start(*scene, start).v - scene->start.v).norm(), 1e-13);
+  EXPECT_NO_THROW(require_consistent(*scene, start));
+  start.p[0] += 0.1;
+  expect_misuse([&] { require_consistent(*scene, start); }, {"row 'contact'", "off the distribution"});
+  start.p.resize(2);
+  expect_misuse([&] { (void)completed_start(*scene, start); }, {"'nonholonomic'", "the start p", "2", "3"});
+  EXPECT_EQ(completed_start(*scene, scene->start).v, scene->start.v);
+}
+
 TEST(Scene, NoSceneIsRefused) {
   expect_misuse([] { (void)completed(nullptr); }, {"no scene"});
 }

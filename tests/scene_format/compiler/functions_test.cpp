@@ -3,7 +3,7 @@
 #include <cstdlib>
 #include <diracstep/constraints/holonomic.hpp>
 #include <diracstep/core/integrator/integrator.hpp>
-#include <diracstep/scene_format/loader/scene_file.hpp>
+#include <diracstep/scene_format/scene_file.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
 #include <diracstep/validation/laws/scene_examination.hpp>
 #include <filesystem>

@@ -1,8 +1,8 @@
 #include <gtest/gtest.h>
 
 #include <diracstep/core/numerics/errors.hpp>
-#include <diracstep/scene_format/loader/scene_file.hpp>
 #include <diracstep/scene_format/loader/scene_template.hpp>
+#include <diracstep/scene_format/scene_file.hpp>
 #include <string>
 #include <vector>
 

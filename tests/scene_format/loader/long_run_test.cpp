@@ -26,7 +26,7 @@ std::vector<double> energy_errors(const std::shared_ptr<const Scene>& scene, con
   std::vector<double> tenths(10, 0.0);
   double start = 0.0;
   long k = 0;
-  const RunReport report = run(integrator, steps, Momentum::projected, 10, [&](const Sample& sample) {
+  const RunReport report = run_steps(integrator, steps, Momentum::projected, 10, [&](const Sample& sample) {
     if (k == 0) start = sample.energy;
     double& largest = tenths[static_cast<std::size_t>(std::min(k / (steps / 10), 9L))];
     largest = std::max(largest, std::abs(sample.energy - start));

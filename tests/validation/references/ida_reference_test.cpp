@@ -181,7 +181,8 @@ TEST(Formulations, AllReachTheClosedFormAndOnlyOneDrifts) {
       const ReferenceRun run =
           integrate_with_ida(*entry.scene, entry.t_end, {.rtol = 1e-9, .formulation = formulation});
       ASSERT_TRUE(run.ok()) << scene << ' ' << name(formulation) << ": " << run.failure;
-      EXPECT_LT(error(entry, run.end), 1.4e-4) << scene << ' ' << name(formulation);  // five times the largest
+      EXPECT_LT(error(entry, run.end), 1.4e-4)
+          << scene << ' ' << name(formulation);  // five times the largest
     }
   }
   const CatalogueScene pendulum = make_scene("pendulum_cartesian");
@@ -349,6 +350,24 @@ TEST(IdaReference, FollowsALagrangianThatDependsOnTime) {
   EXPECT_NEAR(run.end.q[0], q, 1e-7);
   EXPECT_NEAR(run.end.v[0], v, 1e-7);
   EXPECT_NEAR(run.end.p[0], std::exp(3.0) * v, 1e-6);
+}
+
+/// A massless charge on a spring: L = (x v_y − y v_x)/2 − |q|²/2, x' = −y, y' = x; the start gives no
+/// velocity, or one that is not that of the motion.
+TEST(IdaReference, FindsTheVelocityThatALagrangianLinearInItDetermines) {
+  const auto formula = []<class T>(const std::array<T, 2>& q, const std::array<T, 2>& v) {
+    return 0.5 * (q[0] * v[1] - q[1] * v[0]) - 0.5 * (q[0] * q[0] + q[1] * q[1]);
+  };
+  for (const double given : {0.0, 7.0}) {
+    const ReferenceRun run =
+        integrate_with_ida(make<2>(formula, {}, {1.0, 0.0}, {given, given}), 2.0, at(1e-10));
+    ASSERT_TRUE(run.ok()) << run.failure;
+    const double s = std::sin(2.0), c = std::cos(2.0);
+    EXPECT_NEAR(run.end.q[0], c, 1e-7);
+    EXPECT_NEAR(run.end.q[1], s, 1e-7);
+    EXPECT_NEAR(run.end.v[0], -s, 1e-6);
+    EXPECT_NEAR(run.end.v[1], c, 1e-6);
+  }
 }
 
 TEST(IdaReference, TakesAHamiltonianAndAMomentumInstead) {

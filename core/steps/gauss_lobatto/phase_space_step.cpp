@@ -3,8 +3,8 @@
 #include <cmath>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/numerics/scales.hpp>
+#include <diracstep/core/steps/gauss_lobatto/phase_space_step.hpp>
 #include <diracstep/core/steps/gauss_lobatto/tableau.hpp>
-#include <diracstep/core/steps/phase_space_step.hpp>
 
 namespace diracstep {
 
@@ -283,7 +283,7 @@ PhaseSpaceVelocityProblem::PhaseSpaceVelocityProblem(const Scene& scene, bool de
       blocks_{{"two-form", lagrangian_->dimension()}} {
   layout_.add(lagrangian_->pattern(), 0, 0);
   pattern_ = layout_.assemble(dense);
-  for (Vector* column : {&q_, &lq_, &lv_}) column->setZero(lagrangian_->dimension());
+  for (Vector* column : {&q_, &lq_, &lv_, &lvt_}) column->setZero(lagrangian_->dimension());
   for (Vector* values : {&lqq_, &lqv_, &lvv_}) values->setZero(lagrangian_->pattern().nonzeros());
 }
 
@@ -293,12 +293,13 @@ void PhaseSpaceVelocityProblem::begin(double t, ConstVectorRef q) {
   const Vector zero = Vector::Zero(q.size());
   lagrangian_->hessian(t, q, zero, lqq_, lqv_, lvv_);
   lagrangian_->gradient(t, q, zero, lq_, lv_);
-  blocks_[0].scale = usable_scale(max_norm(lq_));
+  lagrangian_->gradient_rate(t, q, zero, lvt_);
+  blocks_[0].scale = usable_scale(std::max(max_norm(lq_), max_norm(lvt_)));
 }
 
 void PhaseSpaceVelocityProblem::residual(ConstVectorRef v, VectorRef f) {
   lagrangian_->gradient(t_, q_, v, lq_, lv_);
-  f = lq_;
+  f = lq_ - lvt_;
   lagrangian_->pattern().transposed_multiply_add(lqv_.data(), v.data(), f.data(), -1.0);
 }
 

@@ -23,8 +23,8 @@ namespace diracstep {
 /// two-form dθ is singular at the start, with the coordinates whose velocities nothing determines.
 std::unique_ptr<StepProblem> phase_space_step(int s, const Scene& scene, bool dense);
 
-/// Unknown v, linear:   ∂L/∂q(q,v) = Dθ(q) v,  that is (Dθᵀ − Dθ) v = ∂H/∂q: the velocity of a phase-space
-/// Lagrangian. Regular where the two-form dθ is.
+/// Unknown v, linear:   ∂L/∂q(t,q,v) = Dθ(t,q) v + ∂θ/∂t,  that is (Dθᵀ − Dθ) v = ∂H/∂q + ∂θ/∂t: the velocity
+/// of a phase-space Lagrangian θ(t,q)·v − H(t,q). Regular where the two-form dθ is.
 class PhaseSpaceVelocityProblem final : public NonlinearProblem {
  public:
   PhaseSpaceVelocityProblem(const Scene& scene, bool dense);
@@ -44,7 +44,7 @@ class PhaseSpaceVelocityProblem final : public NonlinearProblem {
   BlockPattern layout_;
   std::vector<ResidualBlock> blocks_;
   double t_ = 0.0;
-  Vector q_, lq_, lv_, lqq_, lqv_, lvv_;
+  Vector q_, lq_, lv_, lvt_, lqq_, lqv_, lvv_;
 };
 
 }  // namespace diracstep

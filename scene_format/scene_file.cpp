@@ -5,8 +5,8 @@
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/system/consistent_start.hpp>
 #include <diracstep/scene_format/loader/defined_start.hpp>
-#include <diracstep/scene_format/loader/scene_file.hpp>
 #include <diracstep/scene_format/loader/scene_functions.hpp>
+#include <diracstep/scene_format/scene_file.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
 #include <fstream>
 #include <limits>

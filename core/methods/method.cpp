@@ -1,0 +1,98 @@
+#include <diracstep/core/methods/gauss_lobatto.hpp>
+#include <diracstep/core/methods/method.hpp>
+#include <diracstep/core/methods/quadrature.hpp>
+#include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/steps/gauss_lobatto/phase_space_step.hpp>
+#include <diracstep/core/steps/gauss_lobatto/step.hpp>
+#include <diracstep/core/steps/gauss_lobatto/tableau.hpp>
+#include <utility>
+
+namespace diracstep {
+
+namespace {
+
+/// Whether a phase-space Lagrangian asks for a step of its own.
+bool needs_phase_space_step(const Scene& scene, const StepChoices& choices) {
+  return scene.lagrangian->structure().phase_space() && !choices.force_degenerate;
+}
+
+bool asks_for_own_rule(const StepChoices& choices, const StepRule& own) {
+  return !choices.rule || (!choices.rule->own && choices.rule->nodes == own);
+}
+
+/// The rule asked for; with a discretisation of the user's own, forces keep the method's nodes.
+ConstraintRule applied_rule(const StepChoices& choices, const StepRule& own) {
+  ConstraintRule applied = own;
+  if (choices.rule && choices.rule->own) applied.own = choices.rule->own;
+  if (choices.rule && !choices.rule->own) applied.nodes = choices.rule->nodes;
+  return applied;
+}
+
+StepFactory gauss_lobatto_factory(const std::string& name, int s) {
+  return [name, s](const Scene& scene, const StepChoices& choices) {
+    if (needs_phase_space_step(scene, choices)) return phase_space_step(s, scene, choices.dense);
+    if (!asks_for_own_rule(choices, StepRule::midpoint))
+      throw Misuse("method '" + name + "' has its own nodes for the constraint; no other rule applies");
+    return gauss_lobatto_step(s, scene, choices.dense);
+  };
+}
+
+}  // namespace
+
+std::string prefix_of(GeneratingType type) { return "type" + std::to_string(static_cast<int>(type)) + "/"; }
+
+Method method_of(MethodInfo info, GeneratingFunctionFactory generating_function) {
+  const auto make_step = [name = info.name, own = info.constraint_rule, generating_function](
+                             const Scene& scene, const StepChoices& choices) {
+    if (needs_phase_space_step(scene, choices))
+      throw Misuse("scene '" + scene.name + "': its Lagrangian is linear in v, where '" + name +
+                   "' is unstable or leaves p = ∂L/∂v; use type1/midpoint or typeN/gl:S");
+    return dirac_step(generating_function(scene), scene, applied_rule(choices, own), choices.dense);
+  };
+  return {std::move(info), make_step, std::move(generating_function)};
+}
+
+Method gauss_lobatto_method(GeneratingType type, int s) {
+  gauss_lobatto_tableau(s);  // throws for a number of stages that is not allowed
+  const std::string stages = std::to_string(s), name = prefix_of(type) + "gl:" + stages;
+  if (type == GeneratingType::four)
+    throw Misuse("'" + name + "': the Gauss-Lobatto generating functions are of types 1, 2 and 3");
+  const bool first = type == GeneratingType::one;
+  MethodInfo info{
+      .name = name,
+      .type = type,
+      .order = 2 * s,
+      .self_adjoint = true,
+      .constraint_rule = StepRule::midpoint,
+      .summary = "Gauss-Lobatto Dirac step, " + stages + (s == 1 ? " stage" : " stages"),
+      .stages = s,
+      .rows_inside = true,
+      .solved_as = first ? "solved for its stage velocities"
+                         : "the same step as type1/gl:" + stages + ", solved for its stage velocities"};
+  return {std::move(info), gauss_lobatto_factory(name, s),
+          [s, type](const Scene& scene) { return gauss_lobatto_function(type, s, scene.lagrangian); }};
+}
+
+Method midpoint_method() {
+  MethodInfo info{.name = "type1/midpoint",
+                  .type = GeneratingType::one,
+                  .order = 2,
+                  .self_adjoint = true,
+                  .constraint_rule = StepRule::midpoint,
+                  .summary = "L_d = h L((q0+q1)/2, (q1-q0)/h)",
+                  .allocation_free = true,
+                  .stages = 1,
+                  .solved_as = "the same step as GL(1), solved for its velocity"};
+  Method method = method_of(std::move(info), [](const Scene& scene) {
+    return quadrature_lagrangian(scene.lagrangian, StepRule::midpoint);
+  });
+  method.make_step = [stated = method.make_step, as_gl1 = gauss_lobatto_factory(method.info.name, 1)](
+                         const Scene& scene, const StepChoices& choices) {
+    const bool own_rule = asks_for_own_rule(choices, StepRule::midpoint);
+    return own_rule || needs_phase_space_step(scene, choices) ? as_gl1(scene, choices)
+                                                              : stated(scene, choices);
+  };
+  return method;
+}
+
+}  // namespace diracstep
