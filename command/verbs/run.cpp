@@ -247,7 +247,8 @@ IntegratorOptions take_found(const Options& options, const CatalogueScene& entry
 /// been changed.
 void compare_invariants(const Options& options, const CatalogueScene& entry, RunResult& result) {
   if (!result.has_end()) return;
-  const Start& start = completed(entry.scene)->start;
+  const auto scene = completed(entry.scene);
+  const Start& start = scene->start;
   const bool by_momentum = !entry.scene->lagrangian;
   for (const Invariant& invariant : entry.invariants) {
     const Vector& first = by_momentum ? entry.scene->start.p : start.v;
