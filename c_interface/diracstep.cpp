@@ -14,7 +14,7 @@ using namespace diracstep;
 struct diracstep_integrator {
   std::unique_ptr<Integrator> integrator;
   Sample sample;
-  std::string message;
+  std::string message, doubt;
 };
 
 namespace {
@@ -150,4 +150,11 @@ int diracstep_reset(diracstep_integrator* integrator, double time, const double*
 const char* diracstep_message(const diracstep_integrator* integrator) {
   return integrator != nullptr ? integrator->message.c_str()
                                : "there is no integrator: no memory, or NULL was given";
+}
+
+const char* diracstep_doubt(diracstep_integrator* integrator) {
+  if (integrator == nullptr || !integrator->integrator) return "";
+  const Scene& scene = integrator->integrator->scene();
+  integrator->doubt = scene.doubt ? scene.doubt() : std::string();
+  return integrator->doubt.c_str();
 }

@@ -78,6 +78,10 @@ DIRACSTEP_API int diracstep_reset(diracstep_integrator *integrator, double time,
 /* What happened in the last call that did not return DIRACSTEP_OK; valid until the next call. */
 DIRACSTEP_API const char *diracstep_message(const diracstep_integrator *integrator);
 
+/* "", or why what was read so far is not to be believed: derivatives taken by differences that two step sizes
+ * do not agree on.  Valid until the next call. */
+DIRACSTEP_API const char *diracstep_doubt(diracstep_integrator *integrator);
+
 #ifdef __cplusplus
 }
 #endif

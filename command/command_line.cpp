@@ -81,7 +81,7 @@ int execute(int count, char** arguments, bool run_verbs) {
       "  diracstep list methods\n"
       "  diracstep run knife_edge --step 0.05 --out knife_edge.csv\n"
       "  diracstep study knife_edge --orders 2,4,8 --out results\n"
-      "Exit status: 0 done, 1 numerical failure or interrupt, 2 misuse.");
+      "Exit status: 0 done, 1 numerical failure or interrupt, 2 misuse, 3 a result that is doubted.");
   Session session;
   add_check(app, session);
   add_list(app, session);

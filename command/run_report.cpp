@@ -68,6 +68,34 @@ std::string end_table(const Sample& end, const Scene& scene) {
   return text;
 }
 
+std::string invariants_text(const RunResult& result) {
+  std::string text;
+  for (const InvariantEnds& ends : result.invariants) {
+    text +=
+        fmt::format("invariant {}: {:.15g}, changed by {:.2e}", ends.name, ends.end, ends.end - ends.start);
+    if (ends.stated)
+      text += fmt::format(", stated {:.15g}, off by {:.2e}", *ends.stated, ends.end - *ends.stated);
+    text += '\n';
+  }
+  return text;
+}
+
+Json invariants_json(const RunResult& result) {
+  Json json = Json::array();
+  for (const InvariantEnds& ends : result.invariants)
+    json.push_back({{"name", ends.name},
+                    {"start", number(ends.start)},
+                    {"end", number(ends.end)},
+                    {"stated", ends.stated ? number(*ends.stated) : Json(nullptr)}});
+  return json;
+}
+
+/// "ok", "doubted" or why the run failed.
+std::string status(const RunResult& result) {
+  if (!result.failure.empty()) return result.failure;
+  return result.doubt.empty() ? "ok" : "doubted";
+}
+
 Json retries_json(const Retries& retries) {
   return {{"line_searches", retries.line_searches},           {"plain_guesses", retries.plain_guesses},
           {"previous_solutions", retries.previous_solutions}, {"continuations", retries.continuations},
@@ -89,6 +117,7 @@ std::string retries_text(const Retries& retries) {
 
 std::string search_text(const ErrorControlReport& search) {
   std::string text = search_table(search);
+  if (!search.division.empty()) text += search.division + '\n';
   if (search.ok())
     text += fmt::format("estimated error {:.2e}, observed order {:.1f}, {} solves in all\n", search.estimate,
                         search.observed_order, search.work.solves);
@@ -113,6 +142,7 @@ Json search_json(const ErrorControlReport& search) {
             {"step", search.step},
             {"estimate", number(search.estimate)},
             {"observed_order", number(search.observed_order)},
+            {"division", search.division.empty() ? Json(nullptr) : Json(search.division)},
             {"warning", search.warning.empty() ? Json(nullptr) : Json(search.warning)},
             {"refusal", search.refusal.empty() ? Json(nullptr) : Json(search.refusal)},
             {"solves", search.work.solves},
@@ -126,6 +156,11 @@ Json search_json(const ErrorControlReport& search) {
                             {"observed_order", number(run.observed_order)},
                             {"status", run.failure.empty() ? "ok" : run.failure}});
   return json;
+}
+
+double energy_change(const RunResult& result, const CatalogueScene& entry) {
+  const auto scene = completed(entry.scene);
+  return result.end.energy - scene->energy(scene->start.time, scene->start.q, scene->start.v);
 }
 
 }  // namespace
@@ -148,7 +183,8 @@ std::string run_text(const RunResult& result, const CatalogueScene& entry, const
   if (result.variable) text += summary(*result.variable);
   if (result.has_end()) {
     text += fmt::format("\nt = {:.15g}\n{}energy: {:.15g}, changed by {:.2e}\n", result.end.time,
-                        end_table(result.end, *entry.scene), result.end.energy, result.check.energy_error);
+                        end_table(result.end, *entry.scene), result.end.energy, energy_change(result, entry));
+    text += invariants_text(result);
     if (std::isfinite(result.check.error_q))
       text += fmt::format("error against the {} reference: q {:.2e}, p {:.2e}\n", entry.reference.kind,
                           result.check.error_q, result.check.error_p);
@@ -170,7 +206,7 @@ std::string run_json(const RunResult& result, const CatalogueScene& entry, const
             {"momentum", name(result.momentum)},
             {"step", result.variable || (result.search && result.search->adaptive) ? Json(nullptr)
                                                                                    : Json(options.step)},
-            {"status", result.failure.empty() ? "ok" : result.failure}};
+            {"status", status(result)}};
   for (const auto& [key, value] : entry.parameters) json["parameters"][key] = number(value);
   json["doubt"] = result.doubt.empty() ? Json(nullptr) : Json(result.doubt);
   json["end"] = end_json(result, *entry.scene);
@@ -178,6 +214,7 @@ std::string run_json(const RunResult& result, const CatalogueScene& entry, const
   json["error_p"] = number(check.error_p);
   json["constraint"] = number(check.constraint);
   json["energy_error"] = number(check.energy_error);
+  json["invariants"] = invariants_json(result);
   json["steps"] = result.work.steps;
   json["newton_iterations"] = result.work.iterations;
   json["residual_evaluations"] = result.work.residual_evaluations;

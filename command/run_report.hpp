@@ -4,8 +4,16 @@
 #include <diracstep/validation/studies/study_run.hpp>
 #include <optional>
 #include <string>
+#include <vector>
 
 namespace diracstep::command {
+
+/// Something that a scene declares as kept, at both ends of a run.
+struct InvariantEnds {
+  std::string name;
+  double start, end;
+  std::optional<double> stated;
+};
 
 /// What one run came to.
 struct RunResult {
@@ -17,8 +25,9 @@ struct RunResult {
   std::optional<ErrorControlReport> search;  ///< where an error was asked for
   StudyRow check;                            ///< errors against the reference at that time, rows and energy
   std::string doubt;                         ///< empty, or why the points are not to be believed
-  std::string out;                           ///< the file written, if any
-  long lines = 0;                            ///< points in it
+  std::vector<InvariantEnds> invariants;
+  std::string out;  ///< the file written, if any
+  long lines = 0;   ///< points in it
 
   bool has_end() const { return end.q.size() > 0; }
 };

@@ -20,6 +20,7 @@ namespace diracstep::command {
 inline constexpr int done = 0;
 inline constexpr int failed = 1;  ///< a numerical failure, an interrupt, or output that could not be written
 inline constexpr int misused = 2;
+inline constexpr int doubted = 3;  ///< a run that came to its end, with a doubt about its result
 
 /// What the verbs share.
 struct Session {

@@ -18,6 +18,7 @@ class HolonomicRows final : public ConstraintRows {
         constant_(is_linear(phi_)) {}
 
   bool constant() const override { return constant_; }
+  bool workless() const override { return !takes_time<F, std::array<double, N>>; }
 
   void position(double t, ConstVectorRef q, VectorRef phi) const override {
     const auto values = evaluate<double>(t, q);

@@ -16,9 +16,12 @@ SparsityPattern diagonal_sum(const SparsityPattern& first, const SparsityPattern
 }
 
 PhaseStructure common(const PhaseStructure& a, const PhaseStructure& b) {
-  return {a.separable && b.separable, a.y_hessian_constant && b.y_hessian_constant,
-          a.y_hessian_diagonal && b.y_hessian_diagonal, a.quadratic && b.quadratic,
-          a.y_hessian_zero && b.y_hessian_zero};
+  return {a.separable && b.separable,
+          a.y_hessian_constant && b.y_hessian_constant,
+          a.y_hessian_diagonal && b.y_hessian_diagonal,
+          a.quadratic && b.quadratic,
+          a.y_hessian_zero && b.y_hessian_zero,
+          a.autonomous && b.autonomous};
 }
 
 /// f1(x1, y1) + f2(x2, y2).
@@ -128,6 +131,7 @@ class PartRows final : public ConstraintRows {
     for (std::string& name : names) name.insert(0, prefix + ".");
     return names;
   }
+  bool workless() const override { return rows_->workless(); }
   void position(double t, ConstVectorRef q, VectorRef phi) const override {
     rows_->position(t, part(q), phi);
   }

@@ -15,7 +15,9 @@ using Kind = Branch::Kind;
 PhaseStructure structure_of(const std::vector<Branch>& branches) {
   const bool no_inductor =
       std::ranges::none_of(branches, [](const Branch& b) { return b.kind == Kind::inductor; });
-  return {true, true, true, true, no_inductor};
+  const bool no_source =
+      std::ranges::none_of(branches, [](const Branch& b) { return b.kind == Kind::voltage_source; });
+  return {true, true, true, true, no_inductor, no_source};
 }
 
 /// Inductances and inverse capacitances on the diagonals; charges at sources have the potential −V(t) q.

@@ -25,6 +25,8 @@ class LinearRows final : public ConstraintRows {
     for (const auto& [row, column] : pattern().entries()) a_[k++] = a(row, column);
   }
 
+  bool workless() const override { return b_.empty(); }
+
   void coefficients(double t, ConstVectorRef, VectorRef a, VectorRef b) const override {
     a = a_;
     b.setZero();

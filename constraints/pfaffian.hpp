@@ -28,6 +28,9 @@ class PfaffianRows final : public ConstraintRows {
         constant_(are_constant(a_, b_)) {}
 
   bool constant() const override { return constant_; }
+  bool workless() const override {
+    return std::is_same_v<B, NoOffset> && !takes_time<A, std::array<double, N>>;
+  }
 
   void coefficients(double t, ConstVectorRef q, VectorRef a, VectorRef b) const override {
     const auto rows = evaluate_a<double>(t, q);

@@ -50,7 +50,8 @@ int bits_of(const PhaseStructure& structure) {
          (structure.y_hessian_constant ? DIRACSTEP_CONSTANT_MASS : 0) |
          (structure.y_hessian_diagonal ? DIRACSTEP_DIAGONAL_MASS : 0) |
          (structure.quadratic ? DIRACSTEP_QUADRATIC : 0) |
-         (structure.y_hessian_zero ? DIRACSTEP_LINEAR_IN_Y : 0);
+         (structure.y_hessian_zero ? DIRACSTEP_LINEAR_IN_Y : 0) |
+         (structure.autonomous ? DIRACSTEP_AUTONOMOUS : 0);
 }
 
 /// The scene as a plugin sees it, and what it needs of the scene.

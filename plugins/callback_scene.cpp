@@ -1,3 +1,4 @@
+#include <cmath>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/plugins/callback_error.hpp>
 #include <diracstep/plugins/callback_scene.hpp>
@@ -13,6 +14,9 @@ constexpr int max_entries = 1 << 30;  ///< of a full matrix
 struct Origin {
   std::string owner;
   std::shared_ptr<const void> library;
+  DifferenceScales q, v;  ///< of the coordinates and velocities
+  double time_scale = 1.0;
+  std::shared_ptr<DifferenceQuality> quality = {};
 };
 
 void require(bool condition, const std::string& owner, const std::string& what) {
@@ -30,7 +34,8 @@ PhaseStructure structure_from(int bits) {
           .y_hessian_constant = (bits & (DIRACSTEP_CONSTANT_MASS | DIRACSTEP_LINEAR_IN_Y)) != 0,
           .y_hessian_diagonal = (bits & (DIRACSTEP_DIAGONAL_MASS | DIRACSTEP_LINEAR_IN_Y)) != 0,
           .quadratic = (bits & DIRACSTEP_QUADRATIC) != 0,
-          .y_hessian_zero = (bits & DIRACSTEP_LINEAR_IN_Y) != 0};
+          .y_hessian_zero = (bits & DIRACSTEP_LINEAR_IN_Y) != 0,
+          .autonomous = (bits & DIRACSTEP_AUTONOMOUS) != 0};
 }
 
 /// L from callbacks.
@@ -50,8 +55,11 @@ class CallbackLagrangian final : public Lagrangian {
 
   void gradient(double t, ConstVectorRef x, ConstVectorRef y, VectorRef fx, VectorRef fy) const override {
     if (f_.gradient == nullptr) {
-      gradient_by_differences([&](ConstVectorRef shifted) { return value(t, shifted, y); }, x, fx);
-      gradient_by_differences([&](ConstVectorRef shifted) { return value(t, x, shifted); }, y, fy);
+      DifferenceQuality* const quality = origin_.quality.get();
+      gradient_by_differences([&](ConstVectorRef shifted) { return value(t, shifted, y); }, x, fx, origin_.q,
+                              quality);
+      gradient_by_differences([&](ConstVectorRef shifted) { return value(t, x, shifted); }, y, fy, origin_.v,
+                              quality);
       return;
     }
     call(origin_.owner, "lagrangian.gradient",
@@ -65,19 +73,24 @@ class CallbackLagrangian final : public Lagrangian {
         return f_.hessian(f_.data, t, x.data(), y.data(), fxx.data(), fxy.data(), fyy.data());
       });
     Vector other(dimension());
-    differences_.evaluate([&](ConstVectorRef q, VectorRef fx) { gradient(t, q, y, fx, other); }, x, fxx);
-    differences_.evaluate([&](ConstVectorRef v, VectorRef fx) { gradient(t, x, v, fx, other); }, y, fxy);
-    differences_.evaluate([&](ConstVectorRef v, VectorRef fy) { gradient(t, x, v, other, fy); }, y, fyy);
+    differences_.evaluate([&](ConstVectorRef q, VectorRef fx) { gradient(t, q, y, fx, other); }, x, fxx,
+                          origin_.q);
+    differences_.evaluate([&](ConstVectorRef v, VectorRef fx) { gradient(t, x, v, fx, other); }, y, fxy,
+                          origin_.v);
+    differences_.evaluate([&](ConstVectorRef v, VectorRef fy) { gradient(t, x, v, other, fy); }, y, fyy,
+                          origin_.v);
   }
 
   void gradient_rate(double t, ConstVectorRef x, ConstVectorRef y, VectorRef fyt) const override {
     Vector fx(dimension());
-    rate_by_differences([&](double s, VectorRef fy) { gradient(s, x, y, fx, fy); }, t, fyt);
+    rate_by_differences([&](double s, VectorRef fy) { gradient(s, x, y, fx, fy); }, t, fyt,
+                        origin_.time_scale);
   }
 
   void position_gradient_rate(double t, ConstVectorRef x, ConstVectorRef y, VectorRef fxt) const override {
     Vector fy(dimension());
-    rate_by_differences([&](double s, VectorRef fx) { gradient(s, x, y, fx, fy); }, t, fxt);
+    rate_by_differences([&](double s, VectorRef fx) { gradient(s, x, y, fx, fy); }, t, fxt,
+                        origin_.time_scale);
   }
 
  private:
@@ -113,8 +126,9 @@ class CallbackRows final : public ConstraintRows {
     if (rows_.coefficients != nullptr)
       return call(origin_.owner, "rows.coefficients",
                   [&] { return rows_.coefficients(rows_.data, t, q.data(), a.data(), b.data()); });
-    by_rows_.evaluate([&](ConstVectorRef x, VectorRef phi) { position(t, x, phi); }, q, a);
-    rate_by_differences([&](double s, VectorRef phi) { position(s, q, phi); }, t, b);
+    by_rows_.evaluate([&](ConstVectorRef x, VectorRef phi) { position(t, x, phi); }, q, a, origin_.q,
+                      origin_.quality.get());
+    rate_by_differences([&](double s, VectorRef phi) { position(s, q, phi); }, t, b, origin_.time_scale);
   }
 
   void derivative(double t, ConstVectorRef q, ConstVectorRef w, double s, VectorRef d) const override {
@@ -124,7 +138,7 @@ class CallbackRows final : public ConstraintRows {
       out = s * b;
       pattern().multiply_add(a.data(), w.data(), out.data());
     };
-    by_rows_.evaluate(residual, q, d);
+    by_rows_.evaluate(residual, q, d, origin_.q);
   }
 
   void time_derivative(double t, ConstVectorRef q, ConstVectorRef v, VectorRef d) const override {
@@ -134,7 +148,7 @@ class CallbackRows final : public ConstraintRows {
       out = b;
       pattern().multiply_add(a.data(), v.data(), out.data());
     };
-    rate_by_differences(residual, t, d);
+    rate_by_differences(residual, t, d, origin_.time_scale);
   }
 
   void annihilator_derivative(double t, ConstVectorRef q, ConstVectorRef lambda, VectorRef d) const override {
@@ -144,7 +158,7 @@ class CallbackRows final : public ConstraintRows {
       out.setZero();
       pattern().transposed_multiply_add(a.data(), lambda.data(), out.data());
     };
-    by_curvature_.evaluate(impulse, q, d);
+    by_curvature_.evaluate(impulse, q, d, origin_.q);
   }
 
  private:
@@ -166,8 +180,8 @@ class CallbackForce final : public Force {
          [&] { return force_.value(force_.data, t, q.data(), v.data(), f.data()); });
   }
   void derivatives(double t, ConstVectorRef q, ConstVectorRef v, VectorRef fq, VectorRef fv) const override {
-    differences_.evaluate([&](ConstVectorRef x, VectorRef f) { value(t, x, v, f); }, q, fq);
-    differences_.evaluate([&](ConstVectorRef w, VectorRef f) { value(t, q, w, f); }, v, fv);
+    differences_.evaluate([&](ConstVectorRef x, VectorRef f) { value(t, x, v, f); }, q, fq, origin_.q);
+    differences_.evaluate([&](ConstVectorRef w, VectorRef f) { value(t, q, w, f); }, v, fv, origin_.v);
   }
 
  private:
@@ -192,6 +206,39 @@ std::vector<std::string> coordinate_names(const diracstep_scene& scene, const st
     names.push_back(scene.coordinates != nullptr ? name_of(scene.coordinates, i, owner, "coordinate")
                                                  : "q" + std::to_string(i + 1));
   return names;
+}
+
+/// The largest of the sizes for those that are 0, and 1 where all are.
+Vector without_zeros(Vector sizes) {
+  const double largest = sizes.lpNorm<Eigen::Infinity>();
+  for (double& size : sizes)
+    if (!(size > 0.0) || !std::isfinite(size)) size = largest > 0.0 && std::isfinite(largest) ? largest : 1.0;
+  return sizes;
+}
+
+/// Scales of coordinates and velocities by what they are at the start and become in a step, and by how the
+/// Lagrangian changes with them.
+void give_scales(const diracstep_scene& scene, Origin& origin) {
+  const Vector q = Eigen::Map<const Vector>(scene.start_q, scene.dimension),
+               v = Eigen::Map<const Vector>(scene.start_v, scene.dimension);
+  const double t = scene.start_time, span = std::abs(scene.end_time - t);
+  const double step = scene.step != 0.0 ? std::abs(scene.step) : span / 100.0;
+  origin.time_scale = step > 0.0 && std::isfinite(step) ? 4.0 * step : 1.0;
+  origin.quality = std::make_shared<DifferenceQuality>();
+  const diracstep_function& f = *scene.lagrangian;
+  const auto value = [&](ConstVectorRef x, ConstVectorRef y) {
+    double result = 0.0;
+    try {  // points that the motion need not reach: what fails there is no failure of the scene
+      if (f.value(f.data, t, x.data(), y.data(), &result) != 0) return std::nan("");
+    } catch (...) {
+      return std::nan("");
+    }
+    return result;
+  };
+  const Vector sizes = without_zeros(q.cwiseAbs().cwiseMax(origin.time_scale * v.cwiseAbs()));
+  origin.q = find_scales([&](ConstVectorRef x) { return value(x, v); }, q, sizes);
+  const Vector speeds = without_zeros(v.cwiseAbs().cwiseMax(origin.q / (8.0 * origin.time_scale)));
+  origin.v = find_scales([&](ConstVectorRef y) { return value(q, y); }, v, speeds);
 }
 
 }  // namespace
@@ -232,14 +279,16 @@ Scene scene_from(const diracstep_scene& scene, const std::string& owner,
   require(scene.row_blocks == 0 || (scene.row_blocks > 0 && scene.rows != nullptr), owner,
           "row_blocks is " + std::to_string(scene.row_blocks) + " and does not fit rows");
   require(scene.force == nullptr || scene.force->value != nullptr, owner, "force.value is NULL");
-  const Origin origin{owner, std::move(library)};
+  Origin origin{.owner = owner, .library = std::move(library), .q = {}, .v = {}};
   const int n = scene.dimension;
+  give_scales(scene, origin);
   Scene made;
   made.name = scene.name != nullptr ? scene.name : "scene";
   made.coordinates = coordinate_names(scene, owner);
   made.lagrangian = std::make_shared<const CallbackLagrangian>(*scene.lagrangian, n, origin);
   for (int b = 0; b < scene.row_blocks; ++b) made.constraints.push_back(rows_from(scene.rows[b], n, origin));
   if (scene.force != nullptr) made.force = std::make_shared<const CallbackForce>(*scene.force, n, origin);
+  made.doubt = [quality = origin.quality] { return quality->doubt(); };
   made.start = {scene.start_time, Eigen::Map<const Vector>(scene.start_q, n),
                 Eigen::Map<const Vector>(scene.start_v, n)};
   return made;

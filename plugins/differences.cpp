@@ -2,15 +2,98 @@
 #include <array>
 #include <cmath>
 #include <diracstep/plugins/differences.hpp>
+#include <limits>
+#include <sstream>
 
 namespace diracstep {
 
 namespace {
 
-constexpr std::array<double, 3> weights{45.0 / 60.0, -9.0 / 60.0, 1.0 / 60.0};
+constexpr double agreement = 1e-7;  // of both formulas, relative
+constexpr double round_off = 4.0 * std::numeric_limits<double>::epsilon();
+constexpr double divisor = 16.0;  // of the increment where they do not agree
+constexpr int most_divisions = 8;
+constexpr double scale_over_increment = 512.0;
+constexpr double known_to = 1e-5;  // relative error of derivatives from which they are doubted
+constexpr int most_rungs = 12;     // from a guess of a scale
 
-/// A power of two, so that x + kδ is exact for most x.
-double increment(double x) { return std::exp2(std::ceil(std::log2(std::max(1.0, std::abs(x)))) - 9.0); }
+/// The increment for a variable of this scale: a power of two, so that x + kδ is exact for most x.
+double increment(double scale) { return std::exp2(std::ceil(std::log2(scale))) / scale_over_increment; }
+
+/// The scale of a variable at x: that at the start, and up to eight times as much where x has grown.
+double scale_at(const DifferenceScales& scales, Eigen::Index i, double x) {
+  const double size = std::isfinite(x) ? std::abs(x) : 1.0;
+  if (scales.size() == 0) return std::max(1.0, size);
+  return std::max({scales[i], std::min(size, 8.0 * scales[i]), std::ldexp(size, -20)});
+}
+
+/// Sums of one difference, δ not yet divided by.
+struct Sums {
+  Vector sixth, fourth;  ///< (45 Δ₁ − 9 Δ₂ + Δ₃)/60 and (8 Δ₁ − Δ₂)/12
+  Vector bend;           ///< about δ² f''
+  Vector largest;        ///< |f|
+
+  explicit Sums(Eigen::Index rows) : sixth(rows), fourth(rows), bend(rows), largest(rows) {}
+
+  double disagreement(Eigen::Index r) const { return std::abs(sixth[r] - fourth[r]); }
+  /// The size of f' that a disagreement is measured by: near a zero of f', what it is a scale away.
+  double size(Eigen::Index r, double factor) const {
+    return std::max(std::abs(sixth[r]), std::abs(bend[r]) * scale_over_increment / factor);
+  }
+  /// The largest part by which both formulas disagree beyond round-off.
+  double misfit(double factor) const {
+    double largest_part = 0.0;
+    for (Eigen::Index r = 0; r < sixth.size(); ++r) {
+      const double beyond = disagreement(r) - 8.0 * round_off * largest[r];
+      if (beyond <= 0.0) continue;
+      const double part = beyond / size(r, factor);
+      largest_part = std::isfinite(part) ? std::max(largest_part, part) : HUGE_VAL;
+    }
+    return largest_part;
+  }
+  bool agree(double factor) const { return misfit(factor) <= agreement; }
+};
+
+/// The sums of f(k · factor, out), which evaluates at k increments.
+template <class F>
+void take(const F& f, double factor, Vector& ahead, Vector& behind, Sums& sums) {
+  constexpr std::array<double, 3> sixth{45.0 / 60.0, -9.0 / 60.0, 1.0 / 60.0};
+  constexpr std::array<double, 3> fourth{8.0 / 12.0, -1.0 / 12.0, 0.0};
+  constexpr std::array<double, 3> bend{-1.0 / 8.0, 0.0, 1.0 / 8.0};
+  for (Vector* column : {&sums.sixth, &sums.fourth, &sums.bend, &sums.largest}) column->setZero();
+  for (std::size_t k = 0; k < 3; ++k) {
+    const double shift = static_cast<double>(k + 1) * factor;
+    f(shift, ahead);
+    f(-shift, behind);
+    sums.sixth += sixth[k] * (ahead - behind);
+    sums.fourth += fourth[k] * (ahead - behind);
+    sums.bend += bend[k] * (ahead + behind);
+    sums.largest = sums.largest.cwiseMax(ahead.cwiseAbs()).cwiseMax(behind.cwiseAbs());
+  }
+}
+
+/// The same with increments that both formulas agree at; returns the factor of the increments, or of those
+/// with the smallest misfit where none do: what is not smooth, or lost in round-off, only becomes worse.
+template <class F>
+double take_checked(const F& f, Vector& ahead, Vector& behind, Sums& sums) {
+  double factor = 1.0;
+  take(f, factor, ahead, behind, sums);
+  double misfit = sums.misfit(factor);
+  if (misfit <= agreement) return factor;
+  Sums next(sums.sixth.size());
+  double smaller = factor;
+  for (int k = 0; k < most_divisions && misfit > agreement; ++k) {
+    smaller /= divisor;
+    take(f, smaller, ahead, behind, next);
+    const double found = next.misfit(smaller);
+    if (found > 4.0 * misfit) break;
+    if (found > misfit) continue;
+    misfit = found;
+    factor = smaller;
+    sums = next;
+  }
+  return factor;
+}
 
 bool disjoint(const std::vector<bool>& taken, std::span<const int> rows) {
   return std::ranges::none_of(rows, [&](int row) { return taken[static_cast<std::size_t>(row)]; });
@@ -23,35 +106,88 @@ std::span<const int> rows_of(const SparsityPattern& pattern, int column) {
                                        static_cast<std::size_t>(end - begin));
 }
 
-}  // namespace
-
-void gradient_by_differences(const std::function<double(ConstVectorRef)>& f, ConstVectorRef x, VectorRef g) {
-  Vector shifted = x;
-  for (Eigen::Index i = 0; i < x.size(); ++i) {
-    const double delta = std::isfinite(x[i]) ? increment(x[i]) : 1.0;
-    double sum = 0.0;
-    for (std::size_t k = 0; k < weights.size(); ++k) {
-      const double shift = static_cast<double>(k + 1) * delta;
-      shifted[i] = x[i] + shift;
-      const double ahead = f(shifted);
-      shifted[i] = x[i] - shift;
-      sum += weights[k] * (ahead - f(shifted));
-    }
-    shifted[i] = x[i];
-    g[i] = sum / delta;
+void raise(std::atomic<double>& largest, double value) {
+  double known = largest.load();
+  while (value > known && !largest.compare_exchange_weak(known, value)) {
   }
 }
 
-void rate_by_differences(const std::function<void(double, VectorRef)>& f, double t, VectorRef rate) {
-  Vector ahead(rate.size()), behind(rate.size());
-  const double delta = increment(t);
-  rate.setZero();
-  for (std::size_t k = 0; k < weights.size(); ++k) {
-    const double shift = static_cast<double>(k + 1) * delta;
-    f(t + shift, ahead);
-    f(t - shift, behind);
-    rate += weights[k] / delta * (ahead - behind);
+}  // namespace
+
+void DifferenceQuality::note_energy(double derivative, double error) {
+  raise(largest_, std::abs(derivative));
+  raise(error_, error);
+}
+
+void DifferenceQuality::note_disagreement(double part) { raise(disagreement_, part); }
+
+std::string DifferenceQuality::doubt() const {
+  const double largest = largest_.load(), error = error_.load();
+  const double part = std::max(largest > 0.0 ? error / largest : 0.0, disagreement_.load());
+  if (!(part > known_to)) return {};
+  std::ostringstream text;
+  text.precision(1);
+  text << "derivatives of the scene's functions are taken by differences, and two step sizes agree to "
+       << part << " only: give the derivatives, or functions that lose less in round-off";
+  return text.str();
+}
+
+DifferenceScales find_scales(const std::function<double(ConstVectorRef)>& f, ConstVectorRef x,
+                             const Vector& guesses) {
+  DifferenceScales scales = guesses;
+  Vector shifted = x, ahead(1), behind(1);
+  Sums sums(1);
+  for (Eigen::Index i = 0; i < x.size(); ++i) {
+    const auto error = [&](double scale) {
+      const double delta = increment(scale);
+      const auto at = [&](double k, VectorRef out) {
+        shifted[i] = x[i] + k * delta;
+        out[0] = f(shifted);
+      };
+      take(at, 1.0, ahead, behind, sums);
+      shifted[i] = x[i];
+      const double sum = (sums.disagreement(0) + round_off * sums.largest[0]) / delta;
+      return std::isfinite(sum) ? sum : HUGE_VAL;
+    };
+    double best = error(scales[i]);
+    for (const double factor : {divisor, 1.0 / divisor})
+      for (int rung = 0; rung < most_rungs; ++rung) {
+        const double next = error(scales[i] * factor);
+        if (!(next < 0.5 * best)) break;
+        best = next;
+        scales[i] *= factor;
+      }
   }
+  return scales;
+}
+
+void gradient_by_differences(const std::function<double(ConstVectorRef)>& f, ConstVectorRef x, VectorRef g,
+                             const DifferenceScales& scales, DifferenceQuality* quality) {
+  Vector shifted = x, ahead(1), behind(1);
+  Sums sums(1);
+  for (Eigen::Index i = 0; i < x.size(); ++i) {
+    const double scale = scale_at(scales, i, x[i]), delta = increment(scale);
+    const auto at = [&](double k, VectorRef out) {
+      shifted[i] = x[i] + k * delta;
+      out[0] = f(shifted);
+    };
+    const double factor = take_checked(at, ahead, behind, sums);
+    shifted[i] = x[i];
+    g[i] = sums.sixth[0] / (factor * delta);
+    if (quality == nullptr) continue;
+    const double wrong = sums.agree(factor) ? round_off * sums.largest[0] : sums.disagreement(0);
+    quality->note_energy(g[i] * scale, wrong / (factor * delta) * scale);
+  }
+}
+
+void rate_by_differences(const std::function<void(double, VectorRef)>& f, double t, VectorRef rate,
+                         double scale) {
+  Vector ahead(rate.size()), behind(rate.size());
+  Sums sums(rate.size());
+  const double delta = increment(std::max(scale, std::ldexp(std::abs(t), -20)));
+  const auto at = [&](double k, VectorRef out) { f(t + k * delta, out); };
+  const double factor = take_checked(at, ahead, behind, sums);
+  rate = sums.sixth / (factor * delta);
 }
 
 JacobianByDifferences::JacobianByDifferences(SparsityPattern pattern) : pattern_(std::move(pattern)) {
@@ -70,27 +206,28 @@ JacobianByDifferences::JacobianByDifferences(SparsityPattern pattern) : pattern_
 }
 
 void JacobianByDifferences::evaluate(const std::function<void(ConstVectorRef, VectorRef)>& f,
-                                     ConstVectorRef x, VectorRef values) const {
-  Vector shifted = x, ahead(pattern_.rows()), behind(pattern_.rows()), sum(pattern_.rows());
+                                     ConstVectorRef x, VectorRef values, const DifferenceScales& scales,
+                                     DifferenceQuality* quality) const {
+  Vector shifted = x, deltas(x.size()), ahead(pattern_.rows()), behind(pattern_.rows());
+  Sums sums(pattern_.rows());
+  for (Eigen::Index i = 0; i < x.size(); ++i) deltas[i] = increment(scale_at(scales, i, x[i]));
   for (const std::vector<int>& group : groups_) {
-    double delta = 0.0;
-    for (const int column : group) delta = std::max(delta, increment(x[column]));
-    sum.setZero();
-    for (std::size_t k = 0; k < weights.size(); ++k) {
-      const double shift = static_cast<double>(k + 1) * delta;
-      for (const int column : group) shifted[column] = x[column] + shift;
-      f(shifted, ahead);
-      for (const int column : group) shifted[column] = x[column] - shift;
-      f(shifted, behind);
-      sum += weights[k] * (ahead - behind);
-    }
+    const auto at = [&](double k, VectorRef out) {
+      for (const int column : group) shifted[column] = x[column] + k * deltas[column];
+      f(shifted, out);
+    };
+    const double factor = take_checked(at, ahead, behind, sums);
     for (const int column : group) {
       shifted[column] = x[column];
       const int begin = pattern_.column_starts()[static_cast<std::size_t>(column)];
       const auto rows = rows_of(pattern_, column);
       for (std::size_t r = 0; r < rows.size(); ++r)
-        values[begin + static_cast<Eigen::Index>(r)] = sum[rows[r]] / delta;
+        values[begin + static_cast<Eigen::Index>(r)] = sums.sixth[rows[r]] / (factor * deltas[column]);
     }
+    if (quality == nullptr || sums.agree(factor)) continue;
+    for (Eigen::Index r = 0; r < sums.sixth.size(); ++r)
+      if (const double size = sums.size(r, factor); size > 0.0)
+        quality->note_disagreement(sums.disagreement(r) / size);
   }
 }
 

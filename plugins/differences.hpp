@@ -1,20 +1,50 @@
 #pragma once
 
+#include <atomic>
 #include <diracstep/core/numerics/sparsity_pattern.hpp>
 #include <diracstep/core/numerics/types.hpp>
 #include <functional>
+#include <string>
 #include <vector>
 
 /// Derivatives by central differences of sixth order,  f' ≈ [45 Δ₁ − 9 Δ₂ + Δ₃] / (60 δ)  with
-/// Δ_k = f(x + kδ) − f(x − kδ) and δ about 2e-3 of the variable, or of 1 where that is larger.  Exact up to
-/// round-off for polynomials of degree 6; the round-off is about 1e-13 of the terms of f.
+/// Δ_k = f(x + kδ) − f(x − kδ) and δ about 2e-3 of the scale of the variable.  Exact up to round-off for
+/// polynomials of degree 6; the round-off is about 1e-13 of the terms of f.
+///
+/// Each is checked against the difference of fourth order from the same values, [8 Δ₁ − Δ₂] / (12 δ); where
+/// the two differ by more than 1e-7 and by more than round-off, δ is divided by 16 and both are taken again.
 namespace diracstep {
 
-/// g_i = ∂f/∂x_i of a scalar function.
-void gradient_by_differences(const std::function<double(ConstVectorRef)>& f, ConstVectorRef x, VectorRef g);
+/// What the differences of a scene's functions were worth so far; may be used from several threads at once.
+class DifferenceQuality {
+ public:
+  /// A derivative of an energy, times the scale of its variable, and what may be wrong with it.
+  void note_energy(double derivative, double error);
+  /// Part of a derivative by which two formulas still disagree with the smallest δ.
+  void note_disagreement(double part);
+
+  /// Empty, or that the derivatives are not to be trusted, and to how many digits they are known.
+  std::string doubt() const;
+
+ private:
+  std::atomic<double> largest_ = 0.0, error_ = 0.0, disagreement_ = 0.0;
+};
+
+/// How far each variable goes before f changes much: a number above 0 for each, in its own unit.
+using DifferenceScales = Vector;
+
+/// Scales at a point, from guesses that may be off by far: those with the smallest error of ∂f/∂x_i, as
+/// judged by both formulas and the round-off of f.
+DifferenceScales find_scales(const std::function<double(ConstVectorRef)>& f, ConstVectorRef x,
+                             const Vector& guesses);
+
+/// g_i = ∂f/∂x_i of a scalar function.  Without scales each is max(1, |x_i|).
+void gradient_by_differences(const std::function<double(ConstVectorRef)>& f, ConstVectorRef x, VectorRef g,
+                             const DifferenceScales& scales = {}, DifferenceQuality* quality = nullptr);
 
 /// df/dt of a column f(t, out).
-void rate_by_differences(const std::function<void(double, VectorRef)>& f, double t, VectorRef rate);
+void rate_by_differences(const std::function<void(double, VectorRef)>& f, double t, VectorRef rate,
+                         double scale = 1.0);
 
 /// ∂f/∂x of columns on a known pattern.  Columns of the pattern that share no row are differenced together
 /// (Curtis, Powell, Reid 1974), so a sparse derivative takes few evaluations.
@@ -26,8 +56,8 @@ class JacobianByDifferences {
   std::size_t groups() const { return groups_.size(); }
 
   /// values = ∂f/∂x on pattern(); `f(x, out)` writes pattern().rows() numbers.
-  void evaluate(const std::function<void(ConstVectorRef, VectorRef)>& f, ConstVectorRef x,
-                VectorRef values) const;
+  void evaluate(const std::function<void(ConstVectorRef, VectorRef)>& f, ConstVectorRef x, VectorRef values,
+                const DifferenceScales& scales = {}, DifferenceQuality* quality = nullptr) const;
 
  private:
   SparsityPattern pattern_;

@@ -27,7 +27,8 @@ enum {
   DIRACSTEP_CONSTANT_MASS = 2, /* second derivatives in y depend on nothing */
   DIRACSTEP_DIAGONAL_MASS = 4, /* … and those off the diagonal are zero */
   DIRACSTEP_QUADRATIC = 8,     /* every second derivative is constant */
-  DIRACSTEP_LINEAR_IN_Y = 16   /* a phase-space Lagrangian θ(q)·v − H(q) */
+  DIRACSTEP_LINEAR_IN_Y = 16,  /* a phase-space Lagrangian θ(q)·v − H(q) */
+  DIRACSTEP_AUTONOMOUS = 32    /* t does not enter; without it no run says that the energy is kept */
 };
 
 /* f(t,x,y) of two columns of n numbers: a Lagrangian L(t,q,v) or a Hamiltonian H(t,q,p), energy. */

@@ -12,12 +12,14 @@ namespace {
 
 constexpr std::size_t max_waiting = 1 << 16;  // bytes gathered before they are written
 
-std::string header(const Scene& scene) {
+std::string header(const Scene& scene, const std::vector<Invariant>& invariants) {
   std::string line = "t";
   for (const char* prefix : {"", "v_", "p_"})
     for (const auto& name : scene.coordinates) line += ',' + csv_field(prefix + name);
   for (const auto& name : scene.row_names()) line += ',' + csv_field("lambda_" + name);
-  return line + ",energy\n";
+  line += ",energy";
+  for (const Invariant& invariant : invariants) line += ',' + csv_field("invariant_" + invariant.name);
+  return line + '\n';
 }
 
 OutputFile opened(const std::string& path, OutputFile::Mode mode) {
@@ -30,14 +32,22 @@ OutputFile opened(const std::string& path, OutputFile::Mode mode) {
 
 }  // namespace
 
-TrajectoryFile::TrajectoryFile(const std::string& path, const Scene& scene)
-    : rows_(scene.rows()), file_(opened(path, OutputFile::Mode::fresh)) {
-  put(header(scene));
+TrajectoryFile::TrajectoryFile(const std::string& path, const Scene& scene, std::vector<Invariant> invariants)
+    : rows_(scene.rows()),
+      by_momentum_(!scene.lagrangian),
+      invariants_(std::move(invariants)),
+      file_(opened(path, OutputFile::Mode::fresh)) {
+  put(header(scene, invariants_));
 }
 
-TrajectoryFile::TrajectoryFile(const std::string& path, const Scene& scene, Mark mark)
-    : rows_(scene.rows()), file_(opened(path, OutputFile::Mode::existing)), mark_(mark) {
-  const std::string expected = header(scene);
+TrajectoryFile::TrajectoryFile(const std::string& path, const Scene& scene, Mark mark,
+                               std::vector<Invariant> invariants)
+    : rows_(scene.rows()),
+      by_momentum_(!scene.lagrangian),
+      invariants_(std::move(invariants)),
+      file_(opened(path, OutputFile::Mode::existing)),
+      mark_(mark) {
+  const std::string expected = header(scene, invariants_);
   if (file_.size() < mark.bytes || mark.bytes < static_cast<long>(expected.size()))
     throw Misuse(
         fmt::format("--out: '{}' has {} bytes; at the checkpoint it had {}", path, file_.size(), mark.bytes));
@@ -60,8 +70,11 @@ void TrajectoryFile::write(const Sample& sample) {
   };
   for (const Vector* column : {&sample.q, &sample.v, &sample.p}) add(*column);
   add(sample.lambda.head(rows_));
-  fmt::format_to(std::back_inserter(line), ",{:.17g}\n", sample.energy);
-  put(line);
+  fmt::format_to(std::back_inserter(line), ",{:.17g}", sample.energy);
+  for (const Invariant& invariant : invariants_)
+    fmt::format_to(std::back_inserter(line), ",{:.17g}",
+                   invariant.at(sample.time, sample.q, by_momentum_ ? sample.p : sample.v));
+  put(line += '\n');
   ++mark_.lines;
 }
 

@@ -2,11 +2,14 @@
 
 #include <diracstep/core/integrator/integrator.hpp>
 #include <diracstep/files/output_file.hpp>
+#include <diracstep/scene_format/scene_catalogue.hpp>
 #include <string>
+#include <vector>
 
 namespace diracstep::command {
 
-/// A trajectory as CSV: t, the coordinates, v_NAME, p_NAME, lambda_ROW, energy, with 17 significant digits.
+/// A trajectory as CSV: t, the coordinates, v_NAME, p_NAME, lambda_ROW, energy, and invariant_NAME where the
+/// scene declares some, with 17 significant digits.
 /// Lines are gathered and written many at a time, always whole ones.
 class TrajectoryFile {
  public:
@@ -17,10 +20,11 @@ class TrajectoryFile {
   };
 
   /// Begins a file.  Throws Misuse where it cannot be opened.
-  TrajectoryFile(const std::string& path, const Scene& scene);
+  TrajectoryFile(const std::string& path, const Scene& scene, std::vector<Invariant> invariants = {});
   /// Goes on with a file from a mark; what was written after it is dropped.  Throws Misuse where it cannot be
   /// opened, is shorter or has another header.
-  TrajectoryFile(const std::string& path, const Scene& scene, Mark mark);
+  TrajectoryFile(const std::string& path, const Scene& scene, Mark mark,
+                 std::vector<Invariant> invariants = {});
   TrajectoryFile(const TrajectoryFile&) = delete;
   TrajectoryFile& operator=(const TrajectoryFile&) = delete;
   /// Writes what is still gathered where an exception ends the run; close() tells whether that was possible.
@@ -39,6 +43,8 @@ class TrajectoryFile {
   void flush();
 
   Eigen::Index rows_;  ///< of the scene; an integrator may know more, which are left out
+  bool by_momentum_;   ///< without a Lagrangian invariants are functions of p
+  std::vector<Invariant> invariants_;
   OutputFile file_;
   std::string waiting_;
   Mark mark_;

@@ -11,8 +11,8 @@
 #include <diracstep/core/adaptive/adaptive_run.hpp>
 #include <diracstep/core/adaptive/error_control.hpp>
 #include <diracstep/core/adaptive/rate_monitor.hpp>
+#include <diracstep/core/adaptive/variable_run_checks.hpp>
 #include <diracstep/core/numerics/errors.hpp>
-#include <diracstep/core/runs/energy_check.hpp>
 #include <diracstep/core/runs/run.hpp>
 #include <memory>
 #include <optional>
@@ -38,9 +38,17 @@ struct Options {
   std::string control = "integrating";
   std::string at;
   std::optional<double> error;
+  bool fixed = false;
+  long max_solves = ErrorControlOptions{}.max_solves;
+  double max_time = ErrorControlOptions{}.max_time;
+  long max_steps = AdaptiveOptions{}.max_steps;
+  double smallest_step = 0.0;
+  std::string doubt = "report";
   std::vector<std::string> set;
   bool json = false;
 };
+
+constexpr double stated_to = 1e-6;  ///< relative, of an invariant's stated value
 
 StepGrid fitted_steps(const CatalogueScene& entry, double end, const std::optional<double>& wanted) {
   const double start = entry.scene->start.time;
@@ -56,6 +64,17 @@ void require_sense(const Options& options) {
   const bool checkpoints = !options.checkpoint.empty() || !options.resume.empty();
   if (options.every < 1) throw Misuse(fmt::format("--every = {}; 1 or more is needed", options.every));
   if (!options.at.empty() && !options.adaptive) throw Misuse("--at needs --adaptive");
+  if (options.fixed && options.adaptive) throw Misuse("--fixed and --adaptive exclude each other");
+  if (options.max_solves < 1)
+    throw Misuse(fmt::format("--max-solves = {}; 1 or more is needed", options.max_solves));
+  if (options.max_steps < 1)
+    throw Misuse(fmt::format("--max-steps = {}; 1 or more is needed", options.max_steps));
+  if (!(options.max_time > 0.0))
+    throw Misuse(fmt::format("--max-time = {}; seconds above 0 are needed", options.max_time));
+  if (!(options.smallest_step >= 0.0))
+    throw Misuse(fmt::format("--smallest-step = {}; 0 or more is needed", options.smallest_step));
+  if (options.doubt != "report" && options.doubt != "ignore")
+    throw Misuse(fmt::format("--doubt: '{}' is not one of report, ignore", options.doubt));
   if (options.checkpoint_every < 0)
     throw Misuse(
         fmt::format("--checkpoint-every = {}; a number of steps is needed, or 0 for every ten seconds",
@@ -71,13 +90,14 @@ void require_sense(const Options& options) {
 }
 
 /// Where the file goes on: from the checkpoint, or from its beginning.
-void open_trajectory(std::optional<TrajectoryFile>& file, const Options& options, const Scene& scene,
+void open_trajectory(std::optional<TrajectoryFile>& file, const Options& options, const CatalogueScene& entry,
                      const std::optional<Checkpoint>& saved) {
   if (options.out.empty()) return;
   if (saved)
-    file.emplace(options.out, scene, TrajectoryFile::Mark{saved->points, saved->bytes});
+    file.emplace(options.out, *entry.scene, TrajectoryFile::Mark{saved->points, saved->bytes},
+                 entry.invariants);
   else
-    file.emplace(options.out, scene);
+    file.emplace(options.out, *entry.scene, entry.invariants);
 }
 
 void go_on(const Checkpoint& saved, const Options& options, Integrator& integrator) {
@@ -105,37 +125,43 @@ void run_fixed(const Options& options, const CatalogueScene& entry, const Sessio
     require_same_run(*saved, keeping.identity, options.resume);
     go_on(*saved, options, integrator);
   }
-  open_trajectory(file, options, *entry.scene, saved);
+  open_trajectory(file, options, entry, saved);
   if (file) keeping.file = &*file;
   run_to(steps, integrator, keeping, result);
 }
 
 /// Variable steps to the end, or to the last of the times given.
 void run_variable(const Options& options, const CatalogueScene& entry, AdaptiveIntegrator& integrator,
-                  double end, TrajectoryFile* file, RunResult& result) {
+                  VariableRunChecks& checks, double end, TrajectoryFile* file, RunResult& result) {
   Progress progress;
   const double start = entry.scene->start.time;
-  const auto scene = completed(entry.scene);
-  EnergyCheck doubt(*scene);
   const auto keep = [&](const Sample& sample) {
-    doubt.see(sample);
     if (file != nullptr) file->write(sample);
     result.end = sample;
     progress.show((sample.time - start) / (end - start), fmt::format("t = {:g}", sample.time));
     return !interrupted();
   };
   const std::vector<double> times = options.at.empty() ? std::vector<double>{} : numbers("--at", options.at);
-  const RunReport report = times.empty() ? run_until(integrator, end, result.momentum, options.every, keep)
-                                         : run_at(integrator, times, result.momentum, keep);
+  const RunReport report = times.empty()
+                               ? run_until(integrator, end, result.momentum, options.every, keep, &checks)
+                               : run_at(integrator, times, result.momentum, keep, &checks);
   result.failure = report.last.failure;
   if (result.failure.empty() && interrupted())
     result.failure = fmt::format("interrupted at t = {:.17g}", integrator.time());
   result.work = integrator.work();
-  result.doubt = doubt.text();
+  result.doubt = checks.text();
   result.variable =
       VariableSteps{integrator.adaptive().eps, integrator.adaptive().control, integrator.control()};
   const std::string told = warning(*result.variable, result.work.steps);
   if (!told.empty()) say(told);
+}
+
+void finish(std::optional<TrajectoryFile>& file, const Options& options, RunResult& result) {
+  if (!file) return;
+  file->close();
+  result.out = options.out;
+  result.lines = file->lines();
+  say(fmt::format("{} points written to {}", result.lines, result.out));
 }
 
 /// One run with the chosen steps into `result`.
@@ -145,9 +171,15 @@ IntegratorOptions run_once(const Options& options, const CatalogueScene& entry, 
   if (options.adaptive) {
     chosen.step = std::copysign(chosen.step, end - entry.scene->start.time);
     AdaptiveIntegrator integrator(entry.scene, session.registry, session.solvers, chosen,
-                                  {.eps = options.eps, .control = step_control(options.control), .end = end});
-    open_trajectory(file, options, *entry.scene, std::nullopt);
-    run_variable(options, entry, integrator, end, file ? &*file : nullptr, result);
+                                  {.eps = options.eps,
+                                   .control = step_control(options.control),
+                                   .end = end,
+                                   .smallest_step = options.smallest_step,
+                                   .max_steps = options.max_steps});
+    VariableRunChecks checks(integrator,
+                             {entry.scene, session.registry, session.solvers, integrator.options()});
+    open_trajectory(file, options, entry, std::nullopt);
+    run_variable(options, entry, integrator, checks, end, file ? &*file : nullptr, result);
     chosen = integrator.options();
   } else {
     const StepGrid grid = fitted_steps(entry, end, chosen.step);
@@ -156,37 +188,82 @@ IntegratorOptions run_once(const Options& options, const CatalogueScene& entry, 
     run_fixed(options, entry, session, integrator, grid.steps, file, result);
     chosen = integrator.options();
   }
-  if (file) {
-    file->close();
-    result.out = options.out;
-    result.lines = file->lines();
-    say(fmt::format("{} points written to {}", result.lines, result.out));
-  }
+  finish(file, options, result);
   return chosen;
 }
 
-/// Finds the steps for --error; what was found is in the options afterwards.
-ErrorControlReport search(Options& options, const CatalogueScene& entry, const Session& session, double end,
-                          IntegratorOptions& chosen) {
+/// Finds the steps for --error.
+ErrorControlReport search(const Options& options, const CatalogueScene& entry, const Session& session,
+                          double end, const IntegratorOptions& chosen) {
   ErrorControlOptions wanted{.error = *options.error};
   wanted.method = options.method.name;
   wanted.order = options.method.order;
-  if (options.adaptive) wanted.adaptive = true;
+  if (options.adaptive || options.fixed) wanted.adaptive = options.adaptive;
+  wanted.control = step_control(options.control);
   if (options.step)
     wanted.first_step = std::abs(*options.step);
   else if (!has_accelerations(*completed(entry.scene)))
     wanted.first_step = std::abs(entry.natural_step);
+  wanted.integrator = chosen;
+  wanted.max_solves = options.max_solves;
+  wanted.max_time = options.max_time;
   wanted.go_on = [] { return !interrupted(); };
-  ErrorControlReport found = solve_to_error(entry.scene, session.registry, session.solvers, end, wanted);
-  chosen.method = found.method;
-  chosen.order = found.order;
-  chosen.compensated_sums = found.compensated_sums;
-  options.adaptive = found.adaptive;
-  if (found.adaptive)
-    options.eps = found.step;
-  else
-    chosen.step = found.step;
-  return found;
+  return solve_to_error(entry.scene, session.registry, session.solvers, end, wanted);
+}
+
+/// The run that the search ended with: its end, and again point by point where a file or another momentum is
+/// asked for.
+IntegratorOptions take_found(const Options& options, const CatalogueScene& entry, const Session& session,
+                             RunResult& result) {
+  const ErrorControlReport& found = *result.search;
+  result.failure = found.refusal;
+  result.doubt = found.warning;
+  result.end = found.end;
+  result.work = found.work;
+  result.work.steps = 0;
+  for (const ErrorControlRun& run : found.runs)
+    if (run.failure.empty()) result.work.steps = run.steps;
+  IntegratorOptions used = found.steps.integrator;
+  used.method = found.method;
+  used.order = found.order;
+  used.step = found.step;
+  if (!found.ok() || (options.out.empty() && result.momentum == Momentum::projected)) return used;
+  std::optional<TrajectoryFile> file;
+  open_trajectory(file, options, entry, std::nullopt);
+  const RunReport again = run_again(entry.scene, session.registry, session.solvers, found, result.momentum,
+                                    options.every, [&](const Sample& sample) {
+                                      if (file) file->write(sample);
+                                      result.end = sample;
+                                      return !interrupted();
+                                    });
+  result.failure = again.last.failure;
+  if (result.failure.empty() && interrupted())
+    result.failure = fmt::format("interrupted at t = {:.17g}", result.end.time);
+  finish(file, options, result);
+  return used;
+}
+
+/// What the scene declares as kept, at both ends; what is not as stated is a doubt, where no parameter has
+/// been changed.
+void compare_invariants(const Options& options, const CatalogueScene& entry, RunResult& result) {
+  if (!result.has_end()) return;
+  const auto scene = completed(entry.scene);
+  const Start& start = scene->start;
+  const bool by_momentum = !entry.scene->lagrangian;
+  for (const Invariant& invariant : entry.invariants) {
+    const Vector& first = by_momentum ? entry.scene->start.p : start.v;
+    if (first.size() == 0) continue;
+    InvariantEnds ends{
+        .name = invariant.name,
+        .start = invariant.at(start.time, start.q, first),
+        .end = invariant.at(result.end.time, result.end.q, by_momentum ? result.end.p : result.end.v),
+        .stated = invariant.value};
+    if (ends.stated && options.set.empty() &&
+        !(std::abs(ends.start - *ends.stated) <= stated_to * std::abs(*ends.stated)) && result.doubt.empty())
+      result.doubt = fmt::format("the invariant {} is {:.15g} at the start; the scene states {:.15g}",
+                                 ends.name, ends.start, *ends.stated);
+    result.invariants.push_back(std::move(ends));
+  }
 }
 
 void report(const RunResult& result, const Options& options, const CatalogueScene& entry,
@@ -196,13 +273,13 @@ void report(const RunResult& result, const Options& options, const CatalogueScen
   else if (result.out.empty())
     print(run_text(result, entry, used));
   if (!result.doubt.empty()) say(result.doubt);
+  if (!result.doubt.empty() && options.doubt == "report") session.exit_status = doubted;
   if (result.failure.empty()) return;
   say(result.failure);
   session.exit_status = failed;
 }
 
-void run(const Options& given, Session& session) {
-  Options options = given;
+void run(const Options& options, Session& session) {
   require_sense(options);
   const CatalogueScene entry = make_scene(session, options.scene, parameters(options.set));
   RunResult result;
@@ -219,20 +296,12 @@ void run(const Options& given, Session& session) {
   used.substeps = options.substeps;
   if (options.error) {
     result.search = search(options, entry, session, end, used);
-    if (!result.search->warning.empty()) say(result.search->warning);
-  }
-  const bool once_more = result.search && result.search->ok() &&
-                         (!options.out.empty() || result.momentum != Momentum::projected);
-  if (!result.search || once_more) {
-    used = run_once(options, entry, session, used, end, result);
+    used = take_found(options, entry, session, result);
   } else {
-    result.failure = result.search->refusal;
-    result.end = result.search->end;
-    result.work = result.search->work;
-    result.work.steps = result.search->runs.back().steps;
-    used.order = result.search->order;
+    used = run_once(options, entry, session, used, end, result);
   }
   compare_with_reference(result, entry, *completed(entry.scene));
+  compare_invariants(options, entry, result);
   report(result, options, entry, used, session);
 }
 
@@ -275,6 +344,26 @@ void add_run(CLI::App& app, Session& session) {
           "estimate is below")
       ->type_name("E");
   add_redundancy_option(*verb, session);
+  verb->add_flag("--fixed", options->fixed,
+                 "With --error: steps of fixed size, also where variable ones are cheaper");
+  verb->add_option("--max-solves", options->max_solves,
+                   "With --error: nonlinear systems in all; the best answer so far is then shown")
+      ->type_name("N")
+      ->capture_default_str();
+  verb->add_option("--max-time", options->max_time, "With --error: seconds on the clock in all")
+      ->type_name("S")
+      ->capture_default_str();
+  verb->add_option("--max-steps", options->max_steps, "With --adaptive: the run fails at the next one")
+      ->type_name("N")
+      ->capture_default_str();
+  verb->add_option("--smallest-step", options->smallest_step,
+                   "With --adaptive: steps do not become smaller; 0: 1e-9 of the motion")
+      ->type_name("H")
+      ->capture_default_str();
+  verb->add_option("--doubt", options->doubt,
+                   "A run whose result is doubted exits with status 3 (report), or with 0 (ignore)")
+      ->type_name("WHAT")
+      ->capture_default_str();
   add_set_option(*verb, options->set);
   verb->add_flag("--json", options->json, "One JSON document on standard output");
   verb->footer(

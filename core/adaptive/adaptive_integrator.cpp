@@ -97,7 +97,15 @@ void AdaptiveIntegrator::reset() {
   throw Misuse("scene '" + main_.scene().name + "': " + rate_.failure);
 }
 
-/// v, ω and, if asked for, d(ln ω)/dt at the current node.
+double AdaptiveIntegrator::largest_rate() const {
+  const double start = main_.scene().start.time;
+  const double span = std::abs(adaptive_.end.value_or(start + 100.0 * options_.step) - start);
+  const double smallest = adaptive_.smallest_step > 0.0 ? adaptive_.smallest_step : 1e-9 * span;
+  return adaptive_.eps / smallest;
+}
+
+/// v, ω and, if asked for, d(ln ω)/dt at the current node.  ω is bounded from above, by a number that is even
+/// in v as ω is.
 bool AdaptiveIntegrator::measure(bool growth) {
   const double t = main_.time();
   const SolveReport report = meter_.motion().velocity(t, main_.position(), main_.momentum(), v_);
@@ -107,6 +115,7 @@ bool AdaptiveIntegrator::measure(bool growth) {
     rate_ = growth ? meter_.rate_and_growth(t, main_.position(), v_, next_size_)
                    : meter_.rate(t, main_.position(), v_, next_size_);
   if (!rate_.ok()) return false;
+  if (const double largest = largest_rate(); rate_.rate > largest) rate_ = {largest, 0.0, {}};
   report_.slowest = std::min(report_.slowest, rate_.rate);
   report_.fastest = std::max(report_.fastest, rate_.rate);
   return true;
@@ -141,6 +150,9 @@ void AdaptiveIntegrator::note(double size) {
 }
 
 StepReport AdaptiveIntegrator::step() {
+  if (work().steps >= adaptive_.max_steps)
+    return failed(std::to_string(adaptive_.max_steps) +
+                  " steps did not reach the end; take a larger eps, a fixed step, or more steps");
   const long before = meter_.motion().accelerations();
   StepReport report;
   if (adaptive_.control == StepControl::in_step) {

@@ -32,6 +32,9 @@ struct AdaptiveOptions {
   MonitorScales scales = {};       ///< of the generic monitor; zeros are taken from a survey towards `end`
   std::optional<double> end = {};  ///< where the motion will end, for the survey; 100 steps of the options'
                                    ///< size without it
+  double smallest_step =
+      0.0;  ///< without sign: ω counts as at most eps over it; 0: 1e-9 of the time to `end`
+  long max_steps = 10'000'000;  ///< the next one fails
 };
 
 /// What the control did since the start.
@@ -86,6 +89,7 @@ class AdaptiveIntegrator {
   StepReport control_step(double size);
   StepReport solve_size(double eps, double guess, double& size);
   bool measure(bool growth);
+  double largest_rate() const;
   bool start_control();
   StepReport failed(const std::string& what) const;
   void note(double size);

@@ -37,6 +37,14 @@ double median(const std::vector<Stretch>& stretches, Quantity quantity) {
   return 0.0;
 }
 
+/// Whether ω only fell, by far, in a time that is short beside the motion, as after a start at rest: then
+/// what was surveyed says nothing of the rest.
+bool only_fell(const std::vector<Stretch>& stretches, double typical, double covered, double span) {
+  double fastest = 0.0;
+  for (const Stretch& stretch : stretches) fastest = std::max(fastest, stretch.rate(typical));
+  return covered < 1e-3 * span && !stretches.empty() && stretches.back().rate(typical) < 1e-2 * fastest;
+}
+
 double lowest_rate(const std::vector<Stretch>& stretches, double typical) {
   return 0.3 * median(stretches, [typical](const Stretch& s) { return s.rate(typical); });
 }
@@ -134,7 +142,8 @@ RateSurvey survey_rate(const Scene& scene, const SolverFactory& solvers, double 
   SurveyRun second(motion, scene, end, typical);
   survey.failure = second.go(max_steps - max_steps / 2);
   survey.scales.typical = typical;
-  survey.scales.lowest = std::max(lowest_rate(second.stretches, survey.scales.typical), 0.3 / span);
+  const bool fell = only_fell(second.stretches, typical, second.covered, span);
+  survey.scales.lowest = std::max(fell ? 0.0 : lowest_rate(second.stretches, typical), 0.3 / span);
   survey.covered = second.covered;
   survey.accelerations = motion.accelerations();
   for (const Stretch& stretch : second.stretches) {

@@ -10,7 +10,8 @@ namespace diracstep {
 /// underlying ordinary differential equation, 0.3 radians a step, constraints left to drift.
 struct RateSurvey {
   /// For the generic monitor.  ω0: median over time of |a|/|v|; ω_min: 0.3 of the median of ω, or 0.3 radians
-  /// over the whole span where nothing changes at all.
+  /// over the whole span where nothing changes at all, or where ω fell by more than 100 within a thousandth
+  /// of the span and the survey did not get further.
   MonitorScales scales;
   double slowest = 0.0;  ///< smallest and largest ω met, ω_min left out
   double fastest = 0.0;

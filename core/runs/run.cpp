@@ -7,8 +7,9 @@ namespace diracstep {
 
 namespace {
 
-detail::RunOf<Integrator, CheckedSteps> run_of(Integrator& integrator, Momentum momentum, long every,
-                                               const Observer& observer, RunChecks* checks) {
+detail::RunOf<Integrator, CheckedSteps, RunChecks> run_of(Integrator& integrator, Momentum momentum,
+                                                          long every, const Observer& observer,
+                                                          RunChecks* checks) {
   return {integrator, {integrator, checks}, momentum, every, observer, checks};
 }
 

@@ -2,9 +2,20 @@
 
 #include <diracstep/core/runs/branch_check.hpp>
 #include <diracstep/core/runs/energy_check.hpp>
+#include <diracstep/core/runs/node_check.hpp>
 #include <diracstep/core/runs/step_size_check.hpp>
+#include <string>
+#include <vector>
 
 namespace diracstep {
+
+/// The lines that are not empty, one after the other.
+inline std::string joined_doubts(const std::vector<std::string>& lines) {
+  std::string all;
+  for (const std::string& text : lines)
+    if (!text.empty()) all += (all.empty() ? "" : "; ") + text;
+  return all;
+}
 
 /// All that tells when a run of fixed steps is not to be believed although every step was solved. run_steps()
 /// takes one along; a loop of one's own calls it around each step and shows it points on the way, the start
@@ -13,10 +24,18 @@ class RunChecks {
  public:
   /// For the next so many steps.  The integrator's scene must outlive this.
   RunChecks(const Integrator& integrator, long steps)
-      : energy_(integrator.scene()), step_(integrator, steps), branch_(integrator) {}
+      : scene_(integrator.scene()),
+        energy_(integrator.scene()),
+        step_(integrator, steps),
+        nodes_(integrator.scene(), steps),
+        branch_(integrator) {}
 
-  void before_step(Integrator& integrator) { step_.before(integrator); }
-  void after_step(const Integrator& integrator) {
+  void before_step(Integrator& integrator) {
+    if (nodes_.wants(step_number_)) see_node(integrator);
+    step_.before(integrator);
+  }
+  void after_step(Integrator& integrator) {
+    ++step_number_;
     step_.after(integrator);
     branch_.after(integrator);
   }
@@ -24,16 +43,22 @@ class RunChecks {
 
   /// Empty, or the doubts, one after the other.
   std::string text() const {
-    std::string all;
-    for (const std::string& text : {energy_.text(), step_.text(), branch_.text()})
-      if (!text.empty()) all += (all.empty() ? "" : "; ") + text;
-    return all;
+    return joined_doubts({energy_.text(), step_.text(), nodes_.text(), branch_.text(),
+                          scene_.doubt ? scene_.doubt() : std::string()});
   }
 
  private:
+  void see_node(Integrator& integrator) {
+    if (integrator.sample(Momentum::projected, node_).ok()) nodes_.see(step_number_, node_);
+  }
+
+  const Scene& scene_;
   EnergyCheck energy_;
   StepSizeCheck step_;
+  NodeCheck nodes_;
   BranchCheck branch_;
+  long step_number_ = 0;
+  Sample node_;
 };
 
 /// The steps of an integrator, with the checks around each where there are any.

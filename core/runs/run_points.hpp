@@ -25,12 +25,12 @@ inline void require_ahead(double from, double to, double size) {
 }
 
 /// A run of one stepper, and what it reads on its way.  `Steps` takes the steps of the stepper, perhaps with
-/// checks around them.
-template <class Stepper, class Steps>
+/// checks around them, which see what is read.
+template <class Stepper, class Steps, class Checks>
 class RunOf {
  public:
   RunOf(Stepper& stepper, Steps steps, Momentum momentum, long every, const Observer& observer,
-        RunChecks* checks)
+        Checks* checks)
       : stepper_(stepper),
         steps_(steps),
         momentum_(momentum),
@@ -125,7 +125,7 @@ class RunOf {
   Momentum momentum_;
   long every_;
   const Observer& observer_;
-  RunChecks* checks_;
+  Checks* checks_;
   Sample sample_;
   StepReport last_, read_;
   bool shown_ = false;  ///< the current point

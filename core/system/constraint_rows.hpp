@@ -36,6 +36,10 @@ class ConstraintRows {
   /// Whether A depends on neither t nor q, and b not on q; false where that is not known.
   virtual bool constant() const { return false; }
 
+  /// Whether b = 0 everywhere and t does not enter, so that the forces of the rows do no work; false where
+  /// that is not known.
+  virtual bool workless() const { return false; }
+
   /// φ(t,q), m values.  Holonomic rows only; the default throws Misuse.
   virtual void position(double t, ConstVectorRef q, VectorRef phi) const;
 

@@ -53,7 +53,7 @@ class Transform final : public Base {
   static PhaseStructure structure_of(const PhaseStructure& f) {
     const bool constant_and_separable = f.separable && f.y_hessian_constant;
     return {f.separable, f.y_hessian_constant, f.y_hessian_diagonal, constant_and_separable && f.quadratic,
-            false};
+            false,       f.autonomous};
   }
 
   Blocks blocks(double t, ConstVectorRef x, ConstVectorRef y) const {

@@ -18,6 +18,7 @@ struct PhaseStructure {
   bool y_hessian_diagonal = false;
   bool quadratic = false;       ///< every second derivative is constant
   bool y_hessian_zero = false;  ///< f is linear in y
+  bool autonomous = false;      ///< f does not depend on t
 
   /// f = θ(x)·y − H(x) with θ not constant: a phase-space Lagrangian.
   bool phase_space() const { return y_hessian_zero && !separable; }
@@ -116,13 +117,14 @@ PhaseStructure structure_of(const F& f) {
         if (yy && s.second_derivative(i, j)) structure.y_hessian_zero = false;
         if (s.second_derivative_varies(i, j)) structure.quadratic = false;
       }
+    structure.autonomous = !takes_time<F, std::array<double, N>, std::array<double, N>>;
     if constexpr (takes_time<F, std::array<double, N>, std::array<double, N>>) {
       // The time is no variable here, so nothing is known to be constant.
       structure.y_hessian_constant = structure.quadratic = false;
     }
     return structure;
   } catch (const typename Scalar::Branches&) {
-    return {};
+    return {.autonomous = !takes_time<F, std::array<double, N>, std::array<double, N>>};
   }
 }
 

@@ -23,6 +23,9 @@ class RowsAlongMotions final : public ConstraintRows {
            ", which carries no momentum";
   }
 
+  /// They follow from the equations of motion, so that their forces are zero.
+  bool workless() const override { return true; }
+
   void position(double t, ConstVectorRef q, VectorRef phi) const override { force_along(t, q, phi); }
 
   void coefficients(double t, ConstVectorRef q, VectorRef a, VectorRef b) const override {

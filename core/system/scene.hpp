@@ -5,6 +5,7 @@
 #include <diracstep/core/system/force.hpp>
 #include <diracstep/core/system/kinks.hpp>
 #include <diracstep/core/system/phase_function.hpp>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -35,6 +36,9 @@ struct Scene {
   std::shared_ptr<const Force> force;  ///< null where there is none
   Start start;
   std::shared_ptr<const Kinks> kinks = {};  ///< null where nothing is known of any
+  /// Empty, or says after use why the functions above are not to be believed, as derivatives by differences
+  /// that two step sizes do not agree on.
+  std::function<std::string()> doubt = {};
 
   /// Of the tangent spaces: how many numbers a velocity, a momentum, a row and the second derivatives of L
   /// have.

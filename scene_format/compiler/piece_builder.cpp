@@ -102,6 +102,7 @@ void PieceBuilder::add_phase(SceneFunction& function, Piece piece) {
     rate.push_back({0, Table::slots, slot, fyt[k]});
     position_rate.push_back({0, Table::slots, slot, fxt[k]});
   }
+  if (!zero(graph_.derivative(piece.outputs, graph_.time())[0])) function.autonomous = false;
   add_kernel(piece, {{0, Table::fixed, 0, piece.outputs[0]}});
   add_kernel(piece, std::move(gradient));
   add_kernel(piece, std::move(hessian));
@@ -134,6 +135,8 @@ void PieceBuilder::add_rows(SceneFunction& function, Piece piece, const std::vec
     position.push_back({0, Table::slots, row, piece.outputs[r]});
     coefficients.push_back({1, Table::slots, row, b[r]});
     rate.push_back({0, Table::slots, row, by_time[r]});
+    if (!zero(by_time[r])) function.autonomous = false;
+    if (!zero(by_time[r]) || !zero(b[r])) function.workless = false;
     for (std::size_t k = 0; k < n; ++k) {
       if (zero(a[r][k]) && zero(contracted_by_q[r][k])) continue;
       const int entry = static_cast<int>(piece.entries.size());

@@ -59,6 +59,8 @@ struct SceneFunction {
   std::vector<RowGroup> groups = {};
   bool separable = true, y_hessian_constant = true, y_hessian_diagonal = true, quadratic = true,
        y_hessian_zero = true;
+  bool autonomous = true;  ///< t does not enter
+  bool workless = true;    ///< rows: and b = 0
 };
 
 /// A value by coordinate: the start, or a reference.

@@ -91,7 +91,8 @@ class FilePhaseFunction final : public Base {
 
  private:
   static PhaseStructure structure_of(const SceneFunction& f) {
-    return {f.separable, f.y_hessian_constant, f.y_hessian_diagonal, f.quadratic, f.y_hessian_zero};
+    return {f.separable, f.y_hessian_constant, f.y_hessian_diagonal,
+            f.quadratic, f.y_hessian_zero,     f.autonomous};
   }
 
   LoadedFunction function_;
@@ -117,6 +118,8 @@ class FileRows final : public ConstraintRows {
   }
 
   std::string origin(int row) const override { return function_.row_origin(row); }
+
+  bool workless() const override { return function_.function().workless; }
 
   void position(double t, ConstVectorRef q, VectorRef phi) const override {
     if (!holonomic()) return ConstraintRows::position(t, q, phi);

@@ -1,6 +1,7 @@
 #include <diracstep/c_interface/diracstep.h>
 #include <diracstep/version.h>
 
+#include <cmath>
 #include <law_scenes.hpp>
 
 #include "callbacks.hpp"
@@ -95,6 +96,62 @@ TEST_F(CInterface, AnErrorOfACallbackIsAFailureAndKeepsTheState) {
   ASSERT_EQ(create(&callbacks.scene()), DIRACSTEP_OK) << diracstep_message(made_);
   EXPECT_EQ(diracstep_step(made_, 10), DIRACSTEP_FAILED);
   expect_message({"scene 'callbacks'", "lagrangian.value returned error 9"});
+}
+
+/// A particle on a spring of rest length l in the plane, its Lagrangian alone: one problem in three units.
+TEST_F(CInterface, TheUnitOfLengthDoesNotCount) {
+  Vector in_metres;
+  for (const double l : {1.0, 1e-2, 1e-3, 1e6}) {
+    diracstep_function lagrangian{};
+    lagrangian.data = &l;
+    lagrangian.value = [](const void* data, double, const double* x, const double* v, double* f) {
+      const double stretch = std::hypot(x[0], x[1]) - *static_cast<const double*>(data);
+      *f = 0.5 * (v[0] * v[0] + v[1] * v[1]) - 50.0 * stretch * stretch;
+      return 0;
+    };
+    const double q0[] = {1.1 * l, 0.0}, v0[] = {0.0, l};
+    diracstep_scene scene{};
+    scene.name = "spring";
+    scene.dimension = 2;
+    scene.lagrangian = &lagrangian;
+    scene.start_q = q0;
+    scene.start_v = v0;
+    scene.end_time = 5.0;
+    scene.step = 0.05;
+    diracstep_options options{};
+    options.method = "type1/gl:3";
+    ASSERT_EQ(create(&scene, &options), DIRACSTEP_OK) << diracstep_message(made_);
+    ASSERT_EQ(diracstep_step(made_, 100), DIRACSTEP_OK) << diracstep_message(made_);
+    Vector q(2);
+    diracstep_state state{};
+    state.q = q.data();
+    ASSERT_EQ(diracstep_read(made_, DIRACSTEP_PROJECTED, &state), DIRACSTEP_OK);
+    q /= l;
+    if (in_metres.size() == 0) in_metres = q;
+    EXPECT_LT((q - in_metres).lpNorm<Eigen::Infinity>(), 1e-8) << l;
+    EXPECT_NEAR(state.energy / (l * l), 1.0, 1e-5) << l;
+    EXPECT_STREQ(diracstep_doubt(made_), "");
+  }
+}
+
+/// The motion is that of a force of 1e-3; the constant beside it leaves nothing of it in differences.
+TEST_F(CInterface, DifferencesLostInRoundOffAreDoubted) {
+  diracstep_function lagrangian{};
+  lagrangian.value = [](const void*, double, const double* x, const double* v, double* f) {
+    *f = 0.5 * v[0] * v[0] - 1e-3 * std::sin(x[0]) + 1e11;
+    return 0;
+  };
+  const double q0[] = {0.3}, v0[] = {0.0};
+  diracstep_scene scene{};
+  scene.dimension = 1;
+  scene.lagrangian = &lagrangian;
+  scene.start_q = q0;
+  scene.start_v = v0;
+  scene.end_time = 1.0;
+  scene.step = 0.1;
+  ASSERT_EQ(create(&scene), DIRACSTEP_OK) << diracstep_message(made_);
+  (void)diracstep_step(made_, 3);
+  EXPECT_NE(std::string(diracstep_doubt(made_)).find("differences"), std::string::npos);
 }
 
 }  // namespace

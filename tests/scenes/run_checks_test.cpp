@@ -1,6 +1,8 @@
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
+#include <diracstep/core/adaptive/variable_run_checks.hpp>
 #include <diracstep/core/runs/run.hpp>
 #include <diracstep/core/runs/run_checks.hpp>
 #include <diracstep/scene_format/scene_catalogue.hpp>
@@ -89,6 +91,112 @@ TEST(StepSizeCheck, SeesLargeStepsOfDrivenScenes) {
   };
   EXPECT_NE(text(0.25).find("two half steps"), std::string::npos);
   EXPECT_EQ(text(0.01), "");
+}
+
+/// x'' = −c v + g in one dimension: with steps far above 1/c the velocity alternates about g/c.
+std::shared_ptr<const Scene> damped(double c) {
+  Scene scene;
+  scene.name = "damped";
+  scene.coordinates = {"x"};
+  scene.lagrangian = lagrangian<1>([](const auto&, const auto& v) { return 0.5 * v[0] * v[0]; });
+  scene.force = force<1>([c](const auto&, const auto& v) { return std::array{1.0 - c * v[0]}; });
+  scene.start = {0.0, Vector{{0.0}}, Vector{{1.0}}};
+  return std::make_shared<const Scene>(scene);
+}
+
+TEST(NodeCheck, SeesVelocitiesThatAlternate) {
+  const auto text = [](double step, long steps) {
+    Integrator integrator(damped(1e5), Registry::with_built_ins(), kinsol(),
+                          {.method = "type1/midpoint", .step = step});
+    return doubt_of(integrator, steps);
+  };
+  EXPECT_NE(text(0.1, 100).find("velocity of x alternates"), std::string::npos) << text(0.1, 100);
+  EXPECT_EQ(text(1e-6, 300), "");
+}
+
+TEST(NodeCheck, SeesAMomentumThatStaysWhileAForceActs) {
+  Scene scene;
+  scene.name = "oscillator";
+  scene.coordinates = {"x"};
+  scene.lagrangian = lagrangian<1>(
+      [](const auto& q, const auto& v) { return 1e-27 * (0.5 * v[0] * v[0] - 0.5e12 * q[0] * q[0]); });
+  scene.start = {0.0, Vector{{1e-6}}, Vector{{0.0}}};
+  const auto text = [&](double change) {
+    NodeCheck check(scene, 100);
+    for (long k = 0; k < 20; ++k) {
+      const double t = 1e-7 * static_cast<double>(k);
+      Sample node{.time = t, .q = Vector{{1e-6}}, .v = Vector{{0.0}}, .p = Vector{{0.0}}};
+      if (change > 0.0) {
+        node.q[0] *= std::cos(1e6 * t);
+        node.p[0] = -1e-27 * std::sin(1e6 * t);
+        node.v[0] = -std::sin(1e6 * t);
+      }
+      if (check.wants(k)) check.see(k, node);
+    }
+    return check.text();
+  };
+  EXPECT_NE(text(0.0).find("frozen"), std::string::npos);
+  EXPECT_EQ(text(1.0), "");
+}
+
+TEST(VariableRunChecks, LookAtVelocitiesOfVariableSteps) {
+  const auto scene = damped(1e5);
+  const auto text = [&](double rate) {
+    const Monitor monitor{.rate = [rate](double, ConstVectorRef, ConstVectorRef) { return rate; },
+                          .depends_on_velocity = false};
+    const IntegratorOptions options{.method = "type1/midpoint", .step = 0.1};
+    AdaptiveIntegrator integrator(scene, Registry::with_built_ins(), kinsol(), options,
+                                  {.eps = 0.1, .monitor = monitor, .end = 4.0});
+    VariableRunChecks checks(integrator, {scene, Registry::with_built_ins(), kinsol(), options});
+    for (long k = 0; k < 40; ++k) {
+      checks.before_step();
+      EXPECT_TRUE(integrator.step().ok());
+      checks.after_step();
+    }
+    return checks.text();
+  };
+  EXPECT_NE(text(1.0), "");
+  EXPECT_EQ(text(1e5), "");
+}
+
+TEST(EnergyCheck, ReadsWhatIsKeptFromTheFormulas) {
+  Scene scene;
+  scene.name = "driven";
+  scene.coordinates = {"x"};
+  scene.start = {0.0, Vector{{0.0}}, Vector{{0.0}}};
+  // L(t) = L(t + 1) at the start, and at every start with x = 0.
+  scene.lagrangian = lagrangian<1>([](const auto& q, const auto& v, const auto& t) {
+    using std::sin;
+    return 0.5 * v[0] * v[0] - 0.5 * q[0] * q[0] + q[0] * sin(2.0 * t);
+  });
+  EXPECT_FALSE(keeps_energy(scene));
+  scene.lagrangian =
+      lagrangian<1>([](const auto& q, const auto& v) { return 0.5 * v[0] * v[0] - 0.5 * q[0] * q[0]; });
+  EXPECT_TRUE(keeps_energy(scene));
+}
+
+TEST(EnergyCheck, DoesNotDependOnTheOrigin) {
+  for (const double origin : {0.0, 1e6}) {
+    Scene scene;
+    scene.name = "shifted";
+    scene.coordinates = {"x"};
+    scene.lagrangian = lagrangian<1>([origin](const auto& q, const auto& v) {
+      const auto x = q[0] - origin;
+      return 0.5 * v[0] * v[0] - 0.5 * x * x + 1e3 * origin;
+    });
+    scene.start = {0.0, Vector{{origin + 1.0}}, Vector{{0.0}}};
+    EnergyCheck check(scene);
+    const auto see = [&](double t, double x, double v) {
+      Sample point{.time = t, .q = Vector{{origin + x}}, .v = Vector{{v}}, .p = Vector{{v}}};
+      point.energy = scene.energy(t, point.q, point.v);
+      check.see(point);
+    };
+    see(0.0, 1.0, 0.0);
+    see(1.0, 0.5, -0.86);
+    EXPECT_EQ(check.text(), "") << origin;
+    see(2.0, 0.0, -1.2);
+    EXPECT_NE(check.text(), "") << origin;
+  }
 }
 
 TEST(StepSizeCheck, LeavesTheBitsAlone) {

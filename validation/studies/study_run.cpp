@@ -122,7 +122,9 @@ ReferenceEnd reference_end(const CatalogueScene& scene, double t_end) {
 void judge(StudyRow& row, const Scene& scene, const Sample& end, const ReferenceEnd& reference) {
   const double energy = scene.energy(scene.start.time, scene.start.q, scene.start.v);
   row.constraint = largest_violation(scene, end);
-  row.energy_error = std::abs(end.energy - energy) / std::max(std::abs(energy), 1.0);
+  const double change = std::abs(end.energy - energy);
+  const double size = std::max({std::abs(energy), std::abs(end.energy), 0.5 * std::abs(end.p.dot(end.v))});
+  row.energy_error = change == 0.0 ? 0.0 : change / size;
   if (reference.missing.empty()) {
     row.error_q = relative_error(end.q, reference.q);
     row.error_p = relative_error(end.p, reference.p);

@@ -31,16 +31,16 @@ struct StudyRow {
   static constexpr double none = std::numeric_limits<double>::quiet_NaN();
 
   std::string method;
-  int order = 0;            ///< 0 for a baseline
-  double step = none;       ///< ours: the step size, fitted to the interval, or eps of variable steps
-  double rtol = none;       ///< a baseline's
+  int order = 0;                 ///< 0 for a baseline
+  double step = none;            ///< ours: the step size, fitted to the interval, or eps of variable steps
+  double rtol = none;            ///< a baseline's
   std::string formulation = {};  ///< of IDA
   std::string status = "ok";
   double error_q = none;
   double error_p = none;
   double self_error = none;  ///< a baseline's: how far its result is from that of the next tighter tolerance
   double constraint = none;  ///< largest |φ(q)| and |A(q)v + b| at the end
-  double energy_error = none;  ///< |E(end) − E(start)| / max(|E(start)|, 1)
+  double energy_error = none;  ///< |E(end) − E(start)| / max(|E(start)|, |E(end)|, |p·v|/2 at the end)
   CpuSeconds cpu_seconds = {};
   long steps = 0;
   long newton_iterations = 0;
@@ -85,8 +85,8 @@ using Look = std::function<void()>;
 /// Runs from the start to the end of `steps` steps, once to warm up and `repeats` times for the clock.  The
 /// time of a run holds the start, all steps and the reading of the end; construction is left out.  A run
 /// above 0.3 s is repeated less often, and one above 1 s is its own warm-up.
-StudyRow run_ours(Integrator& integrator, long steps, Momentum momentum, int repeats, const ReferenceEnd& reference,
-                  const Look& look = {});
+StudyRow run_ours(Integrator& integrator, long steps, Momentum momentum, int repeats,
+                  const ReferenceEnd& reference, const Look& look = {});
 
 /// The same with variable steps to t_end; the survey of the rate belongs to the construction.  The row's
 /// method ends in `variable_steps` and its step is eps.
@@ -95,6 +95,7 @@ StudyRow run_variable(AdaptiveIntegrator& integrator, double t_end, Momentum mom
 
 /// The same for a baseline, by its method name; `end` receives where it got to.
 StudyRow run_baseline(const std::string& method, const Scene& scene, double t_end,
-                       const ReferenceOptions& options, int repeats, const ReferenceEnd& reference, Sample& end);
+                      const ReferenceOptions& options, int repeats, const ReferenceEnd& reference,
+                      Sample& end);
 
 }  // namespace diracstep

@@ -1,0 +1,90 @@
+#include <algorithm>
+#include <cmath>
+#include <diracstep/core/adaptive/convergence.hpp>
+#include <sstream>
+
+namespace diracstep {
+
+namespace {
+
+constexpr double safety = 2.5;      // between the estimate and the error asked for
+constexpr double aimed = 0.2;       // part of the error asked for that the next run aims at
+constexpr double round_off = 1e-7;  // differences that stop falling below this are laid to round-off
+
+/// p with  d1/d2 = (h0^p − h1^p)/(h1^p − h2^p);  the right side rises with p.
+double order_from(double h0, double h1, double h2, double d1, double d2) {
+  if (!(d1 > 0.0) || !(d2 > 0.0)) return std::nan("");
+  double low = 0.01, high = 40.0;
+  for (int k = 0; k < 60; ++k) {
+    const double p = 0.5 * (low + high);
+    const double a = std::pow(h0 / h1, p), b = std::pow(h2 / h1, p);
+    ((a - 1.0) / (1.0 - b) < d1 / d2 ? low : high) = p;
+  }
+  return 0.5 * (low + high);
+}
+
+}  // namespace
+
+void Convergence::clear() {
+  steps_.clear();
+  differences_.clear();
+  estimate_ = none;
+  stagnant_ = 0;
+}
+
+void Convergence::add(double step, double difference) {
+  steps_.push_back(step);
+  if (runs() < 2) return;
+  stagnant_ = runs() > 2 && difference > 0.5 * differences_.back() ? stagnant_ + 1 : 0;
+  differences_.push_back(difference);
+  double usable = order_;
+  for (const std::size_t last : {runs(), runs() - 1})
+    if (const double p = order_of(last); p < order_ - 1.0) usable = std::min(usable, std::max(p, 0.5));
+  estimate_ = difference / (std::pow(steps_[runs() - 2] / step, usable) - 1.0);
+}
+
+double Convergence::order_of(std::size_t runs) const {
+  if (runs < 3) return none;
+  return order_from(steps_[runs - 3], steps_[runs - 2], steps_[runs - 1], differences_[runs - 3],
+                    differences_[runs - 2]);
+}
+
+bool Convergence::confirmed(std::size_t runs) const {
+  return std::abs(order_of(runs) - order_) <= (order_ < 3 ? 0.5 : 1.0);
+}
+
+bool Convergence::by_order() const { return order_confirmed() && safety * estimate_ <= error_; }
+
+bool Convergence::by_three_runs() const {
+  if (runs() < 3) return false;
+  return safety * differences_.back() <= error_ && safety * differences_[runs() - 3] <= error_;
+}
+
+double Convergence::next_factor() const {
+  if (!(estimate_ > 0.0) || stagnant_ > 0) return 0.7;
+  return std::clamp(std::pow(aimed * error_ / estimate_, 1.0 / order_), 0.35, 0.7);
+}
+
+double Convergence::work_to_go() const {
+  if (runs() < 4 || !(estimate_ > 0.0)) return 1.0;
+  double p = order_;
+  for (const std::size_t last : {runs(), runs() - 1}) p = std::min(p, std::max(order_of(last), 0.3));
+  return std::max(1.0, std::pow(safety * estimate_ / error_, 1.0 / p));
+}
+
+std::string Convergence::obstacle() const {
+  std::ostringstream text;
+  text.precision(3);
+  if (stagnates() && differences_.back() < round_off) {
+    text << "the runs no longer come closer to each other than " << differences_.back()
+         << ": round-off, or a motion that amplifies it, sets the limit";
+  } else {
+    text << "the order observed is " << order_of(runs() - 1) << " and " << order_of(runs())
+         << ", the stated one " << order_ << ", with differences of " << difference()
+         << " between the runs: the steps do not resolve the motion, or its forces are not smooth, or it "
+            "amplifies every error";
+  }
+  return text.str();
+}
+
+}  // namespace diracstep

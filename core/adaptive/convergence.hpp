@@ -1,0 +1,63 @@
+#pragma once
+
+#include <limits>
+#include <string>
+#include <vector>
+
+namespace diracstep {
+
+/// Judges a sequence of runs of one motion with finer and finer steps, h_0 > h_1 > …, by the differences
+/// d_k = |y_k − y_{k−1}| of their ends.
+///
+/// The order observed over three runs solves  d_{k−1}/d_k = (h_{k−2}^p − h_{k−1}^p)/(h_{k−1}^p − h_k^p), and
+/// the error of the last run is estimated by Richardson's  d_k / ((h_{k−1}/h_k)^p − 1)  with the stated
+/// order, or the lower of the last two observed ones where that falls short.
+///
+/// One agreement may be chance.  Accepted is a sequence whose last run has
+///
+///  * two observed orders in a row that agree with the stated one to within one, or half of one for orders
+///    below 3, with falling differences, and 2.5 times the estimate below the error asked for; or
+///  * two differences in a row, those of three runs, below the error asked for divided by 2.5.
+///
+/// What all runs of a sequence step over alike, it does not see: see ForceSurvey.
+class Convergence {
+ public:
+  Convergence(int order, double error) : order_(order), error_(error) {}
+
+  /// The next run, of a smaller step than those before it, and its difference from the last one; that of the
+  /// first is not used.
+  void add(double step, double difference);
+  void clear();
+
+  std::size_t runs() const { return steps_.size(); }
+  double difference() const { return differences_.empty() ? none : differences_.back(); }
+  double estimate() const { return estimate_; }               ///< NaN before the second run
+  double observed_order() const { return order_of(runs()); }  ///< NaN before the third
+
+  bool accepted() const { return by_order() || by_three_runs(); }
+  /// Whether the last two observed orders agree with the stated one.
+  bool order_confirmed() const { return confirmed(runs()) && confirmed(runs() - 1); }
+  /// Three refinements in a row that did not halve the difference.
+  bool stagnates() const { return stagnant_ >= 3; }
+  /// Factor of the next step, from 0.35 to 0.7.
+  double next_factor() const;
+  /// Part of the work of the last run that one which meets the error would take, by the order observed.
+  double work_to_go() const;
+  /// Why the sequence is not accepted, in words.
+  std::string obstacle() const;
+
+ private:
+  static constexpr double none = std::numeric_limits<double>::quiet_NaN();
+  double order_of(std::size_t runs) const;
+  bool confirmed(std::size_t runs) const;
+  bool by_order() const;
+  bool by_three_runs() const;
+
+  int order_;
+  double error_;
+  std::vector<double> steps_, differences_;  ///< differences_[k − 1] belongs to steps_[k]
+  double estimate_ = none;
+  int stagnant_ = 0;
+};
+
+}  // namespace diracstep

@@ -1,0 +1,178 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <diracstep/core/adaptive/force_polynomial.hpp>
+#include <diracstep/core/numerics/scales.hpp>
+#include <limits>
+#include <numbers>
+
+namespace diracstep {
+
+namespace {
+
+constexpr int nodes = 12;             // of a polynomial
+constexpr double counts = 0.02;       // part of the error asked for that the forces missed may make up
+constexpr double read_error = 1e-11;  // relative, of F and of its polynomial
+constexpr double next_point = 0.125;  // ratio of the distances of points that approach an end
+constexpr double epsilon = std::numeric_limits<double>::epsilon();
+
+/// Chebyshev points of (−1, 1) and the weights of their barycentric formula.
+struct ChebyshevPoints {
+  std::array<double, nodes> x{}, weight{};
+  ChebyshevPoints() {
+    for (int k = 0; k < nodes; ++k) {
+      const double angle = (2.0 * k + 1.0) * std::numbers::pi / (2.0 * nodes);
+      x[static_cast<std::size_t>(k)] = std::cos(angle);
+      weight[static_cast<std::size_t>(k)] = (k % 2 == 0 ? 1.0 : -1.0) * std::sin(angle);
+    }
+  }
+  /// out = values · l(x), the polynomial through the columns of `values`.
+  void interpolate(const Columns& values, double at, Vector& out) const {
+    out.setZero(values.rows());
+    double sum = 0.0;
+    for (int k = 0; k < nodes; ++k) {
+      const auto i = static_cast<std::size_t>(k);
+      if (at == x[i]) return void(out = values.col(k));
+      const double w = weight[i] / (at - x[i]);
+      out += w * values.col(k);
+      sum += w;
+    }
+    out /= sum;
+  }
+};
+const ChebyshevPoints chebyshev;
+
+}  // namespace
+
+ForcePolynomial::ForcePolynomial(const Scene& scene, double error)
+    : scene_(scene),
+      error_(error),
+      n_(scene.dimension()),
+      m_(scene.rows()),
+      rows_(scene.constraints, scene.dimension()),
+      smooth_(!scene.force && !scene.kinks && scene.lagrangian->structure().autonomous &&
+              std::ranges::all_of(scene.constraints, [](const auto& rows) { return rows->workless(); })),
+      external_(Vector::Zero(n_)),
+      value_(Vector::Zero(2 * n_ + m_)),
+      other_(value_),
+      samples_(Columns::Zero(2 * n_ + m_, nodes)) {}
+
+double ForcePolynomial::closest(double t) const {
+  return 8.0 * epsilon * std::max(std::abs(t), 0.01 * span_);
+}
+
+void ForcePolynomial::read(const PathCubic& path, double t, VectorRef f) {
+  ++readings_;
+  path.at(t, q_, v_);
+  scene_.lagrangian->gradient(t, q_, v_, f.head(n_), f.segment(n_, n_));
+  if (scene_.force) {
+    scene_.force->value(t, q_, v_, external_);
+    f.head(n_) += external_;
+  }
+  if (m_ == 0) return;
+  rows_.evaluate(t, q_);
+  rows_.velocity_residual(v_, f.tail(m_));
+}
+
+/// What may be missed of each component of F: a part of the largest momentum for ∂L/∂v, the same over the
+/// time of the motion for forces, and for rows a part of the largest |A v| and |b|.
+void ForcePolynomial::find_scales(const std::vector<PathPoint>& path) {
+  span_ = std::abs(path.back().time - path.front().time);
+  readings_ = 0;
+  double force = 0.0, momentum = 0.0;
+  Vector row_terms = Vector::Zero(m_), terms(m_), noise = Vector::Zero(2 * n_ + m_);
+  for (std::size_t k = 0; k + 1 < path.size(); ++k) {
+    const PathCubic cubic{path[k], path[k + 1]};
+    if (std::abs(cubic.end() - cubic.begin()) <= closest(cubic.end())) continue;
+    const double t = 0.5 * (cubic.begin() + cubic.end());
+    read(cubic, t + closest(t), other_);
+    read(cubic, t, value_);
+    noise = noise.cwiseMax((value_ - other_).cwiseAbs());
+    force = std::max(force, max_norm(value_.head(n_)));
+    momentum = std::max(momentum, max_norm(value_.segment(n_, n_)));
+    if (m_ == 0) continue;
+    terms = value_.tail(m_).cwiseAbs();
+    rows_.pattern().multiply_add(rows_.coefficients().cwiseAbs().eval().data(), v_.cwiseAbs().eval().data(),
+                                 terms.data());
+    row_terms = row_terms.cwiseMax(terms);
+  }
+  momentum = std::max(momentum, 0.01 * force * span_);  // of a scene without masses, or at rest so far
+  if (!(momentum > 0.0)) momentum = 1.0;
+  const double part = counts * error_;
+  allowed_.resize(2 * n_ + m_);
+  weights_.resize(2 * n_ + m_);
+  allowed_.head(n_).setConstant(std::max(part * momentum / span_, read_error * force));
+  allowed_.segment(n_, n_).setConstant(std::max(part, read_error) * momentum);
+  weights_.head(n_).setConstant(1.0 / momentum);
+  weights_.segment(n_, n_).setConstant(1.0 / (momentum * span_));
+  for (Eigen::Index r = 0; r < m_; ++r) {
+    const double scale = usable_scale(row_terms[r]);
+    allowed_[2 * n_ + r] = std::max(part, read_error) * scale;
+    weights_[2 * n_ + r] = 1.0 / (scale * span_);
+  }
+  for (Eigen::Index i = 0; i < allowed_.size(); ++i)
+    if (noise[i] < HUGE_VAL) allowed_[i] = std::max(allowed_[i], 30.0 * noise[i]);
+}
+
+double ForcePolynomial::fit(const PathCubic& path, double a, double b, long points,
+                            const std::vector<double>& known) {
+  const double middle = middle_ = 0.5 * (a + b), half = half_ = 0.5 * (b - a);
+  for (int k = 0; k < nodes; ++k)
+    read(path, middle + half * chebyshev.x[static_cast<std::size_t>(k)], samples_.col(k));
+  // What rounding of F and of t leaves of F here, whatever is asked for.
+  const double rounding = 2.0 * std::numeric_limits<double>::epsilon() * std::abs(middle);
+  local_ = 1e-13 * samples_.cwiseAbs().rowwise().maxCoeff();
+  for (int k = 0; k + 1 < nodes; ++k) {
+    const double apart = std::abs(half) * (chebyshev.x[static_cast<std::size_t>(k)] -
+                                           chebyshev.x[static_cast<std::size_t>(k + 1)]);
+    local_ = local_.cwiseMax(rounding / apart * (samples_.col(k) - samples_.col(k + 1)).cwiseAbs());
+  }
+  for (Eigen::Index i = 0; i < local_.size(); ++i)
+    local_[i] = std::max(allowed_[i], std::isfinite(local_[i]) ? local_[i] : 0.0);
+  double worst = 0.0;
+  const auto compare = [&](double t) {
+    if (!((t - a) * (b - t) > 0.0)) return;
+    read(path, t, value_);
+    chebyshev.interpolate(samples_, (t - middle) / half, other_);
+    other_ = (other_ - value_).cwiseAbs();
+    double excess = 0.0;
+    for (Eigen::Index i = 0; i < other_.size(); ++i)
+      if (!(other_[i] <= local_[i]))
+        excess = std::max(excess, std::isfinite(other_[i]) ? other_[i] / local_[i] : HUGE_VAL);
+    worst = std::max(worst, excess);
+  };
+  double place = 0.5;
+  for (long k = 0; k < points; ++k) {
+    compare(a + place * (b - a));
+    place += std::numbers::phi - 1.0;
+    if (place >= 1.0) place -= 1.0;
+  }
+  for (double s = 0.02; s * std::abs(b - a) > closest(b); s *= next_point) {
+    compare(a + s * (b - a));
+    compare(b - s * (b - a));
+    if (smooth_ && points < 16) break;  // of very many steps
+  }
+  for (std::size_t k = 0; k < known.size(); ++k) {
+    const double t = known[k], next = k + 1 < known.size() ? known[k + 1] : b;
+    compare(t - 2.0 * closest(t));
+    compare(t + 2.0 * closest(t));
+    compare(0.5 * (t + next));
+  }
+  return worst;
+}
+
+double ForcePolynomial::miss(const PathCubic& path, double t) {
+  read(path, t, value_);
+  chebyshev.interpolate(samples_, (t - middle_) / half_, other_);
+  return ((other_ - value_).array().abs() * weights_.array()).maxCoeff();
+}
+
+bool ForcePolynomial::jumps(const PathCubic& before, const PathCubic& after) {
+  const double t = before.end(), gap = std::copysign(closest(t), t - before.begin());
+  read(before, t - gap, value_);
+  const Vector left = value_;
+  read(after, t + gap, value_);
+  return ((left - value_).array().abs() > 100.0 * allowed_.array()).any();
+}
+
+}  // namespace diracstep

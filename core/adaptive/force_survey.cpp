@@ -1,0 +1,199 @@
+#include <algorithm>
+#include <cmath>
+#include <diracstep/core/adaptive/force_survey.hpp>
+
+namespace diracstep {
+
+namespace {
+
+constexpr long points_of_smooth = 2'000, all_points = 20'000, fewest_points = 2'000;
+constexpr long most_parts = 3'000, most_readings = 2'000'000;  // the latter of a small scene
+constexpr double widest_gap = 32.0;                            // in closest times, at a jump
+
+}  // namespace
+
+ForceSurvey::ForceSurvey(const Scene& scene, double error)
+    : kinks_(scene.kinks), size_(scene.dimension() + scene.rows()), force_(scene, error) {
+  if (kinks_) switches_ = before_ = Vector::Zero(kinks_->count());
+}
+
+/// Where a switching function whose sign at `a` is given has changed its sign in (a, b].
+double ForceSurvey::crossing(const PathCubic& path, double a, double b, int number, bool sign) {
+  while (std::abs(b - a) > 0.25 * force_.closest(b)) {
+    const double t = 0.5 * (a + b);
+    if (t == a || t == b) break;
+    path.at(t, q_, v_);
+    kinks_->evaluate(t, q_, v_, switches_);
+    (std::signbit(switches_[number]) == sign ? a : b) = t;
+  }
+  return b;
+}
+
+void ForceSurvey::crossings(const PathCubic& path, double a, double b, std::vector<double>& times) {
+  constexpr int looks = 16;
+  const auto at = [&](double t) {
+    path.at(t, q_, v_);
+    kinks_->evaluate(t, q_, v_, switches_);
+  };
+  at(a);
+  before_ = switches_;
+  double last = a;
+  for (int k = 1; k <= looks; ++k) {
+    const double t = k == looks ? b : a + k * (b - a) / looks;
+    at(t);
+    const Vector now = switches_;
+    for (int j = 0; j < kinks_->count(); ++j)
+      if (std::signbit(now[j]) != std::signbit(before_[j]))
+        times.push_back(crossing(path, last, t, j, std::signbit(before_[j])));
+    before_ = now;
+    last = t;
+  }
+}
+
+/// Times in (a, b) where the scene's formulas show that F may change fast, in the order of the motion.
+std::vector<double> ForceSurvey::known_times(const PathCubic& path, double a, double b) {
+  std::vector<double> times;
+  if (!kinks_) return times;
+  if (kinks_->count() > 0) crossings(path, a, b, times);
+  for (const auto& [time, width] : instants_)
+    for (const double off : {0.0, -6.0, 6.0, -1.0, 1.0})
+      if (off == 0.0 || width < std::abs(b - a)) times.push_back(time + off * width);
+  std::erase_if(times, [&](double t) { return !((t - a) * (b - t) > 0.0); });
+  std::ranges::sort(times);
+  if (b < a) std::ranges::reverse(times);
+  const auto same = [this](double s, double t) { return std::abs(t - s) <= force_.closest(t); };
+  times.erase(std::unique(times.begin(), times.end(), same), times.end());
+  return times;
+}
+
+/// The smallest part of (a, b) that bisection leads to whose polynomial misses F while those of both its
+/// halves do not; a few units of round-off wide where F jumps.
+std::pair<double, double> ForceSurvey::narrow(const PathCubic& path, double a, double b) {
+  while (std::abs(b - a) > force_.closest(b)) {
+    const double middle = 0.5 * (a + b);
+    const double left = force_.fit(path, a, middle, 8, {}), right = force_.fit(path, middle, b, 8, {});
+    if (left <= 1.0 && right <= 1.0) break;
+    (left > right ? b : a) = middle;
+  }
+  return {a, b};
+}
+
+/// Divides (a, b), whose polynomial misses F, into parts that do not.
+void ForceSurvey::divide(const PathCubic& path, double a, double b, const std::vector<double>& known,
+                         ForceSurveyReport& report) {
+  std::vector<std::pair<double, double>> cuts;  // ends of parts, and beginnings of those that follow
+  for (const double t : known) {
+    const double gap = std::copysign(force_.closest(t), b - a);
+    if ((t - a) / gap > 2.0 && (b - t) / gap > 2.0) cuts.emplace_back(t - gap, t + gap);
+  }
+  if (cuts.empty()) {
+    const auto [low, high] = narrow(path, a, b);
+    const double middle = 0.5 * (low + high), width = std::abs(high - low);
+    if (width <= widest_gap * force_.closest(b))
+      cuts.emplace_back(low, high);
+    else if (width < std::abs(b - a) / 64.0)
+      cuts.emplace_back(middle, middle);
+    else
+      cuts.emplace_back(0.5 * (a + b), 0.5 * (a + b));
+  }
+  double from = a;
+  cuts.emplace_back(b, b);
+  for (const auto& [to, next] : cuts) {
+    const double part_from = from;
+    from = next;
+    if (!((to - part_from) * (b - a) > 0.0)) continue;
+    if (++parts_ > most_parts || force_.readings() > most_readings / std::max(1L, size_ / 16)) {
+      report.followed = false;
+      return;
+    }
+    const long points = std::max(
+        8L, static_cast<long>(static_cast<double>(points_) * std::abs(to - part_from) / force_.span()));
+    const double part = force_.fit(path, part_from, to, points, {});
+    if (part > 1.0 && std::abs(to - part_from) > widest_gap * force_.closest(to))
+      divide(path, part_from, to, {}, report);
+    else
+      report.stretches.push_back({part_from, to});
+    if (!report.followed) return;
+  }
+}
+
+/// Adds what the polynomial of (a, b) misses of F in its parts: the difference in the middle of each times
+/// its length.
+void ForceSurvey::count_missed(const PathCubic& path, double a, double b, std::size_t first,
+                               ForceSurveyReport& report) {
+  force_.fit(path, a, b, 0, {});
+  double missed = 0.0, most = 0.0, time = a;
+  for (std::size_t k = first; k < report.stretches.size(); ++k) {
+    const double from = report.stretches[k].begin, to = report.stretches[k].end, t = 0.5 * (from + to);
+    const double here = force_.miss(path, t) * std::abs(to - from);
+    missed += here;
+    if (here > most) {
+      most = here;
+      time = t;
+    }
+  }
+  if (!report.followed) missed = HUGE_VAL;
+  if (most > most_missed_) {
+    most_missed_ = most;
+    report.time = time;
+  }
+  report.missed += missed;
+}
+
+void ForceSurvey::examine(const PathCubic& path, double a, double b, ForceSurveyReport& report) {
+  const std::vector<double> known = known_times(path, a, b);
+  const auto share = static_cast<double>(points_) * std::abs(b - a) / force_.span();
+  if (force_.fit(path, a, b, std::max(4L, static_cast<long>(share)), known) <= 1.0) {
+    if (whole_)
+      report.stretches.back().end = b;
+    else
+      report.stretches.push_back({a, b});
+    whole_ = true;
+    return;
+  }
+  const std::size_t first = report.stretches.size();
+  whole_ = false;
+  divide(path, a, b, known, report);
+  count_missed(path, a, b, first, report);
+}
+
+ForceSurveyReport ForceSurvey::along(const std::vector<PathPoint>& path, long parts) {
+  ForceSurveyReport report;
+  const double start = path.front().time, end = path.back().time;
+  points_ =
+      force_.smooth() ? points_of_smooth : std::max(fewest_points, all_points / std::max(1L, size_ / 4));
+  parts_ = 0;
+  most_missed_ = 0.0;
+  whole_ = false;
+  if (kinks_) instants_ = kinks_->instants(std::min(start, end), std::max(start, end));
+  force_.find_scales(path);
+  double gap = 0.0;  // at the beginning of the next step
+  for (std::size_t k = 0; k + 1 < path.size() && report.followed; ++k) {
+    const PathCubic cubic{path[k], path[k + 1]};
+    const double a = cubic.begin(), b = cubic.end();
+    if (std::abs(b - a) <= (2.0 + widest_gap) * force_.closest(b)) {
+      whole_ = false;
+      continue;
+    }
+    const std::size_t first = report.stretches.size();
+    for (long part = 0; part < parts && report.followed; ++part) {
+      const double from = static_cast<double>(part) / static_cast<double>(parts),
+                   to = static_cast<double>(part + 1) / static_cast<double>(parts);
+      examine(cubic, part == 0 ? a : a + from * (b - a), part + 1 == parts ? b : a + to * (b - a), report);
+    }
+    if (gap != 0.0 && first < report.stretches.size()) report.stretches[first].begin += gap;
+    gap = 0.0;
+    if (!report.followed || k + 2 >= path.size()) continue;
+    const PathCubic next{path[k + 1], path[k + 2]};
+    if (std::abs(next.end() - b) <= (2.0 + widest_gap) * force_.closest(b) || !force_.jumps(cubic, next))
+      continue;
+    gap = std::copysign(force_.closest(b), b - a);
+    report.stretches.back().end -= gap;
+    whole_ = false;
+    report.missed = HUGE_VAL;
+    report.time = b;
+  }
+  return report;
+}
+
+}  // namespace diracstep

@@ -1,0 +1,286 @@
+#include <algorithm>
+#include <cmath>
+#include <diracstep/core/adaptive/refinement_search.hpp>
+#include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/numerics/scales.hpp>
+#include <diracstep/core/runs/node_check.hpp>
+#include <utility>
+
+namespace diracstep::detail {
+
+namespace {
+
+constexpr int max_failures = 12;  // of runs in a row
+constexpr int max_divisions = 6;
+constexpr std::size_t max_runs = 60;
+constexpr long fewest_steps = 4;        // of a run with variable steps that counts
+constexpr double missed_allowed = 0.1;  // by the forces surveyed, in parts of the error asked for
+constexpr long nodes_between_looks = 64;
+
+double relative_change(const Vector& a, const Vector& b) {
+  const double size = max_norm(b), change = max_norm(a - b);
+  return size > 1e-14 ? change / size : change;
+}
+
+double relative_change(const Sample& a, const Sample& b) {
+  return std::max(relative_change(a.q, b.q), relative_change(a.p, b.p));
+}
+
+std::string text(double value) { return to_text(value, 3); }
+
+/// Explicit steps solve nothing.
+long effort(const ErrorControlRun& run) { return std::max(run.solves, run.steps); }
+
+}  // namespace
+
+RefinementSearch::RefinementSearch(const Motion& motion, ErrorControlReport& report, double first)
+    : motion_(motion),
+      report_(report),
+      convergence_(report.order, motion.options.error),
+      first_(first),
+      eps_step_(std::copysign(first, motion.end - motion.scene->start.time)) {
+  if (!report.adaptive) plan_ = StepPlan(known_stretches(*motion.scene, motion.end), first);
+}
+
+ErrorControlReport::Steps RefinementSearch::steps_of(long refinement) const {
+  ErrorControlReport::Steps steps;
+  steps.integrator = motion_.options.integrator;
+  steps.integrator.method = report_.method;
+  steps.integrator.order = report_.order;
+  steps.integrator.compensated_sums = report_.compensated_sums;
+  steps.refinement = refinement;
+  if (report_.adaptive) {
+    steps.integrator.step = eps_step_;
+    steps.variable = {.eps = first_ / static_cast<double>(refinement),
+                      .control = motion_.options.control,
+                      .monitor = motion_.options.monitor,
+                      .scales = motion_.scales,
+                      .end = motion_.end};
+  } else {
+    steps.plan = plan_;
+    steps.integrator.step = plan_.first_step(refinement);
+  }
+  return steps;
+}
+
+bool RefinementSearch::reached_end(double t) const {
+  return std::abs(t - motion_.end) <= 1e-9 * std::abs(motion_.end - motion_.scene->start.time);
+}
+
+bool RefinementSearch::time_is_up() const {
+  return std::chrono::duration<double>(Clock::now() - motion_.started).count() > motion_.options.max_time;
+}
+
+/// Whether there will be no further run, which is then told.
+bool RefinementSearch::stopped(long max_solves) {
+  double expected = static_cast<double>(std::max(report_.work.solves, report_.work.steps));
+  if (!report_.runs.empty()) {
+    const ErrorControlRun& last = report_.runs.back();
+    expected += static_cast<double>(effort(last) * refinement_) / static_cast<double>(last_refinement_);
+  }
+  const double limit = static_cast<double>(max_solves);
+  const double needed = predicted_solves();
+  if (ended_ || (motion_.options.go_on && !motion_.options.go_on()))
+    refuse("interrupted");
+  else if (time_is_up())
+    refuse("the time of " + text(motion_.options.max_time) + " s is used up (--max-time)");
+  else if (expected > limit)
+    refuse("the next run would bring the work to " + text(expected) +
+           " nonlinear systems or explicit steps (--max-solves)");
+  else if (convergence_.runs() >= 5 && needed > limit)
+    refuse("at the rate of the runs so far it would take about " + text(needed) +
+           " nonlinear systems or explicit steps (--max-solves)");
+  else if (report_.runs.size() >= max_runs)
+    refuse("no convergence in " + std::to_string(max_runs) + " runs");
+  else
+    return false;
+  return true;
+}
+
+double RefinementSearch::predicted_solves() const {
+  if (report_.runs.empty()) return 0.0;
+  return convergence_.work_to_go() * static_cast<double>(effort(report_.runs.back()));
+}
+
+void RefinementSearch::count(ErrorControlRun& now, const Work& work) {
+  now.steps = work.steps;
+  now.solves = work.solves;
+  report_.work.steps += work.steps;
+  report_.work.solves += work.solves;
+  report_.work.iterations += work.iterations;
+  report_.work.residual_evaluations += work.residual_evaluations;
+  report_.work.jacobian_evaluations += work.jacobian_evaluations;
+}
+
+RefinementSearch::Outcome RefinementSearch::run(long refinement) {
+  ErrorControlRun& now = report_.runs.emplace_back();
+  const ErrorControlReport::Steps steps = steps_of(refinement);
+  now.step = report_.adaptive ? steps.variable.eps : std::abs(plan_.mean_step(refinement));
+  last_refinement_ = refinement;
+  Sample end;
+  Work work;
+  long nodes = 0;
+  SolveReport read_end;
+  NodeCheck rest(*motion_.scene, 0, true);
+  Sample node;
+  const auto at_node = [&](const ReadNode& read, bool last) {
+    if (!last && rest.wants(nodes) && read(Momentum::projected, node).ok()) rest.see(nodes, node);
+    if (last) read_end = read(Momentum::projected, end);
+    if (++nodes % nodes_between_looks != 0) return true;
+    ended_ = motion_.options.go_on && !motion_.options.go_on();
+    return !ended_ && !time_is_up();
+  };
+  const StepReport done = run_steps_of(motion_.scene, motion_.registry, motion_.solvers, steps,
+                                       report_.adaptive, motion_.end, work, at_node);
+  count(now, work);
+  now.failure = done.failure;
+  if (now.failure.empty() && end.q.size() == 0) {
+    now.failure = ended_          ? "interrupted"
+                  : read_end.ok() ? "not finished in time"
+                                  : std::string("reading the end: ") + describe(read_end.status);
+    return read_end.ok() ? Outcome::ended : Outcome::failed;
+  }
+  if (now.failure.empty() && !(end.q.allFinite() && end.p.allFinite())) now.failure = "the end is not finite";
+  if (!now.failure.empty()) return Outcome::failed;
+  const bool first = convergence_.runs() == 0;
+  if (report_.adaptive && (work.steps < fewest_steps || work.steps <= last_steps_)) {
+    now.failure = work.steps < fewest_steps ? "too few steps to prove anything" : "no more steps than before";
+    return Outcome::does_not_count;
+  }
+  last_steps_ = work.steps;
+  frozen_ = rest.text();
+  if (first) first_good_ = refinement;
+  if (!first) now.difference = relative_change(end, report_.end);
+  convergence_.add(now.step, now.difference);
+  now.estimate = convergence_.estimate();
+  now.observed_order = convergence_.observed_order();
+  report_.end = std::move(end);
+  report_.step = report_.adaptive ? now.step : plan_.mean_step(refinement);
+  report_.steps = steps;
+  report_.estimate = now.estimate;
+  report_.observed_order = now.observed_order;
+  return Outcome::counts;
+}
+
+/// One run more; false where the search has come to its end.
+bool RefinementSearch::next(long max_solves) {
+  if (stopped(max_solves)) return false;
+  switch (run(refinement_)) {
+    case Outcome::ended:
+      return !stopped(max_solves);
+    case Outcome::failed:
+      if (++failures_ > max_failures)
+        return refuse("a run failed even with the step " + text(report_.runs.back().step) + ": " +
+                      report_.runs.back().failure);
+      [[fallthrough]];
+    case Outcome::does_not_count:
+      refinement_ *= 2;
+      return true;
+    case Outcome::counts:
+      failures_ = 0;
+  }
+  if (convergence_.accepted()) {
+    if (!survey(true)) return report_.refusal.empty();
+    accept();
+    return false;
+  }
+  if (convergence_.runs() >= 4 && !convergence_.order_confirmed() && !surveyed_ && !survey(false))
+    return report_.refusal.empty();
+  if (convergence_.stagnates() && (convergence_.runs() > 8 || convergence_.difference() < 1e-4))
+    return refuse(convergence_.obstacle());
+  const double next = static_cast<double>(refinement_) / convergence_.next_factor();
+  refinement_ = std::max(refinement_ + 1, std::lround(next));
+  return true;
+}
+
+bool RefinementSearch::measure(long max_solves) {
+  while (convergence_.runs() < 3)
+    if (!next(std::min(max_solves, motion_.options.max_solves))) break;
+  return convergence_.runs() >= 3;
+}
+
+void RefinementSearch::go() {
+  while (report_.refusal.empty() && !accepted_ && next(motion_.options.max_solves)) {
+  }
+}
+
+/// Points of a run that got to the end, for the survey: the run again, with its nodes read.
+std::vector<PathPoint> RefinementSearch::path_of(long refinement) {
+  std::vector<PathPoint> path;
+  Work work;
+  Sample point;
+  const auto& stretches = plan_.stretches();
+  std::size_t stretch = 0;
+  long left = report_.adaptive ? -1 : stretches.front().steps * refinement;
+  const auto at_node = [&](const ReadNode& read, bool) {
+    if (!read(Momentum::projected, point).ok()) return false;
+    path.push_back({point.time, point.q, point.v});
+    if (path.size() > 1 && --left == 0 && ++stretch < stretches.size()) {
+      left = stretches[stretch].steps * refinement;
+      if (stretches[stretch].begin != point.time)
+        path.push_back({stretches[stretch].begin, point.q, point.v});
+    }
+    return !time_is_up();
+  };
+  (void)run_steps_of(motion_.scene, motion_.registry, motion_.solvers, steps_of(refinement), report_.adaptive,
+                     motion_.end, work, at_node);
+  report_.work.solves += work.solves;
+  return path;
+}
+
+/// Looks for what the steps of the last run do not resolve, before it is accepted or because the runs do not
+/// converge.  False where the motion is divided anew or the
+/// search is refused.
+bool RefinementSearch::survey(bool accepted) {
+  surveyed_ = true;
+  // A coarse run shows the way; after a division a fine one, for the place of a kink depends on the motion.
+  const long way = divisions_ == 0 ? first_good_ : refinement_;
+  const std::vector<PathPoint> path = path_of(way);
+  if (path.size() < 2 || !reached_end(path.back().time))
+    return refuse("the time was used up before the forces along the motion were surveyed (--max-time)");
+  ForceSurvey forces(*motion_.scene, motion_.options.error);
+  const long parts = std::max(1L, std::lround(static_cast<double>(refinement_) / static_cast<double>(way)));
+  const ForceSurveyReport found = forces.along(path, parts);
+  if (found.missed <= missed_allowed * motion_.options.error) return true;
+  fast_ = "the force changes fast near t = " + to_text(found.time);
+  if (!accepted && (!found.followed || report_.adaptive)) return true;  // finer steps may do
+  if (!found.followed)
+    refuse(fast_ + " and on much of the motion: steps that follow it would be too many");
+  else if (report_.adaptive)
+    refuse(fast_ + ", and variable steps cannot be divided there; use fixed ones (--fixed)");
+  else if (++divisions_ > max_divisions)
+    refuse(fast_ + "; dividing the motion there " + std::to_string(max_divisions) +
+           " times did not resolve it to the error asked for");
+  else
+    divide(found);
+  return false;
+}
+
+void RefinementSearch::divide(const ForceSurveyReport& found) {
+  plan_ = StepPlan(found.stretches, first_);
+  convergence_.clear();
+  report_.estimate = report_.observed_order = std::nan("");
+  refinement_ = 1;
+  last_steps_ = 0;
+  surveyed_ = false;
+  report_.division = fast_ + ": the steps are divided there, into " +
+                     std::to_string(plan_.stretches().size()) + " stretches";
+}
+
+void RefinementSearch::accept() {
+  accepted_ = true;
+  if (!frozen_.empty()) report_.warning = frozen_;
+  report_.estimate = convergence_.estimate();
+  report_.observed_order = convergence_.observed_order();
+}
+
+/// Ends the search, for which false stands.
+bool RefinementSearch::refuse(const std::string& why) {
+  report_.refusal = "error " + text(motion_.options.error) + " not reached: " + why;
+  if (!fast_.empty() && why.find(fast_) == std::string::npos) report_.refusal += "; " + fast_;
+  if (convergence_.runs() > 1)
+    report_.refusal += "; the best answer so far has an estimated error of " + text(report_.estimate);
+  return false;
+}
+
+}  // namespace diracstep::detail

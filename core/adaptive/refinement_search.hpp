@@ -1,0 +1,63 @@
+#pragma once
+
+#include <chrono>
+#include <diracstep/core/adaptive/convergence.hpp>
+#include <diracstep/core/adaptive/error_control.hpp>
+#include <diracstep/core/adaptive/force_survey.hpp>
+#include <diracstep/core/adaptive/search_run.hpp>
+
+namespace diracstep::detail {
+
+/// Repeats one motion with finer and finer steps of one kind, fixed or variable.
+class RefinementSearch {
+ public:
+  using Clock = std::chrono::steady_clock;
+  struct Motion {
+    std::shared_ptr<const Scene> scene;
+    const Registry& registry;
+    const SolverFactory& solvers;
+    double end;
+    const ErrorControlOptions& options;
+    MonitorScales scales;
+    Clock::time_point started;
+  };
+
+  /// `report` has the method and the kind of steps; the coarsest run has steps of `first`, or eps.
+  RefinementSearch(const Motion& motion, ErrorControlReport& report, double first);
+
+  /// To the first estimate, with at most so many solves; false where there is none.
+  bool measure(long max_solves);
+  /// To the error asked for or a refusal; goes on after measure().
+  void go();
+  /// Solves that a run needs which meets the error, by the last estimate.
+  double predicted_solves() const;
+
+ private:
+  enum class Outcome { counts, does_not_count, failed, ended };
+  bool next(long max_solves);
+  Outcome run(long refinement);
+  ErrorControlReport::Steps steps_of(long refinement) const;
+  void count(ErrorControlRun& now, const Work& work);
+  bool time_is_up() const;
+  bool reached_end(double t) const;
+  bool stopped(long max_solves);
+  bool survey(bool accepted);
+  std::vector<PathPoint> path_of(long refinement);
+  void divide(const ForceSurveyReport& found);
+  void accept();
+  bool refuse(const std::string& why);
+
+  const Motion& motion_;
+  ErrorControlReport& report_;
+  Convergence convergence_;
+  StepPlan plan_;
+  double first_;
+  double eps_step_ = 0.0;  ///< of the options of variable steps, with its sign
+  long refinement_ = 1, last_steps_ = 0, last_refinement_ = 1, first_good_ = 0;
+  int failures_ = 0, divisions_ = 0;
+  bool surveyed_ = false, ended_ = false, accepted_ = false;
+  std::string fast_;    ///< empty, or where the forces change fast
+  std::string frozen_;  ///< empty, or what does not move while a force acts on it
+};
+
+}  // namespace diracstep::detail

@@ -1,0 +1,59 @@
+#include <cmath>
+#include <diracstep/core/adaptive/search_run.hpp>
+
+namespace diracstep::detail {
+
+namespace {
+
+StepReport run_fixed(Integrator& integrator, const ErrorControlReport::Steps& steps, const AtNode& at_node) {
+  const ReadNode read = [&](Momentum momentum, Sample& sample) {
+    return integrator.sample(momentum, sample);
+  };
+  if (!at_node(read, false)) return {};
+  long left = steps.plan.steps() * steps.refinement;
+  return steps.plan.run(integrator, steps.refinement, [&] { return at_node(read, --left == 0); });
+}
+
+StepReport run_variable(AdaptiveIntegrator& integrator, double end, const AtNode& at_node) {
+  const ReadNode read = [&](Momentum momentum, Sample& sample) {
+    return integrator.sample(momentum, sample);
+  };
+  for (;;) {
+    const double left = end - integrator.time(), size = integrator.next_size();
+    if (!at_node(read, false)) return {};
+    if (std::abs(size) >= std::abs(left) * (1.0 - 1e-12)) break;
+    const StepReport report = integrator.step();
+    if (!report.ok()) return report;
+  }
+  StepReport report;
+  const ReadNode read_end = [&](Momentum momentum, Sample& sample) {
+    report = integrator.sample_at(end, momentum, sample);
+    return report.solve;
+  };
+  at_node(read_end, true);
+  return report;
+}
+
+}  // namespace
+
+StepReport run_steps_of(const std::shared_ptr<const Scene>& scene, const Registry& registry,
+                        const SolverFactory& solvers, const ErrorControlReport::Steps& steps, bool adaptive,
+                        double end, Work& work, const AtNode& at_node) {
+  StepReport report;
+  if (adaptive) {
+    AdaptiveIntegrator integrator(scene, registry, solvers, steps.integrator, steps.variable);
+    report = run_variable(integrator, end, at_node);
+    work = integrator.work();
+    work.solves += integrator.side_work().solves;
+    work.iterations += integrator.side_work().iterations;
+    work.residual_evaluations += integrator.side_work().residual_evaluations;
+    work.jacobian_evaluations += integrator.side_work().jacobian_evaluations;
+  } else {
+    Integrator integrator(scene, registry, solvers, steps.integrator);
+    report = run_fixed(integrator, steps, at_node);
+    work = integrator.work();
+  }
+  return report;
+}
+
+}  // namespace diracstep::detail

@@ -1,0 +1,53 @@
+#pragma once
+
+#include <diracstep/core/integrator/integrator.hpp>
+#include <functional>
+#include <vector>
+
+namespace diracstep {
+
+/// Part of a motion that is stepped evenly.
+struct Stretch {
+  double begin = 0.0, end = 0.0;
+  long steps = 1;  ///< of the coarsest run
+};
+
+/// The whole motion, divided where the time alone makes a function of the scene switch, as far as its
+/// formulas show (Scene::kinks).
+std::vector<Stretch> known_stretches(const Scene& scene, double end);
+
+/// How a motion is divided into steps of given size: nodes that every run has, where forces switch or change
+/// fast, and between them a number of even steps that rises from run to run by one factor for all stretches,
+/// so that the runs have an order.
+///
+/// Between two stretches a gap of a few units of round-off in t may lie, at an instant where a force jumps:
+/// no step then reads the force on both of its sides.
+class StepPlan {
+ public:
+  StepPlan() = default;
+  /// One stretch, with steps of about `step`, without sign.
+  StepPlan(double start, double end, double step) : StepPlan(std::vector<Stretch>{{start, end}}, step) {}
+  /// The stretches, in order; their numbers of steps are set here.
+  StepPlan(std::vector<Stretch> stretches, double step);
+
+  const std::vector<Stretch>& stretches() const { return stretches_; }
+  bool even() const { return stretches_.size() == 1; }
+  long steps() const { return steps_; }  ///< of the coarsest run
+  /// The first step of a run, with its sign.
+  double first_step(long refinement) const { return step_in(stretches_.front(), refinement); }
+  /// The mean step of a run, with its sign.
+  double mean_step(long refinement) const;
+
+  /// Steps through the motion; `at_node` is called after each step and ends the run with false.
+  StepReport run(Integrator& integrator, long refinement, const std::function<bool()>& at_node) const;
+
+ private:
+  static double step_in(const Stretch& stretch, long refinement) {
+    return (stretch.end - stretch.begin) / static_cast<double>(stretch.steps * refinement);
+  }
+
+  std::vector<Stretch> stretches_;
+  long steps_ = 0;
+};
+
+}  // namespace diracstep

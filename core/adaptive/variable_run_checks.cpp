@@ -1,0 +1,38 @@
+#include <diracstep/core/adaptive/variable_run_checks.hpp>
+
+namespace diracstep {
+
+namespace {
+
+constexpr long steps_for_a_look = 20;  // of the first; each next one comes after twice as many steps
+constexpr long most_steps_for_a_look = 600;
+
+}  // namespace
+
+void VariableRunChecks::before_step() {
+  const long step = integrator_.work().steps;
+  if (nodes_.wants(step) && integrator_.sample(Momentum::projected, node_).ok()) nodes_.see(step, node_);
+  looking_ = step == next_look_ && integrator_.sample(Momentum::projected, start_).ok();
+}
+
+bool VariableRunChecks::halve(double size) {
+  side_.restart(start_.time, start_.q, start_.p, start_.v);
+  return side_.step(0.5 * size).ok() && side_.step(0.5 * size).ok() &&
+         side_.sample(Momentum::projected, halves_).ok();
+}
+
+void VariableRunChecks::after_step() {
+  if (!looking_) return;
+  next_look_ += std::min(most_steps_for_a_look, std::max(steps_for_a_look, next_look_));
+  if (!integrator_.sample(Momentum::projected, whole_).ok()) return;
+  const double size = whole_.time - start_.time;
+  if (halve(size)) comparison_.add(start_, size, whole_, halves_);
+}
+
+std::string VariableRunChecks::text() const {
+  const Scene& scene = integrator_.integrator().scene();
+  return joined_doubts(
+      {energy_.text(), comparison_.text(), nodes_.text(), scene.doubt ? scene.doubt() : std::string()});
+}
+
+}  // namespace diracstep

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <diracstep/core/adaptive/adaptive_integrator.hpp>
+#include <diracstep/core/runs/energy_check.hpp>
+#include <diracstep/core/runs/node_check.hpp>
+#include <diracstep/core/runs/run_checks.hpp>
+#include <diracstep/core/runs/step_comparison.hpp>
+
+namespace diracstep {
+
+/// What RunChecks does, for variable steps: the energy at the points shown, and at the nodes that are asked
+/// for steps beside their halves, alternating values and frozen momenta.  Steps are halved by the side
+/// integrator of one's own, so that the main sequence keeps its bits.
+class VariableRunChecks {
+ public:
+  /// The integrator must outlive this.
+  VariableRunChecks(AdaptiveIntegrator& integrator, Integrator side)
+      : integrator_(integrator),
+        side_(std::move(side)),
+        energy_(integrator.integrator().scene()),
+        nodes_(integrator.integrator().scene(), 0) {}
+
+  void before_step();
+  void after_step();
+  void see(const Sample& point) { energy_.see(point); }
+
+  /// Empty, or the doubts, one after the other.
+  std::string text() const;
+
+ private:
+  bool halve(double size);
+
+  AdaptiveIntegrator& integrator_;
+  Integrator side_;
+  EnergyCheck energy_;
+  NodeCheck nodes_;
+  StepComparison comparison_;
+  long next_look_ = 1;
+  bool looking_ = false;
+  Sample node_, start_, whole_, halves_;
+};
+
+}  // namespace diracstep

@@ -1,0 +1,111 @@
+#include <algorithm>
+#include <cmath>
+#include <diracstep/core/numerics/scales.hpp>
+#include <diracstep/core/runs/node_check.hpp>
+#include <sstream>
+
+namespace diracstep {
+
+namespace {
+
+constexpr long steps_for_a_window = 600, fewest_windows = 3;
+constexpr double lasting = 0.5;      // an alternation that falls faster from node to node dies out
+constexpr double smallest = 1e-6;    // in parts of the component, and of forces that cancel
+constexpr double negligible = 1e-9;  // of a component beside the largest
+constexpr double frozen = 1e-3;
+
+}  // namespace
+
+NodeCheck::NodeCheck(const Scene& scene, long steps, bool only_rest)
+    : scene_(scene),
+      rows_(scene.constraints, scene.dimension()),
+      only_rest_(only_rest),
+      growing_(steps == 0),
+      between_(growing_ ? 2L * window
+                        : std::clamp(steps / fewest_windows, static_cast<long>(window), steps_for_a_window)) {
+}
+
+void NodeCheck::see(long step, const Sample& node) {
+  nodes_[seen_++] = node;
+  if (seen_ < window) return;
+  seen_ = 0;
+  first_ = step + between_ - static_cast<long>(window) + 1;
+  if (growing_) between_ = std::min(2 * between_, steps_for_a_window);
+  if (text_.empty()) judge();
+}
+
+void NodeCheck::judge() {
+  look_for_rest();
+  if (only_rest_) return;
+  look_for_alternation("velocity", &Sample::v, scene_.coordinates);
+  look_for_alternation("momentum", &Sample::p, scene_.coordinates);
+  look_for_alternation("multiplier", &Sample::lambda, scene_.row_names());
+}
+
+void NodeCheck::look_for_alternation(const char* what, Vector Sample::*column,
+                                     const std::vector<std::string>& names) {
+  double largest = 0.0;
+  for (const Sample& node : nodes_) largest = std::max(largest, max_norm(node.*column));
+  for (std::size_t i = 0; i < names.size() && text_.empty(); ++i) {
+    const auto component = [&](std::size_t k) { return (nodes_[k].*column)[static_cast<Eigen::Index>(i)]; };
+    double last = component(1) - component(0), size = std::abs(component(0));
+    bool alternates = true;
+    for (std::size_t k = 2; k < window && alternates; ++k) {
+      const double change = component(k) - component(k - 1);
+      alternates = change * last < 0.0 && std::abs(change) > lasting * std::abs(last);
+      last = change;
+      size = std::max(size, std::abs(component(k)));
+    }
+    if (!alternates || !(std::abs(last) > smallest * size) || !(size > negligible * largest)) continue;
+    std::ostringstream text;
+    text << "the " << what << " of " << names[i]
+         << " alternates from step to step near t = " << nodes_.back().time
+         << ": something is damped or turns faster than the steps follow; take smaller steps";
+    text_ = text.str();
+  }
+}
+
+/// F = ∂L/∂q + f + AᵀΛ and the sum of the sizes of its terms.
+void NodeCheck::add_force(const Sample& node, Vector& force, Vector& terms) {
+  const Eigen::Index n = scene_.dimension();
+  Vector momentum(n);
+  force.resize(n);
+  scene_.lagrangian->gradient(node.time, node.q, node.v, force, momentum);
+  terms = force.cwiseAbs();
+  if (scene_.force) {
+    scene_.force->value(node.time, node.q, node.v, momentum);
+    force += momentum;
+    terms += momentum.cwiseAbs();
+  }
+  if (rows_.rows() == 0) return;
+  rows_.evaluate(node.time, node.q);
+  rows_.add_annihilator(node.lambda, force);
+  const Vector sizes = rows_.coefficients().cwiseAbs(), multipliers = node.lambda.cwiseAbs();
+  rows_.pattern().transposed_multiply_add(sizes.data(), multipliers.data(), terms.data(), 1.0);
+}
+
+void NodeCheck::look_for_rest() {
+  const Eigen::Index n = scene_.dimension();
+  Vector changes = Vector::Zero(n), impulses = changes, all = changes, force, terms;
+  for (std::size_t k = 0; k + 1 < window; ++k) {
+    const double h = std::abs(nodes_[k + 1].time - nodes_[k].time);
+    add_force(nodes_[k], force, terms);
+    if (!force.allFinite()) return;
+    changes += (nodes_[k + 1].p - nodes_[k].p).cwiseAbs();
+    impulses += h * force.cwiseAbs();
+    all += h * terms;
+  }
+  for (Eigen::Index i = 0; i < n && text_.empty(); ++i) {
+    const double noise = at_rest * std::abs(nodes_.back().p[i]);
+    if (!(impulses[i] > smallest * all[i]) || !(impulses[i] > noise)) continue;
+    if (!(changes[i] < frozen * impulses[i])) continue;
+    std::ostringstream text;
+    text << "near t = " << nodes_.back().time << " the momentum of "
+         << scene_.coordinates[static_cast<std::size_t>(i)] << " stays at " << nodes_.back().p[i]
+         << " while a force acts on it whose impulse in these steps is " << impulses[i]
+         << ": the motion is frozen";
+    text_ = text.str();
+  }
+}
+
+}  // namespace diracstep

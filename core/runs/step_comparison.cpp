@@ -1,0 +1,62 @@
+#include <algorithm>
+#include <cmath>
+#include <diracstep/core/numerics/scales.hpp>
+#include <diracstep/core/runs/step_comparison.hpp>
+#include <sstream>
+
+namespace diracstep {
+
+namespace {
+
+constexpr double doubted_way = 0.25, doubted_change = 0.5;
+constexpr double no_change = 1e-9;  // of a velocity or momentum, in parts of its size
+constexpr long fewest_steps = 3;    // before velocities and momenta count
+
+std::string line(double time, double part, const char* of) {
+  std::ostringstream text;
+  text << "two half steps from t = " << time << " end " << std::round(100.0 * part) << " % of " << of
+       << " beside the whole one: the step is too large to believe the result";
+  return text.str();
+}
+
+}  // namespace
+
+void StepComparison::Differences::add(const Vector& start, const Vector& whole, const Vector& halves,
+                                      double t) {
+  size = std::max(size, max_norm(whole));
+  way = std::max({way, max_norm(whole - start), max_norm(halves - start)});
+  const double difference = max_norm(whole - halves);
+  if (!(difference > largest)) return;
+  largest = difference;
+  time = t;
+}
+
+bool StepComparison::Differences::doubted() const {
+  return largest > doubted_change * std::max(way, no_change * size);
+}
+
+void StepComparison::add(const Sample& start, double h, const Sample& whole, const Sample& halves) {
+  ++steps_;
+  longest_way_ = std::max({longest_way_, std::abs(h) * max_norm(start.v), max_norm(whole.q - start.q),
+                           max_norm(halves.q - start.q)});
+  const double difference =
+      max_norm(whole.q - halves.q) / std::max(longest_way_, at_rest * max_norm(start.q));
+  if (difference > 0.0 && !(difference <= worst_)) {
+    worst_ = difference;
+    worst_time_ = start.time;
+  }
+  velocity_.add(start.v, whole.v, halves.v, start.time);
+  momentum_.add(start.p, whole.p, halves.p, start.time);
+}
+
+std::string StepComparison::text() const {
+  if (worst_ > doubted_way) return line(worst_time_, worst_, "the way of a step");
+  if (steps_ < fewest_steps) return {};
+  if (momentum_.doubted())
+    return line(momentum_.time, momentum_.largest / momentum_.way, "the change of the momentum");
+  if (velocity_.doubted())
+    return line(velocity_.time, velocity_.largest / velocity_.way, "the change of the velocity");
+  return {};
+}
+
+}  // namespace diracstep

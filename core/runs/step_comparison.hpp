@@ -1,0 +1,36 @@
+#pragma once
+
+#include <diracstep/core/integrator/integrator.hpp>
+#include <string>
+
+namespace diracstep {
+
+/// Compares steps with two halves of them: how far apart their ends are, in positions, velocities and
+/// momenta, measured by the longest way that such a step went so far.
+///
+/// Positions are doubted above a quarter of  max h |v|∞ : methods of order 1 stay below at h times the rate
+/// of the motion of 1, the others at more.  Velocities and momenta, whose way may be short at a turning
+/// point, are measured by the longest way of the whole run, and doubted above a half of it.
+class StepComparison {
+ public:
+  /// A step of size h from `start`, where it led, and where its halves did.  q, v and p are read.
+  void add(const Sample& start, double h, const Sample& whole, const Sample& halves);
+
+  /// Empty, or a line that names the worst step so far.
+  std::string text() const;
+  /// The largest difference of positions so far; NaN before the first.
+  double worst() const { return worst_; }
+
+ private:
+  struct Differences {
+    double largest = 0.0, way = 0.0, size = 0.0, time = 0.0;
+    void add(const Vector& start, const Vector& whole, const Vector& halves, double t);
+    bool doubted() const;
+  };
+
+  double longest_way_ = 0.0, worst_ = std::numeric_limits<double>::quiet_NaN(), worst_time_ = 0.0;
+  Differences velocity_, momentum_;
+  long steps_ = 0;
+};
+
+}  // namespace diracstep

@@ -1,0 +1,198 @@
+#include <cmath>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "run_command.hpp"
+
+/// What a run says of itself: its exit status, its doubts, and the error it states.
+namespace diracstep::testing {
+namespace {
+
+using Json = nlohmann::json;
+
+class Doubt : public Command {
+ protected:
+  /// A scene file of this text, and its path.
+  std::string scene(const std::string& name, const std::string& text) const {
+    std::ofstream(path(name + ".toml")) << "name = \"" << name << "\"\n" << text;
+    return path(name + ".toml");
+  }
+};
+
+/// A load of 1 mH and 1 kΩ at a ripple of 50 Hz with steps of 0.5 ms: R/L h = 500.
+const char* const stiff_load = R"(
+[parameters]
+c = 1e-5
+r = 1000
+[definitions]
+volt = "5 + sin(2*pi*50*t)"
+[[source_voltage]]
+name = "V"
+nodes = ["ground", "p"]
+value = "volt"
+[[capacitor]]
+name = "C"
+nodes = ["p", "ground"]
+value = "c"
+[[inductor]]
+name = "L"
+nodes = ["p", "m"]
+value = "1e-3"
+[[resistor]]
+name = "R"
+nodes = ["m", "ground"]
+value = "r"
+[start]
+qC = "5*c"
+[span]
+end = 0.013
+step = 0.0005
+)";
+
+TEST_F(Doubt, HasAnExitStatusOfItsOwn) {
+  const std::string file = scene("load", stiff_load);
+  const Outcome doubted = run("run " + file + " --json");
+  EXPECT_EQ(doubted.status, 3) << doubted.err;
+  const Json json = Json::parse(doubted.out);
+  EXPECT_EQ(json["status"], "doubted");
+  EXPECT_FALSE(json["doubt"].is_null());
+  EXPECT_EQ(run("run " + file + " --doubt ignore").status, 0);
+  const Outcome resolved = run("run " + file + " --step 5e-7 --json");
+  EXPECT_EQ(resolved.status, 0) << resolved.err;
+  EXPECT_EQ(Json::parse(resolved.out)["status"], "ok");
+  expect_misuse("run " + file + " --doubt perhaps", {"perhaps", "report", "ignore"});
+}
+
+TEST_F(Doubt, IsNotRaisedByDrivenScenes) {
+  const std::string driven = scene("driven", R"(
+lagrangian = "v_x^2/2 - x^2/2 + x*sin(2*t)"[coordinates] x = {}[start] x = 0 [span] end = 10.0 step = 0.1) ");
+      const std::string moved = scene("moved", R"(
+lagrangian = "(v_x^2+v_y^2)/2"
+[coordinates]
+x = {}
+y = {}
+[[rows]]
+equation = "x = 1 - cos(t)"[start] x = 0 [span] end = 3.0 step = 0.1) ");
+      for (const std::string& file : {driven, moved}) {
+    const Outcome outcome = run("run " + file);
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+    EXPECT_EQ(outcome.err.find("energy"), std::string::npos) << outcome.err;
+  }
+}
+
+TEST_F(Doubt, DoesNotDependOnTheOrigin) {
+  // A steep well: steps far too large, with coordinates and energies counted from elsewhere.
+  for (const char* shift : {"0", "1e6"}) {
+    const std::string file = scene("well", R"(
+lagrangian = "v_x^2/2 - (x - s)^4/4 - 1000*s"
+[coordinates]
+x = {}
+[parameters]
+s = )" + std::string(shift) + R"(
+[start]
+x = "s + 1"
+v_x = 3
+[span]
+end = 200
+step = 2
+)");
+    const Outcome outcome = run("run " + file + " --method type1/trapezoidal");
+    EXPECT_NE(outcome.status, 0) << shift << outcome.err;
+  }
+}
+
+TEST_F(Doubt, AnErrorThatEqualRunsWouldStateIsNotStated) {
+  const Outcome outcome = run("run vertical_rolling_disk --end 1 --step 10 --error 1e-6 --json");
+  const Json json = Json::parse(outcome.out);
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_LT(json["error_q"].get<double>(), 1e-6);
+  EXPECT_TRUE(json["error_control"]["estimate"].is_number());
+  long last = 0;
+  for (const Json& one : json["error_control"]["runs"]) {
+    EXPECT_GT(one["steps"].get<long>(), last);
+    last = one["steps"];
+  }
+}
+
+TEST_F(Doubt, TheFileHoldsTheAcceptedRun) {
+  for (const char* options : {"pendulum_cartesian --error 1e-7", "kepler_e099 --error 1e-6",
+                              "knife_edge --error 1e-6 --rule midpoint --method type1/trapezoidal"}) {
+    const Outcome stated = run(std::string("run ") + options + " --json");
+    ASSERT_EQ(stated.status, 0) << stated.err;
+    const Json end = Json::parse(stated.out)["end"];
+    ASSERT_EQ(run(std::string("run ") + options + " --out " + path("run.csv")).status, 0);
+    const auto rows = lines(contents(path("run.csv")));
+    const auto names = fields(rows.front()), values = fields(rows.back());
+    for (std::size_t i = 0; i < names.size(); ++i)
+      if (end["q"].contains(names[i])) {
+        EXPECT_EQ(std::stod(values[i]), end["q"][names[i]].get<double>()) << options << ' ' << names[i];
+      }
+  }
+}
+
+TEST_F(Doubt, FixedStepsCanBeAskedFor) {
+  const Outcome fixed = run("run chaplygin_sleigh --error 1e-5 --fixed --json");
+  ASSERT_EQ(fixed.status, 0) << fixed.err;
+  EXPECT_EQ(Json::parse(fixed.out)["error_control"]["adaptive"], false);
+  expect_misuse("run kepler_e06 --error 1e-5 --fixed --adaptive", {"--fixed", "--adaptive"});
+}
+
+TEST_F(Doubt, TheWorkIsLimitedAndTheBestAnswerShown) {
+  const Outcome outcome = run("run kepler_e06 --error 1e-9 --method type1/midpoint --max-solves 3000 --json");
+  EXPECT_EQ(outcome.status, 1);
+  const Json json = Json::parse(outcome.out);
+  EXPECT_NE(json["status"].get<std::string>().find("--max-solves"), std::string::npos);
+  EXPECT_TRUE(json["end"].is_object());
+  EXPECT_TRUE(json["error_control"]["estimate"].is_number());
+  const Outcome late = run("run toda_200 --end 1e5 --error 1e-9 --max-time 0.5 --json");
+  EXPECT_EQ(late.status, 1);
+  EXPECT_NE(late.err.find("--max-"), std::string::npos) << late.err;
+}
+
+TEST_F(Doubt, VariableStepsFromRestEnd) {
+  for (const char* force : {"t", "t^4"}) {
+    const std::string file =
+        scene("ramp", "lagrangian = \"v_x^2/2\"\n[coordinates]\nx = {}\n[force]\nx = \"" +
+                          std::string(force) + "\"\n[start]\nx = 0\n[span]\nend = 2.0\nstep = 0.1\n");
+    const Outcome outcome = run("run " + file + " --adaptive --json", "timeout 20");
+    ASSERT_EQ(outcome.status, 0) << force << outcome.err;
+    const double exact = std::string(force) == "t" ? 8.0 / 6.0 : 64.0 / 30.0;
+    EXPECT_NEAR(Json::parse(outcome.out)["end"]["q"]["x"].get<double>(), exact, 1e-6);
+  }
+  const Outcome limited = run("run kepler_e099 --adaptive --max-steps 10");
+  EXPECT_EQ(limited.status, 1);
+  EXPECT_NE(limited.err.find("10 steps did not reach the end"), std::string::npos) << limited.err;
+}
+
+TEST_F(Doubt, InvariantsAreShownAndCompared) {
+  const std::string file = scene("spin", R"(
+lagrangian = "(v_x^2 + v_y^2)/2 - (x^2 + y^2)/2"
+[coordinates]
+x = {}
+y = {}
+[start]
+x = 1
+v_y = 0.5
+[span]
+end = 1
+step = 0.1
+[invariants.spin]
+formula = "x*v_y - y*v_x"
+value = 0.5
+)");
+  const Outcome outcome = run("run " + file);
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_NE(outcome.out.find("invariant spin: 0.5"), std::string::npos) << outcome.out;
+  ASSERT_EQ(run("run " + file + " --out " + path("spin.csv")).status, 0);
+  const auto rows = lines(contents(path("spin.csv")));
+  EXPECT_EQ(fields(rows.front()).back(), "invariant_spin");
+  EXPECT_NEAR(std::stod(fields(rows.back()).back()), 0.5, 1e-12);
+  std::string text = contents(file);
+  text.replace(text.find("value = 0.5"), 11, "value = 0.6");
+  const Outcome wrong = run("run " + scene("other", text.substr(text.find('\n') + 1)));
+  EXPECT_EQ(wrong.status, 3);
+  EXPECT_NE(wrong.err.find("spin"), std::string::npos) << wrong.err;
+}
+
+}  // namespace
+}  // namespace diracstep::testing
