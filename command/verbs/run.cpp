@@ -279,7 +279,8 @@ void report(const RunResult& result, const Options& options, const CatalogueScen
   session.exit_status = failed;
 }
 
-void run(const Options& options, Session& session) {
+void run(const Options& given, Session& session) {
+  Options options = given;
   require_sense(options);
   const CatalogueScene entry = make_scene(session, options.scene, parameters(options.set));
   RunResult result;
