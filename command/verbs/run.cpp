@@ -39,8 +39,8 @@ struct Options {
   std::string at;
   std::optional<double> error;
   bool fixed = false;
-  long max_solves = ErrorControlOptions{}.max_solves;
-  double max_time = ErrorControlOptions{}.max_time;
+  long max_solves = ErrorControlOptions::usual_max_solves;
+  double max_time = ErrorControlOptions::usual_max_time;
   long max_steps = AdaptiveOptions{}.max_steps;
   double smallest_step = 0.0;
   std::string doubt = "report";
@@ -195,7 +195,8 @@ IntegratorOptions run_once(const Options& options, const CatalogueScene& entry, 
 /// Finds the steps for --error.
 ErrorControlReport search(const Options& options, const CatalogueScene& entry, const Session& session,
                           double end, const IntegratorOptions& chosen) {
-  ErrorControlOptions wanted{.error = *options.error};
+  ErrorControlOptions wanted;
+  wanted.error = *options.error;
   wanted.method = options.method.name;
   wanted.order = options.method.order;
   if (options.adaptive || options.fixed) wanted.adaptive = options.adaptive;
