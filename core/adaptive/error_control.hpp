@@ -2,6 +2,7 @@
 
 #include <diracstep/core/adaptive/adaptive_integrator.hpp>
 #include <diracstep/core/adaptive/step_plan.hpp>
+#include <diracstep/core/runs/run.hpp>
 #include <functional>
 #include <limits>
 #include <memory>
