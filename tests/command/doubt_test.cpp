@@ -64,16 +64,30 @@ TEST_F(Doubt, HasAnExitStatusOfItsOwn) {
 }
 
 TEST_F(Doubt, IsNotRaisedByDrivenScenes) {
-  const std::string driven = scene("driven", R"(
-lagrangian = "v_x^2/2 - x^2/2 + x*sin(2*t)"[coordinates] x = {}[start] x = 0 [span] end = 10.0 step = 0.1) ");
-      const std::string moved = scene("moved", R"(
+  const std::string driven = scene("driven", R"toml(
+lagrangian = "v_x^2/2 - x^2/2 + x*sin(2*t)"
+[coordinates]
+x = {}
+[start]
+x = 0
+[span]
+end = 10.0
+step = 0.1
+)toml");
+  const std::string moved = scene("moved", R"toml(
 lagrangian = "(v_x^2+v_y^2)/2"
 [coordinates]
 x = {}
 y = {}
 [[rows]]
-equation = "x = 1 - cos(t)"[start] x = 0 [span] end = 3.0 step = 0.1) ");
-      for (const std::string& file : {driven, moved}) {
+equation = "x = 1 - cos(t)"
+[start]
+x = 0
+[span]
+end = 3.0
+step = 0.1
+)toml");
+  for (const std::string& file : {driven, moved}) {
     const Outcome outcome = run("run " + file);
     EXPECT_EQ(outcome.status, 0) << outcome.err;
     EXPECT_EQ(outcome.err.find("energy"), std::string::npos) << outcome.err;

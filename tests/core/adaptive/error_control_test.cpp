@@ -13,7 +13,8 @@ namespace {
 using testing::expect_misuse;
 using testing::samples_of;
 
-ErrorControlReport solve(const std::shared_ptr<const Scene>& scene, double end, ErrorControlOptions options) {
+ErrorControlReport solve(const std::shared_ptr<const Scene>& scene, double end,
+                         const ErrorControlOptions& options) {
   return solve_to_error(scene, Registry::with_built_ins(), kinsol(), end, options);
 }
 
