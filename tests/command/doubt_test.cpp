@@ -20,7 +20,7 @@ class Doubt : public Command {
 };
 
 /// A load of 1 mH and 1 kΩ at a ripple of 50 Hz with steps of 0.5 ms: R/L h = 500.
-const char* const stiff_load = R"(
+const char* const stiff_load = R"toml(
 [parameters]
 c = 1e-5
 r = 1000
@@ -47,7 +47,7 @@ qC = "5*c"
 [span]
 end = 0.013
 step = 0.0005
-)";
+)toml";
 
 TEST_F(Doubt, HasAnExitStatusOfItsOwn) {
   const std::string file = scene("load", stiff_load);

@@ -7,6 +7,10 @@
 #include "scenes.hpp"
 #include "stepping.hpp"
 
+#if defined(__GNUC__) && !defined(__clang__) && __GNUC__ < 13
+#pragma GCC diagnostic ignored "-Wmaybe-uninitialized"  // of empty functions in options, which are made empty
+#endif
+
 namespace diracstep {
 namespace {
 
