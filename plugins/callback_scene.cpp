@@ -16,7 +16,8 @@ struct Origin {
   std::shared_ptr<const void> library;
   DifferenceScales q, v;  ///< of the coordinates and velocities
   double time_scale = 1.0;
-  std::shared_ptr<DifferenceQuality> quality = {};
+  std::shared_ptr<DifferenceQuality> quality = {};        ///< of derivatives by coordinates
+  std::shared_ptr<DifferenceQuality> speed_quality = {};  ///< of momenta
 };
 
 void require(bool condition, const std::string& owner, const std::string& what) {
@@ -54,16 +55,7 @@ class CallbackLagrangian final : public Lagrangian {
   }
 
   void gradient(double t, ConstVectorRef x, ConstVectorRef y, VectorRef fx, VectorRef fy) const override {
-    if (f_.gradient == nullptr) {
-      DifferenceQuality* const quality = origin_.quality.get();
-      gradient_by_differences([&](ConstVectorRef shifted) { return value(t, shifted, y); }, x, fx, origin_.q,
-                              quality);
-      gradient_by_differences([&](ConstVectorRef shifted) { return value(t, x, shifted); }, y, fy, origin_.v,
-                              quality);
-      return;
-    }
-    call(origin_.owner, "lagrangian.gradient",
-         [&] { return f_.gradient(f_.data, t, x.data(), y.data(), fx.data(), fy.data()); });
+    gradient_noted(t, x, y, fx, fy, f_.gradient == nullptr);
   }
 
   void hessian(double t, ConstVectorRef x, ConstVectorRef y, VectorRef fxx, VectorRef fxy,
@@ -73,27 +65,45 @@ class CallbackLagrangian final : public Lagrangian {
         return f_.hessian(f_.data, t, x.data(), y.data(), fxx.data(), fxy.data(), fyy.data());
       });
     Vector other(dimension());
-    differences_.evaluate([&](ConstVectorRef q, VectorRef fx) { gradient(t, q, y, fx, other); }, x, fxx,
-                          origin_.q);
-    differences_.evaluate([&](ConstVectorRef v, VectorRef fx) { gradient(t, x, v, fx, other); }, y, fxy,
-                          origin_.v);
-    differences_.evaluate([&](ConstVectorRef v, VectorRef fy) { gradient(t, x, v, other, fy); }, y, fyy,
-                          origin_.v);
+    differences_.evaluate([&](ConstVectorRef q, VectorRef fx) { gradient_noted(t, q, y, fx, other, false); },
+                          x, fxx, origin_.q);
+    differences_.evaluate([&](ConstVectorRef v, VectorRef fx) { gradient_noted(t, x, v, fx, other, false); },
+                          y, fxy, origin_.v);
+    differences_.evaluate([&](ConstVectorRef v, VectorRef fy) { gradient_noted(t, x, v, other, fy, false); },
+                          y, fyy, origin_.v);
   }
 
   void gradient_rate(double t, ConstVectorRef x, ConstVectorRef y, VectorRef fyt) const override {
     Vector fx(dimension());
-    rate_by_differences([&](double s, VectorRef fy) { gradient(s, x, y, fx, fy); }, t, fyt,
+    rate_by_differences([&](double s, VectorRef fy) { gradient_noted(s, x, y, fx, fy, false); }, t, fyt,
                         origin_.time_scale);
   }
 
   void position_gradient_rate(double t, ConstVectorRef x, ConstVectorRef y, VectorRef fxt) const override {
     Vector fy(dimension());
-    rate_by_differences([&](double s, VectorRef fx) { gradient(s, x, y, fx, fy); }, t, fxt,
+    rate_by_differences([&](double s, VectorRef fx) { gradient_noted(s, x, y, fx, fy, false); }, t, fxt,
                         origin_.time_scale);
   }
 
  private:
+  /// The gradient; `noted`: at a point of the motion, where differences are judged.  Errors of forces are
+  /// measured by the energies of forces and of the motion, those of momenta by energies of any kind.
+  void gradient_noted(double t, ConstVectorRef x, ConstVectorRef y, VectorRef fx, VectorRef fy,
+                      bool noted) const {
+    if (f_.gradient != nullptr)
+      return call(origin_.owner, "lagrangian.gradient",
+                  [&] { return f_.gradient(f_.data, t, x.data(), y.data(), fx.data(), fy.data()); });
+    DifferenceQuality* const quality = noted ? origin_.quality.get() : nullptr;
+    DifferenceQuality* const speed_quality = noted ? origin_.speed_quality.get() : nullptr;
+    gradient_by_differences([&](ConstVectorRef shifted) { return value(t, shifted, y); }, x, fx, origin_.q,
+                            quality);
+    gradient_by_differences([&](ConstVectorRef shifted) { return value(t, x, shifted); }, y, fy, origin_.v,
+                            speed_quality);
+    if (quality == nullptr || speed_quality == nullptr) return;
+    quality->note_size(fy.dot(y));
+    speed_quality->note_size(quality->largest_energy());
+  }
+
   diracstep_function f_;
   Origin origin_;
   JacobianByDifferences differences_;
@@ -225,6 +235,7 @@ void give_scales(const diracstep_scene& scene, Origin& origin) {
   const double step = scene.step != 0.0 ? std::abs(scene.step) : span / 100.0;
   origin.time_scale = step > 0.0 && std::isfinite(step) ? 4.0 * step : 1.0;
   origin.quality = std::make_shared<DifferenceQuality>();
+  origin.speed_quality = std::make_shared<DifferenceQuality>();
   const diracstep_function& f = *scene.lagrangian;
   const auto value = [&](ConstVectorRef x, ConstVectorRef y) {
     double result = 0.0;
@@ -288,7 +299,10 @@ Scene scene_from(const diracstep_scene& scene, const std::string& owner,
   made.lagrangian = std::make_shared<const CallbackLagrangian>(*scene.lagrangian, n, origin);
   for (int b = 0; b < scene.row_blocks; ++b) made.constraints.push_back(rows_from(scene.rows[b], n, origin));
   if (scene.force != nullptr) made.force = std::make_shared<const CallbackForce>(*scene.force, n, origin);
-  made.doubt = [quality = origin.quality] { return quality->doubt(); };
+  made.doubt = [quality = origin.quality, speed_quality = origin.speed_quality] {
+    const std::string doubt = quality->doubt();
+    return doubt.empty() ? speed_quality->doubt() : doubt;
+  };
   made.start = {scene.start_time, Eigen::Map<const Vector>(scene.start_q, n),
                 Eigen::Map<const Vector>(scene.start_v, n)};
   return made;

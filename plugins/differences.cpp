@@ -9,7 +9,8 @@ namespace diracstep {
 
 namespace {
 
-constexpr double agreement = 1e-7;  // of both formulas, relative
+constexpr double agreement = 1e-7;   // of both formulas, relative
+constexpr double resolution = 2e-6;  // relative, of both parts of f: about what δ of 2e-3 of a scale leaves
 constexpr double round_off = 4.0 * std::numeric_limits<double>::epsilon();
 constexpr double divisor = 16.0;  // of the increment where they do not agree
 constexpr int most_divisions = 8;
@@ -29,11 +30,11 @@ double scale_at(const DifferenceScales& scales, Eigen::Index i, double x) {
 
 /// Sums of one difference, δ not yet divided by.
 struct Sums {
-  Vector sixth, fourth;  ///< (45 Δ₁ − 9 Δ₂ + Δ₃)/60 and (8 Δ₁ − Δ₂)/12
-  Vector bend;           ///< about δ² f''
-  Vector largest;        ///< |f|
+  Vector sixth, fourth;    ///< (45 Δ₁ − 9 Δ₂ + Δ₃)/60 and (8 Δ₁ − Δ₂)/12
+  Vector bend, bend_near;  ///< about δ² f'', from Δ₁ and Δ₃ and from Δ₁ and Δ₂
+  Vector largest;          ///< |f|
 
-  explicit Sums(Eigen::Index rows) : sixth(rows), fourth(rows), bend(rows), largest(rows) {}
+  explicit Sums(Eigen::Index rows) : sixth(rows), fourth(rows), bend(rows), bend_near(rows), largest(rows) {}
 
   double disagreement(Eigen::Index r) const { return std::abs(sixth[r] - fourth[r]); }
   /// The size of f' that a disagreement is measured by: near a zero of f', what it is a scale away.
@@ -51,6 +52,11 @@ struct Sums {
     }
     return largest_part;
   }
+  /// Whether f is a smooth function of some δ, as far as its odd and its even part show.
+  bool resolved(Eigen::Index r) const {
+    const double apart = disagreement(r) + std::abs(bend[r] - bend_near[r]);
+    return apart <= resolution * (std::abs(sixth[r]) + std::abs(bend[r])) + 8.0 * round_off * largest[r];
+  }
   bool agree(double factor) const { return misfit(factor) <= agreement; }
 };
 
@@ -60,7 +66,9 @@ void take(const F& f, double factor, Vector& ahead, Vector& behind, Sums& sums) 
   constexpr std::array<double, 3> sixth{45.0 / 60.0, -9.0 / 60.0, 1.0 / 60.0};
   constexpr std::array<double, 3> fourth{8.0 / 12.0, -1.0 / 12.0, 0.0};
   constexpr std::array<double, 3> bend{-1.0 / 8.0, 0.0, 1.0 / 8.0};
-  for (Vector* column : {&sums.sixth, &sums.fourth, &sums.bend, &sums.largest}) column->setZero();
+  constexpr std::array<double, 3> bend_near{-1.0 / 3.0, 1.0 / 3.0, 0.0};
+  for (Vector* column : {&sums.sixth, &sums.fourth, &sums.bend, &sums.bend_near, &sums.largest})
+    column->setZero();
   for (std::size_t k = 0; k < 3; ++k) {
     const double shift = static_cast<double>(k + 1) * factor;
     f(shift, ahead);
@@ -68,6 +76,7 @@ void take(const F& f, double factor, Vector& ahead, Vector& behind, Sums& sums) 
     sums.sixth += sixth[k] * (ahead - behind);
     sums.fourth += fourth[k] * (ahead - behind);
     sums.bend += bend[k] * (ahead + behind);
+    sums.bend_near += bend_near[k] * (ahead + behind);
     sums.largest = sums.largest.cwiseMax(ahead.cwiseAbs()).cwiseMax(behind.cwiseAbs());
   }
 }
@@ -119,11 +128,16 @@ void DifferenceQuality::note_energy(double derivative, double error) {
   raise(error_, error);
 }
 
+void DifferenceQuality::note_size(double energy) {
+  if (std::isfinite(energy)) raise(largest_, std::abs(energy));
+}
+
 void DifferenceQuality::note_disagreement(double part) { raise(disagreement_, part); }
 
 std::string DifferenceQuality::doubt() const {
   const double largest = largest_.load(), error = error_.load();
-  const double part = std::max(largest > 0.0 ? error / largest : 0.0, disagreement_.load());
+  const double of_energies = error > 0.0 ? std::min(error / largest, 1.0) : 0.0;  // 1: nothing is left
+  const double part = std::max(of_energies, disagreement_.load());
   if (!(part > known_to)) return {};
   std::ostringstream text;
   text.precision(1);
@@ -146,10 +160,17 @@ DifferenceScales find_scales(const std::function<double(ConstVectorRef)>& f, Con
       };
       take(at, 1.0, ahead, behind, sums);
       shifted[i] = x[i];
+      if (!sums.resolved(0)) return HUGE_VAL;
       const double sum = (sums.disagreement(0) + round_off * sums.largest[0]) / delta;
       return std::isfinite(sum) ? sum : HUGE_VAL;
     };
     double best = error(scales[i]);
+    for (int rung = 1; rung <= most_rungs && best == HUGE_VAL; ++rung) {
+      const double smaller = guesses[i] * std::pow(divisor, -rung);
+      best = error(smaller);
+      if (best < HUGE_VAL) scales[i] = smaller;
+    }
+    if (best == HUGE_VAL) continue;
     for (const double factor : {divisor, 1.0 / divisor})
       for (int rung = 0; rung < most_rungs; ++rung) {
         const double next = error(scales[i] * factor);
@@ -176,6 +197,8 @@ void gradient_by_differences(const std::function<double(ConstVectorRef)>& f, Con
     g[i] = sums.sixth[0] / (factor * delta);
     if (quality == nullptr) continue;
     const double wrong = sums.agree(factor) ? round_off * sums.largest[0] : sums.disagreement(0);
+    const double per_scale = scale_over_increment / factor;
+    quality->note_size(sums.bend[0] * per_scale * per_scale);  // near a zero of f', what it is a scale away
     quality->note_energy(g[i] * scale, wrong / (factor * delta) * scale);
   }
 }

@@ -20,6 +20,10 @@ class DifferenceQuality {
  public:
   /// A derivative of an energy, times the scale of its variable, and what may be wrong with it.
   void note_energy(double derivative, double error);
+  /// Energies at play: what errors of energies are measured by is the largest of these and of the
+  /// derivatives.
+  void note_size(double energy);
+  double largest_energy() const { return largest_.load(); }
   /// Part of a derivative by which two formulas still disagree with the smallest δ.
   void note_disagreement(double part);
 
@@ -33,8 +37,9 @@ class DifferenceQuality {
 /// How far each variable goes before f changes much: a number above 0 for each, in its own unit.
 using DifferenceScales = Vector;
 
-/// Scales at a point, from guesses that may be off by far: those with the smallest error of ∂f/∂x_i, as
-/// judged by both formulas and the round-off of f.
+/// Scales at a point, from guesses that may be off by far: of those at which f is resolved, so that both
+/// formulas agree for its odd part and two formulas for its even part, the one with the smallest error of
+/// ∂f/∂x_i.  Where f is resolved by none the guess stays.
 DifferenceScales find_scales(const std::function<double(ConstVectorRef)>& f, ConstVectorRef x,
                              const Vector& guesses);
 

@@ -349,7 +349,8 @@ void add_run(CLI::App& app, Session& session) {
   verb->add_flag("--fixed", options->fixed,
                  "With --error: steps of fixed size, also where variable ones are cheaper");
   verb->add_option("--max-solves", options->max_solves,
-                   "With --error: nonlinear systems in all; the best answer so far is then shown")
+                   "With --error: nonlinear systems, of each kind of steps tried; the best answer so far is "
+                   "then shown")
       ->type_name("N")
       ->capture_default_str();
   verb->add_option("--max-time", options->max_time, "With --error: seconds on the clock in all")

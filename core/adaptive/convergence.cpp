@@ -7,9 +7,10 @@ namespace diracstep {
 
 namespace {
 
-constexpr double safety = 2.5;      // between the estimate and the error asked for
-constexpr double aimed = 0.2;       // part of the error asked for that the next run aims at
-constexpr double round_off = 1e-7;  // differences that stop falling below this are laid to round-off
+constexpr double safety = 2.5;             // between the estimate and the error asked for
+constexpr double aimed = 0.2;              // part of the error asked for that the next run aims at
+constexpr double round_off_alone = 1e-15;  // differences below this hold nothing else
+constexpr double round_off = 1e-7;         // differences that stop falling below this are laid to round-off
 
 /// p with  d1/d2 = (h0^p − h1^p)/(h1^p − h2^p);  the right side rises with p.
 double order_from(double h0, double h1, double h2, double d1, double d2) {
@@ -60,7 +61,9 @@ bool Convergence::by_three_runs() const {
   return safety * differences_.back() <= error_ && safety * differences_[runs() - 3] <= error_;
 }
 
-bool Convergence::near_round_off() const { return stagnant_ > 0 && differences_.back() < round_off; }
+bool Convergence::near_round_off() const {
+  return difference() < round_off_alone || (stagnant_ > 0 && difference() < round_off);
+}
 
 double Convergence::next_factor() const {
   if (!(estimate_ > 0.0) || stagnant_ > 0) return 0.7;
@@ -77,8 +80,8 @@ double Convergence::work_to_go() const {
 std::string Convergence::obstacle() const {
   std::ostringstream text;
   text.precision(3);
-  if (stagnates() && differences_.back() < round_off) {
-    text << "the runs no longer come closer to each other than " << differences_.back()
+  if (near_round_off()) {
+    text << "the runs no longer come closer to each other than " << difference()
          << ": round-off, or a motion that amplifies it, sets the limit";
   } else {
     text << "the order observed is " << order_of(runs() - 1) << " and " << order_of(runs())

@@ -39,8 +39,8 @@ class Convergence {
   bool order_confirmed() const { return confirmed(runs()) && confirmed(runs() - 1); }
   /// Three refinements in a row that did not halve the difference.
   bool stagnates() const { return stagnant_ >= 3; }
-  /// The last refinement did not halve a difference that is as small as those of round-off: what the work to
-  /// go is predicted from has no meaning then.
+  /// The last difference is one of round-off alone, or small and not halved by the last refinement: orders
+  /// and the work to go mean nothing then.
   bool near_round_off() const;
   /// Factor of the next step, from 0.35 to 0.7.
   double next_factor() const;

@@ -28,7 +28,8 @@ struct ErrorControlOptions {
   std::optional<bool> compensated_sums = {};  ///< empty: where the library chooses the method and the error
                                               ///< is below 1e-8
   IntegratorOptions integrator = {};          ///< the rule of rows and all else that is not said above
-  long max_solves = usual_max_solves;         ///< nonlinear systems in all, or explicit steps
+  long max_solves = usual_max_solves;         ///< nonlinear systems, or explicit steps; where fixed and
+                                              ///< variable steps are both tried, of each
   double max_time = usual_max_time;           ///< seconds on the clock in all
   std::function<bool()> go_on = {};           ///< asked within each run; false ends the search
 };

@@ -11,7 +11,7 @@ namespace diracstep {
 struct RateSurvey {
   /// For the generic monitor.  ω0: median over time of |a|/|v|; ω_min: 0.3 of the median of ω, or 0.3 radians
   /// over the whole span where nothing changes at all, or where ω fell by more than 100 within a thousandth
-  /// of the span and the survey did not get further.
+  /// of the span and the survey, then made longer once, did not get further.
   MonitorScales scales;
   double slowest = 0.0;  ///< smallest and largest ω met, ω_min left out
   double fastest = 0.0;
@@ -28,7 +28,8 @@ struct RateSurvey {
 /// Steps that tell whether variable steps pay, and the scales to choose them by.
 inline constexpr long survey_steps = 400;
 
-/// Surveys from the start towards `end`, at most `max_steps` steps.  Throws Misuse for an end that is the
+/// Surveys from the start towards `end`, at most `max_steps` steps, or 8 times as many after a
+/// start at rest under a force that begins like a power of the time.  Throws Misuse for an end that is the
 /// start or not finite, and for a Lagrangian linear in v.
 RateSurvey survey_rate(const Scene& scene, const SolverFactory& solvers, double end,
                        long max_steps = survey_steps);

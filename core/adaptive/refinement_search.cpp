@@ -13,8 +13,9 @@ namespace {
 constexpr int max_failures = 12;  // of runs in a row
 constexpr int max_divisions = 6;
 constexpr std::size_t max_runs = 60;
-constexpr long fewest_steps = 4;        // of a run with variable steps that counts
-constexpr double missed_allowed = 0.1;  // by the forces surveyed, in parts of the error asked for
+constexpr long fewest_steps = 4;              // of a run with variable steps that counts
+constexpr double missed_allowed = 0.1;        // by the forces surveyed, in parts of the error asked for
+constexpr double error_out_of_reach = 1e-15;  // differences of runs hold nothing but round-off below it
 constexpr long nodes_between_looks = 64;
 
 double relative_change(const Vector& a, const Vector& b) {
@@ -89,6 +90,8 @@ bool RefinementSearch::stopped(long max_solves) {
   else if (expected > limit)
     refuse("the next run would bring the work to " + text(expected) +
            " nonlinear systems or explicit steps (--max-solves)");
+  else if (convergence_.runs() >= 5 && needed > limit && convergence_.difference() < error_out_of_reach)
+    refuse(convergence_.obstacle());
   else if (convergence_.runs() >= 5 && needed > limit && !convergence_.near_round_off())
     refuse("at the rate of the runs so far it would take about " + text(needed) +
            " nonlinear systems or explicit steps (--max-solves)");
@@ -130,7 +133,7 @@ RefinementSearch::Outcome RefinementSearch::run(long refinement) {
     if (last) read_end = read(Momentum::projected, end);
     if (++nodes % nodes_between_looks != 0) return true;
     ended_ = motion_.options.go_on && !motion_.options.go_on();
-    return !ended_ && !time_is_up();
+    return !ended_ && !time_is_up() && report_.work.steps + nodes <= motion_.options.max_solves;
   };
   const StepReport done = run_steps_of(motion_.scene, motion_.registry, motion_.solvers, steps,
                                        report_.adaptive, motion_.end, work, at_node);
@@ -138,7 +141,7 @@ RefinementSearch::Outcome RefinementSearch::run(long refinement) {
   now.failure = done.failure;
   if (now.failure.empty() && end.q.size() == 0) {
     now.failure = ended_          ? "interrupted"
-                  : read_end.ok() ? "not finished in time"
+                  : read_end.ok() ? "not finished with the time or work allowed"
                                   : std::string("reading the end: ") + describe(read_end.status);
     return read_end.ok() ? Outcome::ended : Outcome::failed;
   }
@@ -281,7 +284,8 @@ bool RefinementSearch::refuse(const std::string& why) {
   report_.refusal = "error " + text(motion_.options.error) + " not reached: " + why;
   if (!fast_.empty() && why.find(fast_) == std::string::npos) report_.refusal += "; " + fast_;
   if (convergence_.runs() > 1)
-    report_.refusal += "; the best answer so far has an estimated error of " + text(report_.estimate);
+    report_.refusal += "; the best answer so far has an estimated error of " + text(report_.estimate) +
+                       (convergence_.order_confirmed() ? "" : ", which the observed orders do not confirm");
   return false;
 }
 

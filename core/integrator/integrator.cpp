@@ -126,7 +126,7 @@ StepReport Integrator::take(double h, Guess guess) {
     pieces = more;
   }
   if (!outcome.ok()) return failed(outcome.solve, step.start, outcome.failure);
-  const StepReport report{outcome.solve, work_.steps, step.start, {}};
+  StepReport report{outcome.solve, work_.steps, step.start, {}};
   accept_step(h, pieces);
   return report;
 }

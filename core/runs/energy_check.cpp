@@ -9,6 +9,7 @@ namespace diracstep {
 namespace {
 
 constexpr double doubted = 0.1;
+constexpr long points_on_the_way = 10, points_for_a_mean = 32;
 
 }  // namespace
 
@@ -32,21 +33,32 @@ void EnergyCheck::see(const Sample& point) {
   const double way = max_norm(point.q - start_position_);
   // At rest what moves is round-off, and so are the energies at play.
   if (std::isfinite(point.energy) && way <= at_rest * max_norm(start_position_)) return;
-  scene_.lagrangian->gradient(point.time, point.q, point.v, force_, momentum_);
-  const double kinetic = 0.5 * std::abs(momentum_.dot(point.v)),
-               work = std::abs(force_.dot(point.q - start_position_));
-  for (const double size : {kinetic, work})
-    if (std::isfinite(size)) at_play_ = std::max(at_play_, size);
+  add_at_play(point);
   double change = std::abs(point.energy - start_energy_);
   if (!std::isfinite(change)) change = HUGE_VAL;
+  const double noise = at_rest * std::abs(start_energy_);
+  if (points_ >= points_on_the_way && change > std::max(doubted * at_play_, noise)) lost_on_the_way_ = true;
   if (change <= worst_change_) return;
   worst_change_ = change;
   worst_energy_ = point.energy;
   worst_time_ = point.time;
 }
 
+void EnergyCheck::add_at_play(const Sample& point) {
+  scene_.lagrangian->gradient(point.time, point.q, point.v, force_, momentum_);
+  const double kinetic = 0.5 * std::abs(momentum_.dot(point.v)),
+               work = std::abs(force_.dot(point.q - start_position_));
+  double here = 0.0;
+  for (const double size : {kinetic, work})
+    if (std::isfinite(size)) here = std::max(here, size);
+  at_play_ = std::max(at_play_, here);
+  sum_at_play_ += here;
+  ++points_;
+}
+
 std::string EnergyCheck::text() const {
-  if (!(worst_change_ > doubted * at_play_)) return {};
+  const double size = points_ < points_for_a_mean ? at_play_ : sum_at_play_ / static_cast<double>(points_);
+  if (!lost_on_the_way_ && !(worst_change_ > doubted * size)) return {};
   std::ostringstream text;
   text << "the energy, which this scene keeps, went from " << start_energy_ << " to " << worst_energy_
        << " at t = " << worst_time_ << ": the step is too large to believe the result";

@@ -35,11 +35,12 @@ void NodeCheck::see(long step, const Sample& node) {
 }
 
 void NodeCheck::judge() {
+  if (!only_rest_) {  // first: a force that alternates has large impulses, which cancel in the momentum
+    look_for_alternation("velocity", &Sample::v, scene_.coordinates);
+    look_for_alternation("momentum", &Sample::p, scene_.coordinates);
+    look_for_alternation("multiplier", &Sample::lambda, scene_.row_names());
+  }
   look_for_rest();
-  if (only_rest_) return;
-  look_for_alternation("velocity", &Sample::v, scene_.coordinates);
-  look_for_alternation("momentum", &Sample::p, scene_.coordinates);
-  look_for_alternation("multiplier", &Sample::lambda, scene_.row_names());
 }
 
 void NodeCheck::look_for_alternation(const char* what, Vector Sample::*column,
@@ -85,6 +86,7 @@ void NodeCheck::add_force(const Sample& node, Vector& force, Vector& terms) {
 }
 
 void NodeCheck::look_for_rest() {
+  if (!text_.empty()) return;
   const Eigen::Index n = scene_.dimension();
   Vector changes = Vector::Zero(n), impulses = changes, all = changes, force, terms;
   for (std::size_t k = 0; k + 1 < window; ++k) {

@@ -30,8 +30,9 @@ std::string row_label(const ConstraintBlocks& blocks, int row) {
   for (const auto& block : blocks) {
     if (row < block->rows()) {
       const std::string origin = block->origin(row);
-      const std::string label = "row '" + block->names()[static_cast<std::size_t>(row)] + "'";
-      return origin.empty() ? label : label + " (" + origin + ")";
+      std::string label = "row '" + block->names()[static_cast<std::size_t>(row)] + "'";
+      if (!origin.empty()) label.append(" (").append(origin).append(")");
+      return label;
     }
     row -= block->rows();
   }

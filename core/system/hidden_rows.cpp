@@ -170,11 +170,11 @@ void require_described(const Scene& scene, const Columns& w, const Directions& s
 Columns directions(const Scene& scene, const Point& start, const FullDerivatives& at_start,
                    const Point& other, const FullDerivatives& at_other) {
   const Columns here = stacked(scene, start, at_start), elsewhere = stacked(scene, other, at_other);
-  const Columns w = kernel(here);
+  Columns w = kernel(here);
   if (w.cols() == 0 || !elsewhere.allFinite()) return w;
   Columns both(here.rows() + elsewhere.rows(), here.cols());
   both << here, elsewhere;
-  const Columns constant = kernel(both);
+  Columns constant = kernel(both);
   if (kernel(elsewhere).cols() > constant.cols())
     refuse(scene, w,
            "elsewhere another motion does: a direction without momentum that moves is not supported");

@@ -14,8 +14,8 @@ int Constants::add(Node node) {
   return found->second;
 }
 
-Kernel::Kernel(FormulaGraph& graph, std::vector<Store> stores, const PieceLayout& layout, Constants& known,
-               Constants& instance)
+Kernel::Kernel(FormulaGraph& graph, const std::vector<Store>& stores, const PieceLayout& layout,
+               Constants& known, Constants& instance)
     : width_(layout.width()) {
   std::vector<Node> roots;
   for (const Store& store : stores)
@@ -172,9 +172,12 @@ const char* function_name(Op op) {
 
 /// x to the power n with the multiplications of whole_power.
 std::string power_text(const std::string& x, int exponent) {
+  const auto product = [](const std::string& a, const std::string& b) {
+    return std::string("(").append(a).append(" * ").append(b).append(")");
+  };
   std::string result, square = x;
-  for (; exponent > 0; exponent /= 2, square = '(' + square + " * " + square + ')')
-    if (exponent % 2 == 1) result = result.empty() ? square : '(' + result + " * " + square + ')';
+  for (; exponent > 0; exponent /= 2, square = product(square, square))
+    if (exponent % 2 == 1) result = result.empty() ? square : product(result, square);
   return result;
 }
 

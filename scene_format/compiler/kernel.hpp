@@ -56,7 +56,7 @@ struct PieceLayout {
 /// earlier ones.  It can be run here, slowly, or written as C; both give the same bits.
 class Kernel {
  public:
-  Kernel(FormulaGraph& graph, std::vector<Store> stores, const PieceLayout& layout, Constants& known,
+  Kernel(FormulaGraph& graph, const std::vector<Store>& stores, const PieceLayout& layout, Constants& known,
          Constants& instance);
 
   bool empty() const { return stores_.empty(); }

@@ -152,9 +152,11 @@ TEST_F(Doubt, FixedStepsCanBeAskedFor) {
 }
 
 TEST_F(Doubt, TheWorkIsLimitedAndTheBestAnswerShown) {
-  const Outcome outcome = run("run kepler_e06 --error 1e-9 --method type1/midpoint --max-solves 3000 --json");
+  const Outcome outcome =
+      run("run kepler_e06 --error 1e-9 --method type1/midpoint --fixed --max-solves 20000 --json");
   EXPECT_EQ(outcome.status, 1);
   const Json json = Json::parse(outcome.out);
+  EXPECT_LE(json["error_control"]["solves"].get<long>(), 20000);
   EXPECT_NE(json["status"].get<std::string>().find("--max-solves"), std::string::npos);
   EXPECT_TRUE(json["end"].is_object());
   EXPECT_TRUE(json["error_control"]["estimate"].is_number());

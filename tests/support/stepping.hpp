@@ -12,10 +12,11 @@
 namespace diracstep::testing {
 
 /// Kept points of a run; fails the test where the run fails.
-inline std::vector<Sample> samples_of(const std::shared_ptr<const Scene>& scene, IntegratorOptions options,
-                                      long steps, Momentum momentum = Momentum::projected,
+inline std::vector<Sample> samples_of(const std::shared_ptr<const Scene>& scene,
+                                      const IntegratorOptions& options, long steps,
+                                      Momentum momentum = Momentum::projected,
                                       const Registry& registry = Registry::with_built_ins()) {
-  Integrator integrator(scene, registry, kinsol(), std::move(options));
+  Integrator integrator(scene, registry, kinsol(), options);
   std::vector<Sample> samples;
   const RunReport report = run_steps(integrator, steps, momentum, 1, [&](const Sample& sample) {
     samples.push_back(sample);

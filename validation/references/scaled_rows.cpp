@@ -20,6 +20,7 @@ class ScaledRows final : public ConstraintRows {
         rows_(std::move(rows)),
         factor_(factor) {}
 
+  bool workless() const override { return rows_->workless(); }
   void position(double t, ConstVectorRef q, VectorRef phi) const override {
     rows_->position(t, q, phi);
     phi *= factor_;

@@ -123,7 +123,7 @@ Covector differential(GeneratingFunction& s, const Trajectory& t, std::size_t k,
     EXPECT_TRUE(make_stationary(s, step, y));
   }
   s.gradient(step, y, g);
-  const Covector d{y.col(0), y.col(1), g.col(0), g.col(1)};
+  Covector d{y.col(0), y.col(1), g.col(0), g.col(1)};
   if (s.type() != GeneratingType::one) return d;
   return plus ? gamma_plus(d) : gamma_minus(d);
 }

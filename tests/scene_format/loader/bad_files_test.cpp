@@ -107,7 +107,9 @@ TEST(BadFiles, SomethingMustMove) {
                                   changed("lagrangian = \"m*(v_x^2 + v_y^2)/2 - m*g*y\"", "")}) {
     const CatalogueScene entry = scene_from_text("bad.toml", text);
     testing::expect_misuse(
-        [&] { Integrator(entry.scene, Registry::with_built_ins(), kinsol(), {.step = 0.1}); },
+        [&] {
+          const Integrator integrator(entry.scene, Registry::with_built_ins(), kinsol(), {.step = 0.1});
+        },
         {"carries no momentum"});
   }
 }

@@ -183,7 +183,7 @@ end = 1
 step = 0.1
 )toml");
   try {
-    Integrator(entry.scene, Registry::with_built_ins(), kinsol(), {.step = 0.1});
+    const Integrator integrator(entry.scene, Registry::with_built_ins(), kinsol(), {.step = 0.1});
     FAIL() << "a moving direction was accepted";
   } catch (const Misuse& misuse) {
     EXPECT_NE(std::string(misuse.what()).find("moves"), std::string::npos) << misuse.what();
