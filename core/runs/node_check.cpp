@@ -21,7 +21,7 @@ NodeCheck::NodeCheck(const Scene& scene, long steps, bool only_rest)
       rows_(scene.constraints, scene.dimension()),
       only_rest_(only_rest),
       growing_(steps == 0),
-      between_(growing_ ? 2L * window
+      between_(growing_ ? 2L * static_cast<long>(window)
                         : std::clamp(steps / fewest_windows, static_cast<long>(window), steps_for_a_window)) {
 }
 
