@@ -292,7 +292,7 @@ const std::map<std::string, std::vector<std::string>> expected{
     {"knife_edge step*1e-3", {"A", "A", "A", "A"}},
     {"knife_edge step*1e0", {"B", "A", "B", "t"}},
     {"knife_edge step*1e1", {"t", "B", "t", "t"}},
-    {"knife_edge step*1e2", {"tW", "t", "tW", "t"}},
+    {"knife_edge step*1e2", {"W", "t", "W", "t"}},
     {"kepler_e06 step*1e-12", {"A", "A", "A", "A"}},
     {"kepler_e06 step*1e-9", {"A", "A", "A", "A"}},
     {"kepler_e06 step*1e-6", {"A", "A", "A", "A"}},
