@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <diracstep/scene_format/compiler/size_limits.hpp>
 #include <span>
 #include <string>
 #include <unordered_map>
@@ -83,7 +84,8 @@ struct NodeData {
 /// give the same graph: no result depends on addresses or hashes.
 class FormulaGraph {
  public:
-  static constexpr std::size_t size_limit = 400'000;  ///< nodes; more throws std::length_error
+  /// More nodes, and more visits of nodes, than the limits allow throw std::length_error.
+  explicit FormulaGraph(const SizeLimits& limits = {}) : limits_(limits) {}
 
   Node number(double value) { return insert({Op::number, none, none, 0, value}); }
   Node parameter(int id) { return insert({Op::parameter, id}); }
@@ -136,9 +138,13 @@ class FormulaGraph {
   Node partial(Node node, bool second);
   Node rebuild(const NodeData& node);
 
+  SizeLimits limits_;
   std::vector<NodeData> nodes_;
   std::vector<Known> known_;
   std::unordered_map<NodeData, Node, Hash> index_;
+  mutable std::vector<unsigned> visits_;  ///< the last search that reached each node
+  mutable unsigned searches_ = 0;
+  mutable std::size_t visited_ = 0;  ///< nodes, in all searches
 };
 
 /// How many arguments an operation takes: 0 for leaves.

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <diracstep/scene_format/compiler/piece_builder.hpp>
+#include <stdexcept>
 
 namespace diracstep::scene_compiler {
 
@@ -25,6 +26,7 @@ Node PieceBuilder::leaf(const Piece& piece, std::size_t slot, Role role) {
 }
 
 PieceBuilder::Matrix PieceBuilder::gradients(const Piece& piece, const std::vector<Node>& roots, Role role) {
+  if (roots.size() * piece.slots.size() > size_limits().derivatives) throw std::length_error("derivatives");
   Matrix rows(roots.size(), std::vector<Node>(piece.slots.size()));
   for (std::size_t k = 0; k < piece.slots.size(); ++k) {
     const std::vector<Node> column = graph_.derivative(roots, leaf(piece, k, role));

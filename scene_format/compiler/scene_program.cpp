@@ -376,15 +376,17 @@ std::vector<const SceneFunction*> SceneProgram::functions() const {
 }
 
 std::unique_ptr<SceneProgram> compile_scene(const std::string& file, const std::string& text) {
-  auto program = std::make_unique<SceneProgram>(read_document(file, text));
+  const SizeLimits limits = size_limits();
+  auto program = std::make_unique<SceneProgram>(read_document(file, text), limits);
   try {
     SceneCompiler(*program).compile();
   } catch (const std::length_error&) {
     throw SceneError(
         file, {},
-        fmt::format("the formulas and their derivatives have more than {} parts, the limit; write "
-                    "repeated elements with for = \"i = 1..N\" and sum(i = 1..N, …)",
-                    FormulaGraph::size_limit));
+        fmt::format(
+            "the formulas and their derivatives have more than {} parts, the limit, or take more than {} "
+            "visits of these; write repeated elements with for = \"i = 1..N\" and sum(i = 1..N, …)",
+            limits.graph_nodes, limits.graph_visits));
   }
   return program;
 }

@@ -82,7 +82,7 @@ struct InvariantProgram {
 
 /// A scene file compiled: everything but the numbers.
 struct SceneProgram {
-  explicit SceneProgram(SceneDocument scene) : document(std::move(scene)) {}
+  SceneProgram(SceneDocument scene, const SizeLimits& limits) : document(std::move(scene)), graph(limits) {}
   SceneDocument document;
   FormulaGraph graph;
   Symbols symbols;
