@@ -1,4 +1,3 @@
-#include <diracstep/version.h>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -47,7 +46,8 @@ class Run {
   void go() {
     long k = integrator_.work().steps;
     if (k == 0 || wanted(k)) keep();
-    while (k < steps_ && result_.failure.empty() && !interrupted()) {
+    bool stopped = false;
+    while (k < steps_ && !stopped && result_.failure.empty()) {
       doubt_.before_step(integrator_);
       const StepReport report = integrator_.step();
       if (!report.ok()) {
@@ -56,17 +56,16 @@ class Run {
       }
       doubt_.after_step(integrator_);
       ++k;
-      if (k == steps_ || checkpoint_due(k)) save();
+      stopped = interrupted();  // asked once, before the point is kept: the checkpoint stands before it
+      if (k == steps_ || stopped || checkpoint_due(k)) save();
       if (wanted(k))
         keep();
       else if (k % every_look_ == 0)
         look();
       if (k % steps_between_looks == 0) show(k);
     }
-    if (result_.failure.empty() && k < steps_) {
-      result_.failure = fmt::format("interrupted at t = {:.17g}", integrator_.time());
-      save();
-    }
+    if (result_.failure.empty() && k < steps_)
+      result_.failure = fmt::format("{} at t = {:.17g}", interruption(), integrator_.time());
     if (integrator_.time() != kept_time_) keep();
     result_.work = integrator_.work();
     result_.doubt = doubt_.text();
@@ -126,50 +125,10 @@ class Run {
   Progress progress_;
 };
 
-/// What the scene's formulas give at its start and at a point beside it, as a check sum of the bits.
-std::string formula_sum(const Scene& scene) {
-  const Eigen::Index n = scene.dimension();
-  std::string bytes;
-  const auto put = [&](const Vector& values) {
-    bytes.append(reinterpret_cast<const char*>(values.data()),
-                 static_cast<std::size_t>(values.size()) * sizeof(double));
-  };
-  ConstraintsAtPoint rows(scene.constraints, static_cast<int>(n));
-  for (const double shift : {0.0, 0.01}) {
-    const Vector q = scene.start.q.array() + shift, v = scene.start.v.array() + shift;
-    Vector lq = Vector::Zero(n), lv = Vector::Zero(n);
-    scene.lagrangian->gradient(scene.start.time, q, v, lq, lv);
-    put(lq);
-    put(lv);
-    if (scene.rows() == 0) continue;
-    rows.evaluate(scene.start.time, q);
-    put(rows.coefficients());
-  }
-  return fmt::format("{:016x}", check_sum(bytes));
-}
-
 }  // namespace
 
 void run_to(long steps, Integrator& integrator, const Keeping& keeping, RunResult& result) {
   Run(steps, integrator, keeping, result).go();
-}
-
-std::vector<std::pair<std::string, std::string>> identity(const CatalogueScene& entry,
-                                                          const Integrator& integrator,
-                                                          const Keeping& keeping, bool to_file) {
-  const IntegratorOptions& options = integrator.options();
-  std::vector<std::pair<std::string, std::string>> run{{"diracstep", DIRACSTEP_VERSION},
-                                                       {"scene", entry.scene->name}};
-  for (const auto& [name, value] : entry.parameters) run.emplace_back(name, fmt::format("{:.17g}", value));
-  run.emplace_back("check sum of the formulas", formula_sum(integrator.scene()));
-  run.emplace_back("method", options.method);
-  run.emplace_back("order", std::to_string(options.order));
-  run.emplace_back("step", fmt::format("{:.17g}", options.step));
-  run.emplace_back("substeps", std::to_string(options.substeps));
-  run.emplace_back("compensated sums", options.compensated_sums ? "yes" : "no");
-  run.emplace_back("trajectory", to_file ? fmt::format("every {}", keeping.every) : "none");
-  run.emplace_back("momentum", diracstep::name(keeping.momentum));
-  return run;
 }
 
 }  // namespace diracstep::command

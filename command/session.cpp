@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <cstring>
 #include <diracstep/command/session.hpp>
+#include <diracstep/files/shown_text.hpp>
 #include <stdexcept>
 
 namespace diracstep::command {
@@ -64,9 +65,13 @@ void add_set_option(CLI::App& verb, std::vector<std::string>& assignments) {
       ->allow_extra_args(false);
 }
 
-void say(std::string_view message) { fmt::print(stderr, "diracstep: {}\n", message); }
+void say(std::string_view message) {
+  const std::string line = "diracstep: " + shown_lines(message) + '\n';
+  std::fwrite(line.data(), 1, line.size(), stderr);  // where nobody can be told, the work goes on
+}
 
-void print(std::string_view text) {
+void print(std::string_view given) {
+  const std::string text = shown_lines(given);
   if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size()) refuse_output();
 }
 

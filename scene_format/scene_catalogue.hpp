@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace diracstep {
@@ -78,7 +79,9 @@ struct CatalogueScene {
   std::vector<Invariant> invariants = {};
   Recommendation recommended = {};
   std::vector<SymbolNote> notes = {};  ///< coordinates, sizes and parameters
-  std::string code = {};               ///< how the formulas are computed: compiled, or interpreted and why
+  /// What a scene file says of the motion, entry by entry; none for scenes that are not from files.
+  std::vector<std::pair<std::string, std::string>> definition = {};
+  std::string code = {};  ///< how the formulas are computed: compiled, or interpreted and why
 };
 
 /// Names of the scenes that come with the library, sorted.

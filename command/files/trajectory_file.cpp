@@ -66,7 +66,7 @@ void TrajectoryFile::write(const Sample& sample) {
 }
 
 void TrajectoryFile::close() {
-  flush();
+  sync();
   file_.close();
 }
 

@@ -7,18 +7,23 @@
 #include <diracstep/command/interrupt.hpp>
 #include <diracstep/command/progress.hpp>
 #include <diracstep/command/run_control.hpp>
+#include <diracstep/command/run_identity.hpp>
 #include <diracstep/command/verbs/verbs.hpp>
 #include <diracstep/core/adaptive/adaptive_integrator.hpp>
 #include <diracstep/core/adaptive/error_control.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/runs/energy_check.hpp>
 #include <diracstep/core/runs/run.hpp>
+#include <diracstep/files/file_lock.hpp>
+#include <diracstep/files/paths.hpp>
 #include <memory>
 #include <optional>
 
 namespace diracstep::command {
 
 namespace {
+
+constexpr double most_seconds = 1e8;  // three years
 
 struct Options {
   std::string scene;
@@ -32,6 +37,8 @@ struct Options {
   std::string checkpoint;
   long checkpoint_every = 0;
   std::string resume;
+  double max_steps = 1e12, min_step = 0.0;
+  std::optional<double> max_seconds;
   bool adaptive = false;
   double eps = 0.2;
   std::string control = "integrating";
@@ -41,10 +48,11 @@ struct Options {
   bool json = false;
 };
 
-StepGrid fitted_steps(const CatalogueScene& entry, double end, const std::optional<double>& wanted) {
-  const double start = entry.scene->start.time;
-  const double step = wanted.value_or(std::copysign(entry.natural_step, end - start));
-  const StepGrid grid = fit_steps(start, end, step);
+StepGrid fitted_steps(const CatalogueScene& entry, double end, double step, double max_steps) {
+  const StepGrid grid = fit_steps(entry.scene->start.time, end, step);
+  if (static_cast<double>(grid.steps) > max_steps)
+    throw Misuse(fmt::format("{} steps of {:g} lead to t = {:g}; --max-steps allows {:g}", grid.steps,
+                             grid.step, end, max_steps));
   if (std::abs(grid.step - step) > 1e-9 * std::abs(step))
     say(fmt::format("step {:g} adjusted to {:.17g}, so that {} steps end at t = {:g}", step, grid.step,
                     grid.steps, end));
@@ -61,12 +69,37 @@ void require_sense(const Options& options) {
                     options.checkpoint_every));
   if (options.checkpoint_every > 0 && !checkpoints)
     throw Misuse("--checkpoint-every without --checkpoint FILE");
-  if (!options.out.empty() && options.out == options.checkpoint)
-    throw Misuse(fmt::format("--out and --checkpoint are both '{}'", options.out));
+  if (!(options.max_steps >= 1.0))
+    throw Misuse(fmt::format("--max-steps = {:g}; 1 or more is needed", options.max_steps));
+  if (!(options.min_step >= 0.0) || (options.min_step > 0.0 && !options.adaptive))
+    throw Misuse(
+        fmt::format("--min-step = {:g}; a number of at least 0 is needed, and --adaptive", options.min_step));
+  if (options.max_seconds && !(*options.max_seconds > 0.0 && *options.max_seconds <= most_seconds))
+    throw Misuse(fmt::format("--max-seconds = {:g}; a number above 0, up to {:g}, is needed",
+                             *options.max_seconds, most_seconds));
   if (checkpoints && options.adaptive)
     throw Misuse("--checkpoint and --resume do not go with --adaptive: checkpoints cover fixed steps only");
   if (checkpoints && options.error)
     throw Misuse("--checkpoint and --resume do not go with --error: name the method and the step instead");
+}
+
+/// The file that checkpoints go to, or empty.
+std::string checkpoint_path(const Options& options) {
+  return options.checkpoint.empty() ? options.resume : options.checkpoint;
+}
+
+/// Before anything is computed: what could not be written in the end, or would be written over something
+/// read.
+void require_files(const Options& options, const Session& session) {
+  std::vector<NamedPath> inputs, outputs;
+  if (options.scene.ends_with(".toml")) inputs.push_back({"the scene", options.scene});
+  for (const Plugin& plugin : session.plugins) inputs.push_back({"the plugin", plugin.path()});
+  if (!options.out.empty()) outputs.push_back({"--out", options.out});
+  if (const std::string checkpoint = checkpoint_path(options); !checkpoint.empty())
+    outputs.push_back({options.checkpoint.empty() ? "--resume" : "--checkpoint", checkpoint});
+  if (!options.resume.empty() && !options.out.empty() && same_file(options.resume, options.out))
+    throw Misuse(fmt::format("--out and --resume are both '{}'", options.resume));
+  require_outputs(outputs, inputs);
 }
 
 /// Where the file goes on: from the checkpoint, or from its beginning.
@@ -92,12 +125,9 @@ void go_on(const Checkpoint& saved, const Options& options, Integrator& integrat
 void run_fixed(const Options& options, const CatalogueScene& entry, const Session& session,
                Integrator& integrator, long steps, std::optional<TrajectoryFile>& file, RunResult& result) {
   Keeping keeping{.momentum = result.momentum, .every = options.every};
-  keeping.checkpoint = options.checkpoint.empty() ? options.resume : options.checkpoint;
+  keeping.checkpoint = checkpoint_path(options);
   keeping.checkpoint_every = options.checkpoint_every;
-  keeping.identity = identity(entry, integrator, keeping, !options.out.empty());
-  keeping.identity.emplace_back("rule", options.method.rule.value_or("the method's own"));
-  keeping.identity.emplace_back("solver", name(session.solver_options.iteration));
-  keeping.identity.emplace_back("Jacobian", name(session.solver_options.jacobian));
+  keeping.identity = run_identity(entry, session, options.method, integrator, keeping, !options.out.empty());
   std::optional<Checkpoint> saved;
   if (!options.resume.empty()) {
     saved = read_checkpoint(options.resume);
@@ -116,20 +146,27 @@ void run_variable(const Options& options, const CatalogueScene& entry, AdaptiveI
   const double start = entry.scene->start.time;
   const auto scene = completed(entry.scene);
   EnergyCheck doubt(*scene);
+  std::string beyond;  // a limit
   const auto keep = [&](const Sample& sample) {
+    if (integrator.control().smallest_step < options.min_step)
+      beyond = fmt::format("a step of {:g} is below --min-step", integrator.control().smallest_step);
+    if (static_cast<double>(integrator.work().steps) > options.max_steps)
+      beyond = fmt::format("--max-steps allows {:g}", options.max_steps);
     doubt.see(sample);
     if (file != nullptr) file->write(sample);
     result.end = sample;
     progress.show((sample.time - start) / (end - start), fmt::format("t = {:g}", sample.time));
-    return !interrupted();
+    return beyond.empty() && !interrupted();
   };
   const std::vector<double> times = options.at.empty() ? std::vector<double>{} : numbers("--at", options.at);
   const RunReport report = times.empty()
                                ? diracstep::run(integrator, end, result.momentum, options.every, keep)
                                : run_at(integrator, times, result.momentum, keep);
   result.failure = report.last.failure;
-  if (result.failure.empty() && interrupted())
-    result.failure = fmt::format("interrupted at t = {:.17g}", integrator.time());
+  if (result.failure.empty() && !beyond.empty())
+    result.failure = fmt::format("stopped at t = {:.17g}: {}", integrator.time(), beyond);
+  else if (result.failure.empty() && interrupted())
+    result.failure = fmt::format("{} at t = {:.17g}", interruption(), integrator.time());
   result.work = integrator.work();
   result.doubt = doubt.text();
   result.variable =
@@ -150,7 +187,7 @@ IntegratorOptions run_once(const Options& options, const CatalogueScene& entry, 
     run_variable(options, entry, integrator, end, file ? &*file : nullptr, result);
     chosen = integrator.options();
   } else {
-    const StepGrid grid = fitted_steps(entry, end, chosen.step);
+    const StepGrid grid = fitted_steps(entry, end, chosen.step, options.max_steps);
     chosen.step = grid.step;
     Integrator integrator(entry.scene, session.registry, session.solvers, chosen);
     run_fixed(options, entry, session, integrator, grid.steps, file, result);
@@ -204,7 +241,12 @@ void report(const RunResult& result, const Options& options, const CatalogueScen
 void run(const Options& given, Session& session) {
   Options options = given;
   require_sense(options);
+  require_files(options, session);
+  std::optional<FileLock> lock;
+  if (const std::string checkpoint = checkpoint_path(options); !checkpoint.empty()) lock.emplace(checkpoint);
   const CatalogueScene entry = make_scene(session, options.scene, parameters(options.set));
+  catch_interrupts();
+  if (options.max_seconds) limit_time(*options.max_seconds);
   RunResult result;
   result.momentum = momentum(options.momentum);
   const double end =
@@ -258,6 +300,15 @@ void add_run(CLI::App& app, Session& session) {
   verb->add_option("--resume", options->resume,
                    "Go on from a checkpoint, with the same bits as if never interrupted")
       ->type_name("FILE");
+  verb->add_option("--max-steps", options->max_steps, "Refuse a run of more steps")
+      ->type_name("N")
+      ->capture_default_str();
+  verb->add_option("--min-step", options->min_step, "End a run of varying steps where one gets smaller")
+      ->type_name("H")
+      ->capture_default_str();
+  verb->add_option("--max-seconds", options->max_seconds,
+                   "End the run after so long, as an interrupt does: with its checkpoint")
+      ->type_name("S");
   verb->add_flag("--adaptive", options->adaptive, "Reversible steps of varying size");
   verb->add_option("--eps", options->eps, "Radians of a step of varying size")->capture_default_str();
   verb->add_option("--control", options->control,
