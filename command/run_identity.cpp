@@ -88,6 +88,7 @@ std::vector<std::pair<std::string, std::string>> run_identity(const CatalogueSce
   run.emplace_back("start, as bits", sha256(bits(Vector::Constant(1, start.time)) + bits(start.q) +
                                             bits(start.v) + bits(start.p))
                                          .substr(0, 16));
+  run.emplace_back("redundant rows", session.drop_redundant_rows ? "dropped" : "as the scene says");
   run.emplace_back("method", options.method);
   run.emplace_back("order", std::to_string(options.order));
   run.emplace_back("step", fmt::format("{:.17g}", options.step));
