@@ -20,7 +20,8 @@ class Faults : public Command {
     bool checkpoints;                     ///< a run with checkpoints, resumed after each fault
     std::vector<std::string> files = {};  ///< of anything else: whole or not there
   };
-  const Task run_task{"run knife_edge --method type1/gl:2 --step 0.05 --end 3 --every 2 --json", true};
+  const Task run_task{
+      "run knife_edge --method type1/gl:2 --step 0.05 --end 3 --every 2 --doubt ignore --json", true};
 
   std::string folder() const { return path("w"); }
   std::string file(const std::string& name) const { return folder() + "/" + name; }
@@ -123,8 +124,8 @@ TEST_F(Faults, OfAStudy_slow) {
 class EndingPlugin : public Command {
  protected:
   std::string line(const std::string& more) const {
-    return "run kepler_e06 --method type1/ending --step 0.05 --end 10 --out '" + path("k.csv") +
-           "' --plugin '" + DIRACSTEP_TEST_PLUGINS "/ending.so'" + more;
+    return "run kepler_e06 --method type1/ending --step 0.05 --end 10 --doubt ignore --out '" +
+           path("k.csv") + "' --plugin '" + DIRACSTEP_TEST_PLUGINS "/ending.so'" + more;
   }
   std::string saving() const { return line(" --checkpoint '" + path("c") + "' --checkpoint-every 10"); }
 
