@@ -40,7 +40,8 @@ void add_method_options(CLI::App& verb, MethodChoice& choice) {
   verb.add_option(
           "--method", choice.name,
           "A method; see diracstep list methods.  auto: GL(S) of the order asked for, or as plan says")
-      ->capture_default_str();
+      ->capture_default_str()
+      ->each([&choice](const std::string&) { choice.given = true; });
   verb.add_option("--order", choice.order,
                   "Order; methods of another one are composed to it.  0 keeps the method's own")
       ->capture_default_str();

@@ -49,6 +49,7 @@ struct MethodChoice {
   std::string name = automatic_method;
   int order = 0;
   std::optional<std::string> rule = {};  ///< for nonholonomic rows
+  bool given = false;                    ///< a method was named, be it "auto"
 };
 void add_method_options(CLI::App& verb, MethodChoice& choice);
 

@@ -45,7 +45,7 @@ struct Options {
   std::string at;
   std::optional<double> error;
   bool fixed = false;
-  long max_solves = ErrorControlOptions{}.max_solves;
+  long max_solves = ErrorControlOptions::usual_max_solves;
   std::optional<double> max_time;
   std::optional<long> max_steps;
   double smallest_step = 0.0;
@@ -225,7 +225,8 @@ IntegratorOptions run_once(const Options& options, const CatalogueScene& entry, 
 /// Finds the steps for --error.
 ErrorControlReport search(const Options& options, const CatalogueScene& entry, const Session& session,
                           double end, const IntegratorOptions& chosen) {
-  ErrorControlOptions wanted{.error = *options.error};
+  ErrorControlOptions wanted;
+  wanted.error = *options.error;
   wanted.method = options.method.name;
   wanted.order = options.method.order;
   if (options.adaptive || options.fixed) wanted.adaptive = options.adaptive;

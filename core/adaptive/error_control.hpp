@@ -2,6 +2,7 @@
 
 #include <diracstep/core/adaptive/adaptive_integrator.hpp>
 #include <diracstep/core/adaptive/step_plan.hpp>
+#include <diracstep/core/runs/run.hpp>
 #include <functional>
 #include <limits>
 #include <memory>
@@ -13,6 +14,9 @@ namespace diracstep {
 
 /// The error asked for, and how far the search may go.
 struct ErrorControlOptions {
+  static constexpr long usual_max_solves = 1'000'000;
+  static constexpr double usual_max_time = 30.0;
+
   double error = 0.0;  ///< asked for at the end of the motion, see ErrorControlReport::estimate
   std::string method = automatic_method;  ///< "auto": default_method() for this error
   int order = 0;  ///< as in IntegratorOptions; without a method, the one of default_method()
@@ -24,8 +28,8 @@ struct ErrorControlOptions {
   std::optional<bool> compensated_sums = {};  ///< empty: where the library chooses the method and the error
                                               ///< is below 1e-8
   IntegratorOptions integrator = {};          ///< the rule of rows and all else that is not said above
-  long max_solves = 1'000'000;                ///< nonlinear systems in all, or explicit steps
-  double max_time = 30.0;                     ///< seconds on the clock in all
+  long max_solves = usual_max_solves;         ///< nonlinear systems in all, or explicit steps
+  double max_time = usual_max_time;           ///< seconds on the clock in all
   std::function<bool()> go_on = {};           ///< asked within each run; false ends the search
 };
 

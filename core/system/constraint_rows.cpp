@@ -35,7 +35,7 @@ std::string row_label(const ConstraintBlocks& blocks, int row) {
     }
     row -= block->rows();
   }
-  throw std::out_of_range("there is no such row");
+  throw Misuse("row_label: there is no such row");
 }
 
 ConstraintBlocks only_holonomic(const ConstraintBlocks& blocks) {

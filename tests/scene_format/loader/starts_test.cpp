@@ -28,7 +28,7 @@ Sample end_of(const CatalogueScene& entry, double end, const std::string& method
                         {.method = method, .step = grid.step});
   Sample last;
   const RunReport report =
-      run(integrator, grid.steps, Momentum::projected, grid.steps, [&](const Sample& sample) {
+      run_steps(integrator, grid.steps, Momentum::projected, grid.steps, [&](const Sample& sample) {
         last = sample;
         return true;
       });
