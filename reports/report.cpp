@@ -41,7 +41,7 @@ Cells row_cells(const StudyRow& row) {
   return {row.method == ida_method ? "IDA, " + row.formulation : row.method,
           row.is_baseline() ? "" : fmt::format("{}", row.order),
           row.is_baseline() ? fmt::format("rtol {:g}", row.rtol)
-                             : (std::isfinite(row.step) ? fmt::format("{:.4g}", row.step) : "-"),
+                            : (std::isfinite(row.step) ? fmt::format("{:.4g}", row.step) : "-"),
           fmt::format("{}", row.steps),
           error_cell(row.error_q),
           error_cell(row.error_p),

@@ -25,7 +25,8 @@ using PageFacts = std::vector<std::pair<std::string, std::string>>;
 std::string study_page(const std::vector<PageEntry>& entries, const PageFacts& options,
                        const std::filesystem::path& directory);
 
-/// The data of the page as JSON: that of studies_json, the styles of the curves, and the runs of the histories.
+/// The data of the page as JSON: that of studies_json, the styles of the curves, and the runs of the
+/// histories.
 std::string study_page_data(const std::vector<PageEntry>& entries);
 
 }  // namespace diracstep

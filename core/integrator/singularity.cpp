@@ -38,8 +38,7 @@ std::string names_in(const Vector& combination, const NonlinearProblem& problem,
     if (std::ranges::find(names, name) == names.end()) names.push_back(name);
   }
   std::string list;
-  for (std::size_t k = 0; k < std::min(names.size(), max_names); ++k)
-    list += (k == 0 ? "" : ", ") + names[k];
+  for (std::size_t k = 0; k < std::min(names.size(), max_names); ++k) list += (k == 0 ? "" : ", ") + names[k];
   return names.size() > max_names ? list + ", …" : list;
 }
 

@@ -54,8 +54,7 @@ MatrixForm matrix_form(const Scene& scene, int limit) {
   }
   const double filled = filled_part(scene);
   reason << "the factors fill " << std::lround(100.0 * filled) << " % of a full matrix, "
-         << (filled > max_filled ? "more than " : "no more than ") << std::lround(100.0 * max_filled)
-         << " %";
+         << (filled > max_filled ? "more than " : "no more than ") << std::lround(100.0 * max_filled) << " %";
   return {filled > max_filled, reason.str()};
 }
 

@@ -28,6 +28,7 @@ class RowSubset final : public ConstraintRows {
   }
 
   bool constant() const override { return block_->constant(); }
+  bool workless() const override { return block_->workless(); }
   std::string origin(int row) const override { return block_->origin(kept_[static_cast<std::size_t>(row)]); }
   void position(double t, ConstVectorRef q, VectorRef phi) const override {
     Vector all(block_->rows());

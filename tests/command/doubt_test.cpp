@@ -20,7 +20,7 @@ class Doubt : public Command {
 };
 
 /// A load of 1 mH and 1 kΩ at a ripple of 50 Hz with steps of 0.5 ms: R/L h = 500.
-const char* const stiff_load = R"(
+const char* const stiff_load = R"toml(
 [parameters]
 c = 1e-5
 r = 1000
@@ -47,7 +47,7 @@ qC = "5*c"
 [span]
 end = 0.013
 step = 0.0005
-)";
+)toml";
 
 TEST_F(Doubt, HasAnExitStatusOfItsOwn) {
   const std::string file = scene("load", stiff_load);
@@ -64,16 +64,30 @@ TEST_F(Doubt, HasAnExitStatusOfItsOwn) {
 }
 
 TEST_F(Doubt, IsNotRaisedByDrivenScenes) {
-  const std::string driven = scene("driven", R"(
-lagrangian = "v_x^2/2 - x^2/2 + x*sin(2*t)"[coordinates] x = {}[start] x = 0 [span] end = 10.0 step = 0.1) ");
-      const std::string moved = scene("moved", R"(
+  const std::string driven = scene("driven", R"toml(
+lagrangian = "v_x^2/2 - x^2/2 + x*sin(2*t)"
+[coordinates]
+x = {}
+[start]
+x = 0
+[span]
+end = 10.0
+step = 0.1
+)toml");
+  const std::string moved = scene("moved", R"toml(
 lagrangian = "(v_x^2+v_y^2)/2"
 [coordinates]
 x = {}
 y = {}
 [[rows]]
-equation = "x = 1 - cos(t)"[start] x = 0 [span] end = 3.0 step = 0.1) ");
-      for (const std::string& file : {driven, moved}) {
+equation = "x = 1 - cos(t)"
+[start]
+x = 0
+[span]
+end = 3.0
+step = 0.1
+)toml");
+  for (const std::string& file : {driven, moved}) {
     const Outcome outcome = run("run " + file);
     EXPECT_EQ(outcome.status, 0) << outcome.err;
     EXPECT_EQ(outcome.err.find("energy"), std::string::npos) << outcome.err;

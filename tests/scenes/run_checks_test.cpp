@@ -125,7 +125,12 @@ TEST(NodeCheck, SeesAMomentumThatStaysWhileAForceActs) {
     NodeCheck check(scene, 100);
     for (long k = 0; k < 20; ++k) {
       const double t = 1e-7 * static_cast<double>(k);
-      Sample node{.time = t, .q = Vector{{1e-6}}, .v = Vector{{0.0}}, .p = Vector{{0.0}}};
+      Sample node{.time = t,
+                  .q = Vector{{1e-6}},
+                  .v = Vector{{0.0}},
+                  .p = Vector{{0.0}},
+                  .lambda = {},
+                  .impulse = {}};
       if (change > 0.0) {
         node.q[0] *= std::cos(1e6 * t);
         node.p[0] = -1e-27 * std::sin(1e6 * t);
@@ -187,7 +192,12 @@ TEST(EnergyCheck, DoesNotDependOnTheOrigin) {
     scene.start = {0.0, Vector{{origin + 1.0}}, Vector{{0.0}}};
     EnergyCheck check(scene);
     const auto see = [&](double t, double x, double v) {
-      Sample point{.time = t, .q = Vector{{origin + x}}, .v = Vector{{v}}, .p = Vector{{v}}};
+      Sample point{.time = t,
+                   .q = Vector{{origin + x}},
+                   .v = Vector{{v}},
+                   .p = Vector{{v}},
+                   .lambda = {},
+                   .impulse = {}};
       point.energy = scene.energy(t, point.q, point.v);
       check.see(point);
     };

@@ -14,8 +14,8 @@ enum class DaeFormulation {
   index_2,      ///< the multipliers themselves, without a tolerance: stabilised index 2
   velocity,     ///< multipliers as derivatives, A v + b = 0 alone: index 1, φ drifts
 };
-inline constexpr std::array<DaeFormulation, 4> all_formulations{DaeFormulation::rates, DaeFormulation::rates_loose, DaeFormulation::index_2,
-                                                   DaeFormulation::velocity};
+inline constexpr std::array<DaeFormulation, 4> all_formulations{
+    DaeFormulation::rates, DaeFormulation::rates_loose, DaeFormulation::index_2, DaeFormulation::velocity};
 
 /// "rates", "rates-loose", "index-2" or "velocity".
 const char* name(DaeFormulation formulation);

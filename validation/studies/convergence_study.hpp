@@ -23,7 +23,7 @@ struct StudyOptions {
   /// Tolerances of the baselines; empty: no runs of theirs.
   std::vector<double> rtols = {1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12, 1e-13, 1e-14};
   std::vector<std::string> baselines = {ida_method, erk_method};  ///< beside the methods
-  std::optional<DaeFormulation> ida_formulation = {};                           ///< empty: best_formulations() of the scene
+  std::optional<DaeFormulation> ida_formulation = {};             ///< empty: best_formulations() of the scene
   int repeats = 5;  ///< timed runs of each row; long runs take fewer
   Momentum momentum = Momentum::projected;
   std::optional<double> t_end = {};              ///< instead of the scene's

@@ -17,8 +17,9 @@ struct Candidate {
   std::vector<WorkPoint> points;  ///< of the runs that completed
 };
 
-Candidate tried(DaeFormulation formulation, const Scene& scene, double t_end, const std::vector<double>& rtols,
-                const ReferenceEnd& reference, double budget, const Look& look) {
+Candidate tried(DaeFormulation formulation, const Scene& scene, double t_end,
+                const std::vector<double>& rtols, const ReferenceEnd& reference, double budget,
+                const Look& look) {
   Candidate candidate{formulation, {}};
   for (const double rtol : rtols) {
     if (look) look();
@@ -48,12 +49,14 @@ const Candidate* fastest_at(double error, const std::vector<Candidate>& all,
 
 }  // namespace
 
-std::vector<DaeFormulation> best_formulations(const Scene& scene, double t_end, const std::vector<double>& rtols,
-                                 const ReferenceEnd& reference, double budget, const Look& look) {
+std::vector<DaeFormulation> best_formulations(const Scene& scene, double t_end,
+                                              const std::vector<double>& rtols, const ReferenceEnd& reference,
+                                              double budget, const Look& look) {
   const std::vector<DaeFormulation> formulations = formulations_of(scene);
   if (formulations.size() == 1 || rtols.empty()) return {DaeFormulation::rates};
   std::vector<Candidate> all;
-  for (const DaeFormulation formulation : formulations) all.push_back(tried(formulation, scene, t_end, rtols, reference, budget, look));
+  for (const DaeFormulation formulation : formulations)
+    all.push_back(tried(formulation, scene, t_end, rtols, reference, budget, look));
   std::vector<DaeFormulation> chosen;
   for (const double error : judged_errors) {
     const Candidate* const best = fastest_at(error, all, chosen);

@@ -108,8 +108,8 @@ StabilityRow run_stability_case(const StabilityCase& that, const Registry& regis
                                 const SolverFactory& solvers, const StabilityMethod& method,
                                 const std::function<bool()>& going_on = {});
 
-/// Every method on every case, and IDA at tolerances 1e-3, 1e-4, … as long as a run takes no more CPU time than
-/// the longest of ours.
+/// Every method on every case, and IDA at tolerances 1e-3, 1e-4, … as long as a run takes no more CPU time
+/// than the longest of ours.
 std::vector<StabilityResult> stability_study(const std::vector<StabilityCase>& cases,
                                              const Registry& registry, const SolverFactory& solvers,
                                              const std::vector<StabilityMethod>& methods, bool with_ida,

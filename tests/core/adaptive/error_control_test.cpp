@@ -7,13 +7,18 @@
 #include "scenes.hpp"
 #include "stepping.hpp"
 
+#if defined(__GNUC__) && !defined(__clang__) && __GNUC__ < 13
+#pragma GCC diagnostic ignored "-Wmaybe-uninitialized"  // of empty functions in options, which are made empty
+#endif
+
 namespace diracstep {
 namespace {
 
 using testing::expect_misuse;
 using testing::samples_of;
 
-ErrorControlReport solve(const std::shared_ptr<const Scene>& scene, double end, ErrorControlOptions options) {
+ErrorControlReport solve(const std::shared_ptr<const Scene>& scene, double end,
+                         const ErrorControlOptions& options) {
   return solve_to_error(scene, Registry::with_built_ins(), kinsol(), end, options);
 }
 

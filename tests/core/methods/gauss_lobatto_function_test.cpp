@@ -57,8 +57,8 @@ Columns columns_of(GeneratingFunction& s, const PhasePoint& start, const PhasePo
   const GraphOf graph = graph_of(s.type());
   Columns y(s.dimension(), s.columns());
   y.col(0) = graph.starts_from_position ? start.q : start.p;
-  y.col(1) = graph.ends_at_position ? end.at.q : end.at.p;
-  const Vector v = (end.at.q - start.q) / h;
+  y.col(1) = graph.ends_at_position ? end.q : end.p;
+  const Vector v = (end.q - start.q) / h;
   s.guess_inner({0.0, h}, start.q, start.p, v, y.rightCols(s.inner_columns()));
   EXPECT_TRUE(make_stationary(s, {0.0, h}, y));
   return y;
@@ -77,7 +77,7 @@ TEST(GaussLobattoFunction, TypesTwoAndThreeAreTheLegendreTransformsOfTypeOne) {
       const auto f = function(type, s);
       value[static_cast<int>(type) - 1] = f->value({0.0, h}, columns_of(*f, start, end));
     }
-    EXPECT_NEAR(value[1], end.at.p.dot(end.at.q) - value[0], 1e-14) << s;
+    EXPECT_NEAR(value[1], end.p.dot(end.q) - value[0], 1e-14) << s;
     EXPECT_NEAR(value[2], -start.p.dot(start.q) - value[0], 1e-14) << s;
   }
 }
