@@ -60,6 +60,8 @@ bool Convergence::by_three_runs() const {
   return safety * differences_.back() <= error_ && safety * differences_[runs() - 3] <= error_;
 }
 
+bool Convergence::near_round_off() const { return stagnant_ > 0 && differences_.back() < round_off; }
+
 double Convergence::next_factor() const {
   if (!(estimate_ > 0.0) || stagnant_ > 0) return 0.7;
   return std::clamp(std::pow(aimed * error_ / estimate_, 1.0 / order_), 0.35, 0.7);

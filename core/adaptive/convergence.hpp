@@ -39,6 +39,9 @@ class Convergence {
   bool order_confirmed() const { return confirmed(runs()) && confirmed(runs() - 1); }
   /// Three refinements in a row that did not halve the difference.
   bool stagnates() const { return stagnant_ >= 3; }
+  /// The last refinement did not halve a difference that is as small as those of round-off: what the work to
+  /// go is predicted from has no meaning then.
+  bool near_round_off() const;
   /// Factor of the next step, from 0.35 to 0.7.
   double next_factor() const;
   /// Part of the work of the last run that one which meets the error would take, by the order observed.

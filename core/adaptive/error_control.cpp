@@ -12,6 +12,7 @@ namespace {
 using detail::RefinementSearch;
 
 constexpr double cost_of_variable = 1.4;   // of a variable step beside a fixed one of the same method
+constexpr double first_parts = 10.0;        // of the work allowed, of which the first run takes one
 constexpr double most_over_median = 30.0;  // of the rate that the first fixed step follows
 
 std::string text(double value) { return to_text(value, 3); }
@@ -40,6 +41,9 @@ FirstSteps first_steps(const ErrorControlOptions& options, const RateSurvey& sur
   const double median = survey.scales.lowest / 0.3;
   if (options.first_step <= 0.0 && survey.fastest > 0.0)
     step = std::min(step, radians / std::min(survey.fastest, most_over_median * median));
+  // However little work is allowed, the first runs fit into it, and their answer has an estimated error.
+  if (options.first_step <= 0.0)
+    step = std::max(step, std::min(span / 20.0, first_parts * span / static_cast<double>(options.max_solves)));
   return {step, std::clamp(5.0 * accuracy, 0.02, 1.2), span * survey.fastest / radians};
 }
 

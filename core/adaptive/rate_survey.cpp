@@ -12,6 +12,11 @@ namespace diracstep {
 
 namespace {
 
+constexpr double short_part = 1e-3;     // of the span: a survey of less says little of the motion
+constexpr double largest_power = 20.0;  // of the time, by which ω is taken to fall like m/(t − t0)
+constexpr long longer_survey = 8;       // times the steps, once, where ω falls so
+constexpr long most_steps = 5000;       // of a survey that is made longer
+
 /// The motion over one step of the survey: mean squares of v and a, and of ȧ from their difference.
 struct Stretch {
   double duration, v2, a2, jerk2;
@@ -37,12 +42,26 @@ double median(const std::vector<Stretch>& stretches, Quantity quantity) {
   return 0.0;
 }
 
+double fastest_rate(const std::vector<Stretch>& stretches, double typical) {
+  double fastest = 0.0;
+  for (const Stretch& stretch : stretches) fastest = std::max(fastest, stretch.rate(typical));
+  return fastest;
+}
+
 /// Whether ω only fell, by far, in a time that is short beside the motion, as after a start at rest: then
 /// what was surveyed says nothing of the rest.
 bool only_fell(const std::vector<Stretch>& stretches, double typical, double covered, double span) {
-  double fastest = 0.0;
-  for (const Stretch& stretch : stretches) fastest = std::max(fastest, stretch.rate(typical));
-  return covered < 1e-3 * span && !stretches.empty() && stretches.back().rate(typical) < 1e-2 * fastest;
+  return covered < short_part * span && !stretches.empty() &&
+         stretches.back().rate(typical) < 1e-2 * fastest_rate(stretches, typical);
+}
+
+/// Whether ω still falls like m/(t − t0) in a time that is short beside the motion, as it does after a start
+/// at rest under a force like (t − t0)^m: each step then lengthens that time by one factor, and with more
+/// steps the survey gets through.
+bool falls_like_time(const std::vector<Stretch>& stretches, double typical, double covered, double span) {
+  if (stretches.empty() || covered >= short_part * span) return false;
+  const double last = stretches.back().rate(typical);
+  return last < 0.5 * fastest_rate(stretches, typical) && last * covered < largest_power;
 }
 
 double lowest_rate(const std::vector<Stretch>& stretches, double typical) {
@@ -141,6 +160,9 @@ RateSurvey survey_rate(const Scene& scene, const SolverFactory& solvers, double 
       median(first.stretches, [](const Stretch& s) { return s.v2 > 0.0 ? std::sqrt(s.a2 / s.v2) : 0.0; });
   SurveyRun second(motion, scene, end, typical);
   survey.failure = second.go(max_steps - max_steps / 2);
+  if (longer_survey * max_steps <= most_steps && survey.failure.empty() &&
+      falls_like_time(second.stretches, typical, second.covered, span))
+    return survey_rate(scene, solvers, end, longer_survey * max_steps);
   survey.scales.typical = typical;
   const bool fell = only_fell(second.stretches, typical, second.covered, span);
   survey.scales.lowest = std::max(fell ? 0.0 : lowest_rate(second.stretches, typical), 0.3 / span);

@@ -77,6 +77,8 @@ bool RefinementSearch::stopped(long max_solves) {
   if (!report_.runs.empty()) {
     const ErrorControlRun& last = report_.runs.back();
     expected += static_cast<double>(effort(last) * refinement_) / static_cast<double>(last_refinement_);
+  } else if (!report_.adaptive) {
+    expected += static_cast<double>(plan_.steps() * refinement_);
   }
   const double limit = static_cast<double>(max_solves);
   const double needed = predicted_solves();
@@ -87,7 +89,7 @@ bool RefinementSearch::stopped(long max_solves) {
   else if (expected > limit)
     refuse("the next run would bring the work to " + text(expected) +
            " nonlinear systems or explicit steps (--max-solves)");
-  else if (convergence_.runs() >= 5 && needed > limit)
+  else if (convergence_.runs() >= 5 && needed > limit && !convergence_.near_round_off())
     refuse("at the rate of the runs so far it would take about " + text(needed) +
            " nonlinear systems or explicit steps (--max-solves)");
   else if (report_.runs.size() >= max_runs)

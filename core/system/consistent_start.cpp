@@ -109,6 +109,15 @@ void require_met(const Scene& scene, const Start& start, const char* guessed) {
   }
 }
 
+/// Throws Misuse where a row is not met at a start that was projected.
+void require_projected(const Scene& scene, const Start& start) {
+  try {
+    require_consistent(scene, start);
+  } catch (const InconsistentStart& start_off) {
+    throw Misuse(std::string(start_off.what()) + "; the start cannot be projected onto the rows");
+  }
+}
+
 /// The scene without the rows that depend on others, where only what is not held moves, at its start or at a
 /// pose near it.
 std::shared_ptr<const Scene> independent(std::shared_ptr<const Scene> scene, const std::vector<int>& held) {
@@ -208,6 +217,8 @@ ConsistentStart project_start(const Scene& given, const Start& given_start, cons
   result.velocity_moved = (result.start.v - start.v).norm();
   if (!held(guesses.q).empty() || !held(guesses.v).empty())
     require_met(scene, result.start, held(guesses.v).empty() ? "positions" : "positions and velocities");
+  else
+    require_projected(scene, result.start);  // rows that seemed redundant were not solved for
   return result;
 }
 

@@ -204,6 +204,7 @@ ConstraintBlocks hidden_rows(const Scene& scene) {
   if (scene.dimension() > largest_full_matrix) return {};
   const Point first{start.time, start.q, start.v}, other = near(start);
   const FullDerivatives at_first(scene, first), at_other(scene, other);
+  if (!at_first.lvv.allFinite()) return {};  // told where the momentum is taken
   const Columns w = directions(scene, first, at_first, other, at_other);
   if (w.cols() == 0) return {};
   const Directions parts = split(w, at_first.fv);

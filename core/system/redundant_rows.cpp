@@ -120,6 +120,10 @@ std::vector<int> dependent_sparse_columns(const Eigen::SparseMatrix<double>& one
   return dependent;
 }
 
+/// Poses around the start fulfil the rows to about 1e-10, and what depends on others there does so to as
+/// much.
+constexpr double pose_tolerance = 1e-7;
+
 /// One-forms at the start, and at poses around it that the rows allow.
 std::vector<Columns> one_forms_around(const Scene& scene, const Start& start) {
   ConstraintsAtPoint rows(scene.constraints, scene.dimension());
@@ -160,7 +164,7 @@ std::vector<int> best_choice(std::vector<int> at_start, const std::vector<Column
   constexpr double clearly = 2.0;
   double best = margin_without(at_start, poses);
   for (std::size_t k = 1; k < poses.size(); ++k) {
-    std::vector<int> other = dependent_columns(poses[k], tolerance);
+    std::vector<int> other = dependent_columns(poses[k], std::max(tolerance, pose_tolerance));
     if (other.size() != at_start.size()) continue;
     const double margin = margin_without(other, poses);
     if (margin <= clearly * best) continue;
@@ -235,8 +239,10 @@ bool singular_at_start_only(const Scene& scene, const Start& start, double toler
   if (scene.rows() == 0 || scene.rows() > max_rows_in_full) return false;
   const std::vector<Columns> poses = one_forms_around(scene, start);
   const std::size_t here = dependent_columns(poses[0], tolerance).size();
-  return std::ranges::any_of(
-      poses, [&](const Columns& there) { return dependent_columns(there, tolerance).size() < here; });
+  // All poses: one that was found from afar may lie on another branch of the rows, of another rank.
+  return poses.size() > 1 && std::all_of(poses.begin() + 1, poses.end(), [&](const Columns& there) {
+           return dependent_columns(there, std::max(tolerance, pose_tolerance)).size() < here;
+         });
 }
 
 std::shared_ptr<const Scene> without_rows(const Scene& scene, const std::vector<std::string>& names) {

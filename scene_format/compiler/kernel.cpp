@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <diracstep/files/sha256.hpp>
 #include <diracstep/scene_format/compiler/kernel.hpp>
 #include <diracstep/scene_format/compiler/operations.hpp>
@@ -261,7 +262,6 @@ std::string Kernel::source(const std::string& name, int instance_width, int posi
 
 const std::string& kernel_prelude() {
   static const std::string text = R"(/* Written by DiracStep from a scene file: valid C and C++. */
-#include <algorithm>
 #include <math.h>
 #if defined(__GNUC__)
 #define DIRACSTEP_RESTRICT __restrict__

@@ -71,7 +71,7 @@ TEST_F(RunCommand, SummaryHasErrorsWorkAndConstraint) {
   const Outcome outcome = run("run pendulum_cartesian --end 1");
   ASSERT_EQ(outcome.status, 0) << outcome.err;
   for (const char* word :
-       {"20 steps", "error against the exact reference", "Newton iterations", "constraint rows"})
+       {"50 steps of 0.02", "error against the exact reference", "Newton iterations", "constraint rows"})
     EXPECT_NE(outcome.out.find(word), std::string::npos) << word << '\n' << outcome.out;
 }
 

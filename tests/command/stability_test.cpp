@@ -89,7 +89,7 @@ TEST_F(StabilityCommand, Misuse) {
 TEST_F(StabilityCommand, RunSaysWhenTheEnergyIsLost) {
   const Outcome lost =
       run("run stiff_spring_pendulum --set k=1e6 --method type1/trapezoidal --end 0.06 --json");
-  ASSERT_EQ(lost.status, 0) << lost.err;
+  ASSERT_EQ(lost.status, 3) << lost.err;
   EXPECT_NE(lost.err.find("the energy, which this scene keeps"), std::string::npos) << lost.err;
   EXPECT_TRUE(Json::parse(lost.out)["doubt"].is_string());
   const Outcome kept = run("run stiff_spring_pendulum --set k=1e6 --method type1/gl:3 --json");
