@@ -29,7 +29,8 @@ CodePoint first_code_point(std::string_view text) {
     value = value << 6 | (byte(i) & 0x3fu);
   }
   const bool surrogate = value >= 0xd800 && value <= 0xdfff;
-  return {value, value < least[bytes] || value > 0x10ffff || surrogate ? 0 : bytes};
+  if (value < least[bytes] || value > 0x10ffff || surrogate) return {lead, 0};
+  return {value, bytes};
 }
 
 bool acts_on_terminals(std::uint32_t c) {
