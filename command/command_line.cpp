@@ -1,12 +1,17 @@
 #include <diracstep/version.h>
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
+#include <cstdio>
+#include <cstdlib>
 #include <diracstep/command/command_line.hpp>
 #include <diracstep/command/verbs.hpp>
 #include <diracstep/core/numerics/errors.hpp>
+#include <new>
+#include <string_view>
 
 namespace diracstep::command {
 
@@ -54,7 +59,31 @@ void take_plugins(CLI::App& app, Session& session, bool run_verbs) {
   }
 }
 
+volatile bool under_way = false;  ///< a verb runs
+
+/// The last function at exit: a plugin may call exit() in the middle of a run, which nothing else would tell.
+void tell_of_exit() {
+  if (!under_way) return;
+  constexpr std::string_view message =
+      "diracstep: a plugin ended the program by exit(); the files stand as they were last written\n";
+  static_cast<void>(!write(STDERR_FILENO, message.data(), message.size()));
+  _exit(failed);
+}
+
+class UnderWay {
+ public:
+  UnderWay() {
+    static const int registered = std::atexit(tell_of_exit);
+    static_cast<void>(registered);
+    under_way = true;
+  }
+  ~UnderWay() { under_way = false; }
+  UnderWay(const UnderWay&) = delete;
+  UnderWay& operator=(const UnderWay&) = delete;
+};
+
 int read_and_run(CLI::App& app, const Session& session, int count, char** arguments) {
+  const UnderWay this_call;
   try {
     app.parse(count, arguments);
     finish_output();
@@ -64,15 +93,15 @@ int read_and_run(CLI::App& app, const Session& session, int count, char** argume
   } catch (const Misuse& misuse) {
     say(misuse.what());
     return misused;
+  } catch (const std::bad_alloc&) {
+    throw;
   } catch (const std::exception& error) {
     say(error.what());
     return failed;
   }
 }
 
-}  // namespace
-
-int execute(int count, char** arguments, bool run_verbs) {
+int with_all_verbs(int count, char** arguments, bool run_verbs) {
   CLI::App app("Discrete Dirac integrators for constrained Lagrangian and Hamiltonian systems", "diracstep");
   app.set_version_flag("--version", "diracstep " DIRACSTEP_VERSION);
   app.require_subcommand(1);
@@ -93,6 +122,17 @@ int execute(int count, char** arguments, bool run_verbs) {
   add_study(app, session);
   take_plugins(app, session, run_verbs);
   return read_and_run(app, session, count, arguments);
+}
+
+}  // namespace
+
+int execute(int count, char** arguments, bool run_verbs) {
+  try {
+    return with_all_verbs(count, arguments, run_verbs);
+  } catch (const std::bad_alloc&) {  // what tells it may not take memory
+    std::fputs("diracstep: there is not enough memory\n", stderr);
+    return failed;
+  }
 }
 
 }  // namespace diracstep::command

@@ -2,6 +2,6 @@
 #include <diracstep/command/interrupt.hpp>
 
 int main(int count, char** arguments) {
-  diracstep::command::catch_interrupts();
+  diracstep::command::prepare_standard_streams();
   return diracstep::command::execute(count, arguments);
 }

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdio>
 #include <diracstep/command/progress.hpp>
+#include <diracstep/files/shown_text.hpp>
 
 namespace diracstep {
 
@@ -54,9 +55,10 @@ void Progress::show(double part, const std::string& what) {
   const double done = part - done_before_;
   if (done > 0.02 * (1.0 - done_before_))
     line += fmt::format(", about {} left", duration(elapsed * (1.0 - part) / done));
-  line += "  " + what;
+  line += "  " + shown_line(what);
   if (line.size() >= terminal_width()) line.resize(terminal_width() - 1);
-  fmt::print(stderr, "\r{}\x1b[K", line);
+  line = '\r' + line + "\x1b[K";
+  std::fwrite(line.data(), 1, line.size(), stderr);
   std::fflush(stderr);
   shown_ = true;
 }

@@ -1,4 +1,3 @@
-#include <diracstep/version.h>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -9,7 +8,6 @@
 #include <diracstep/command/run_control.hpp>
 #include <diracstep/core/runs/run_checks.hpp>
 #include <diracstep/core/runs/step_loop.hpp>
-#include <diracstep/validation/studies/convergence_study.hpp>
 
 namespace diracstep::command {
 
@@ -50,30 +48,29 @@ class Run {
     if (first == 0 || wanted(first)) keep();
     CheckedSteps steps{integrator_, &doubt_};
     const StepReport last = step_while(
-        steps, [&](long k) { return first + k < steps_ && result_.failure.empty() && !interrupted(); },
-        [&](long k) {
-          visit(first + k);
-          return true;
-        });
-    if (!last.ok()) result_.failure = last.failure;
-    if (result_.failure.empty() && integrator_.work().steps < steps_) {
-      result_.failure = fmt::format("interrupted at t = {:.17g}", integrator_.time());
-      save();
-    }
+        steps, [&](long k) { return first + k < steps_ && result_.failure.empty(); },
+        [&](long k) { return visit(first + k); });
+    if (!last.ok())
+      result_.failure = last.failure;
+    else if (result_.failure.empty() && integrator_.work().steps < steps_)
+      result_.failure = fmt::format("{} at t = {:.17g}", interruption(), integrator_.time());
     if (integrator_.time() != kept_time_) keep();
     result_.work = integrator_.work();
     result_.doubt = doubt_.text();
   }
 
  private:
-  /// What there is to do after step k.
-  void visit(long k) {
-    if (k == steps_ || checkpoint_due(k)) save();
+  /// What there is to do after step k; whether the run goes on.  The signal is asked for once, and the
+  /// checkpoint is saved before the point is kept: a run that goes on from it does not keep the point twice.
+  bool visit(long k) {
+    const bool stopped = interrupted();
+    if (k == steps_ || stopped || checkpoint_due(k)) save();
     if (wanted(k))
       keep();
     else if (k % every_look_ == 0)
       look();
     if (k % steps_between_looks == 0) show(k);
+    return !stopped;
   }
 
   bool wanted(long k) const { return k == steps_ || (keeping_.file != nullptr && k % keeping_.every == 0); }
@@ -129,50 +126,10 @@ class Run {
   Progress progress_;
 };
 
-/// What the scene's formulas give at its start and at a point beside it, as a check sum of the bits.
-std::string formula_sum(const Scene& scene) {
-  const Eigen::Index n = scene.dimension();
-  std::string bytes;
-  const auto put = [&](const Vector& values) {
-    bytes.append(reinterpret_cast<const char*>(values.data()),
-                 static_cast<std::size_t>(values.size()) * sizeof(double));
-  };
-  ConstraintsAtPoint rows(scene.constraints, static_cast<int>(n));
-  for (const double shift : {0.0, 0.01}) {
-    const Vector q = scene.start.q.array() + shift, v = scene.start.v.array() + shift;
-    Vector lq = Vector::Zero(n), lv = Vector::Zero(n);
-    scene.lagrangian->gradient(scene.start.time, q, v, lq, lv);
-    put(lq);
-    put(lv);
-    if (scene.rows() == 0) continue;
-    rows.evaluate(scene.start.time, q);
-    put(rows.coefficients());
-  }
-  return fmt::format("{:016x}", check_sum(bytes));
-}
-
 }  // namespace
 
 void run_to(long steps, Integrator& integrator, const Keeping& keeping, RunResult& result) {
   Run(steps, integrator, keeping, result).go();
-}
-
-std::vector<std::pair<std::string, std::string>> identity(const CatalogueScene& entry,
-                                                          const Integrator& integrator,
-                                                          const Keeping& keeping, bool to_file) {
-  const IntegratorOptions& options = integrator.options();
-  std::vector<std::pair<std::string, std::string>> run{{"diracstep", DIRACSTEP_VERSION},
-                                                       {"scene", entry.scene->name}};
-  for (const auto& [name, value] : entry.parameters) run.emplace_back(name, fmt::format("{:.17g}", value));
-  run.emplace_back("check sum of the formulas", formula_sum(integrator.scene()));
-  run.emplace_back("method", options.method);
-  run.emplace_back("order", std::to_string(options.order));
-  run.emplace_back("step", fmt::format("{:.17g}", options.step));
-  run.emplace_back("substeps", std::to_string(options.substeps));
-  run.emplace_back("compensated sums", options.compensated_sums ? "yes" : "no");
-  run.emplace_back("trajectory", to_file ? fmt::format("every {}", keeping.every) : "none");
-  run.emplace_back("momentum", diracstep::name(keeping.momentum));
-  return run;
 }
 
 }  // namespace diracstep::command

@@ -25,9 +25,4 @@ struct Keeping {
 /// the trajectory is on the disk before it is.
 void run_to(long steps, Integrator& integrator, const Keeping& keeping, RunResult& result);
 
-/// What makes a run the one it is: everything that its bits depend on.
-std::vector<std::pair<std::string, std::string>> identity(const CatalogueScene& entry,
-                                                          const Integrator& integrator,
-                                                          const Keeping& keeping, bool to_file);
-
 }  // namespace diracstep::command

@@ -7,6 +7,7 @@
 #include <cstring>
 #include <diracstep/command/session.hpp>
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/files/shown_text.hpp>
 
 namespace diracstep::command {
 
@@ -74,9 +75,13 @@ void add_redundancy_option(CLI::App& verb, Session& session) {
                 "Leave out rows that depend on others, and say which, instead of refusing the scene");
 }
 
-void say(std::string_view message) { fmt::print(stderr, "diracstep: {}\n", message); }
+void say(std::string_view message) {
+  const std::string line = "diracstep: " + shown_lines(message) + '\n';
+  std::fwrite(line.data(), 1, line.size(), stderr);  // where nobody can be told, the work goes on
+}
 
-void print(std::string_view text) {
+void print(std::string_view given) {
+  const std::string text = shown_lines(given);
   if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size()) refuse_output();
 }
 

@@ -69,10 +69,11 @@ void add_redundancy_option(CLI::App& verb, Session& session);
 /// Adds --solver and --jacobian, which change the session's solvers when the command line is read.
 void add_solver_options(CLI::App& verb, Session& session);
 
-/// A message for the user, on standard error.
+/// A message for the user, on standard error; lost where that is closed or full.
 void say(std::string_view message);
 
 /// Text for standard output, and the end of it.  Both throw Error where it cannot be written.
+/// Here and in messages control characters are shown escaped: see shown_lines.
 void print(std::string_view text);
 void finish_output();
 

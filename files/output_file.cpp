@@ -7,34 +7,50 @@
 #include <cstdio>
 #include <cstring>
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/files/file_lock.hpp>
 #include <diracstep/files/output_file.hpp>
 #include <filesystem>
 #include <utility>
 
 namespace diracstep {
 
-namespace {
-
-/// Makes the name of a file last: where a system stops, its folder may be older than its files.
-void sync_folder_of(const std::string& path) {
-  const auto folder = std::filesystem::path(path).parent_path();
-  const int descriptor = ::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY);
+void sync_folder(const std::string& folder) {
+  const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);  // NOLINT
   if (descriptor < 0) return;  // a folder that may be written but not read: nothing more can be done
   ::fsync(descriptor);
   ::close(descriptor);
 }
 
+namespace {
+
+void sync_folder_of(const std::string& path) {
+  const auto folder = std::filesystem::path(path).parent_path();
+  sync_folder(folder.empty() ? "." : folder.string());
+}
+
 }  // namespace
 
 OutputFile::OutputFile(const std::string& path, Mode mode) : path_(path) {
-  const int how = mode == Mode::fresh ? O_WRONLY | O_CREAT | O_TRUNC : O_RDWR;
-  descriptor_ = ::open(path.c_str(), how | O_CLOEXEC, 0666);  // NOLINT(cppcoreguidelines-pro-type-vararg)
+  // Emptied once it is locked; O_NONBLOCK: a pipe that nobody reads is refused instead of waited for.
+  const int how = mode == Mode::fresh ? O_WRONLY | O_CREAT : O_RDWR;
+  descriptor_ = ::open(path.c_str(), how | O_CLOEXEC | O_NONBLOCK | O_NOCTTY, 0666);  // NOLINT
   if (descriptor_ < 0) throw Misuse(fmt::format("'{}' cannot be written: {}", path, std::strerror(errno)));
+  ::fcntl(descriptor_, F_SETFL, ::fcntl(descriptor_, F_GETFL) & ~O_NONBLOCK);  // NOLINT
+  struct stat status {};
+  if (::fstat(descriptor_, &status) != 0 || !S_ISREG(status.st_mode)) return;
+  if (!take_lock(descriptor_)) {
+    ::close(descriptor_);
+    throw Misuse(fmt::format("'{}' cannot be written: another run is writing it", path));
+  }
+  name_is_new_ = mode == Mode::fresh;
+  if (mode == Mode::fresh && ::ftruncate(descriptor_, 0) != 0) refuse("could not be cut");
   if (mode == Mode::existing) ::lseek(descriptor_, 0, SEEK_END);
 }
 
 OutputFile::OutputFile(OutputFile&& other) noexcept
-    : path_(std::move(other.path_)), descriptor_(std::exchange(other.descriptor_, -1)) {}
+    : path_(std::move(other.path_)),
+      descriptor_(std::exchange(other.descriptor_, -1)),
+      name_is_new_(other.name_is_new_) {}
 
 OutputFile::~OutputFile() {
   if (descriptor_ >= 0) ::close(descriptor_);
@@ -58,6 +74,7 @@ void OutputFile::write(std::string_view bytes) {
 void OutputFile::sync() {
   // EINVAL: a pipe or a device, which has nothing to synchronise
   if (::fsync(descriptor_) != 0 && errno != EINVAL && errno != EROFS) refuse("could not be written in full");
+  if (std::exchange(name_is_new_, false)) sync_folder_of(path_);
 }
 
 void OutputFile::close() {
@@ -90,10 +107,69 @@ void OutputFile::refuse(const char* what) const {
 
 namespace {
 
-void write_once(const std::string& path, std::string_view bytes, bool lasting) {
+/// A new file beside `path` that becomes the one of that name, or nothing.
+class Replacement {
+ public:
+  explicit Replacement(const std::string& path) : path_(path), fresh_(path + ".new") {
+    // O_EXCL follows no link: whatever stands in the way is never written to
+    for (int attempts = 0; descriptor_ < 0; ++attempts) {
+      descriptor_ =
+          ::open(fresh_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);  // NOLINT
+      if (descriptor_ < 0 && (errno != EEXIST || attempts > 2 || !remove_leftover()))
+        throw Misuse(fmt::format("'{}' cannot be written: '{}': {}", path, fresh_, std::strerror(errno)));
+    }
+    take_lock(descriptor_);
+    struct stat old {};
+    if (::stat(path.c_str(), &old) == 0) ::fchmod(descriptor_, old.st_mode & 0777);
+  }
+  ~Replacement() {
+    if (descriptor_ < 0) return;
+    ::unlink(fresh_.c_str());
+    ::close(descriptor_);
+  }
+  Replacement(const Replacement&) = delete;
+  Replacement& operator=(const Replacement&) = delete;
+
+  void become(std::string_view bytes) {
+    while (!bytes.empty()) {
+      const ssize_t written = ::write(descriptor_, bytes.data(), bytes.size());
+      if (written < 0 && errno == EINTR) continue;
+      if (written < 0) refuse("could not be written in full");
+      bytes.remove_prefix(static_cast<std::size_t>(written));
+    }
+    if (::fsync(descriptor_) != 0) refuse("could not be written in full");
+    if (std::rename(fresh_.c_str(), path_.c_str()) != 0) refuse("could not be replaced");
+    ::close(std::exchange(descriptor_, -1));
+    sync_folder_of(path_);
+  }
+
+ private:
+  /// What a killed process left: a regular file that nobody has locked.
+  bool remove_leftover() const {
+    const int left = ::open(fresh_.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);  // NOLINT
+    if (left < 0) {
+      errno = EEXIST;
+      return false;
+    }
+    struct stat status {};
+    const bool removed = ::fstat(left, &status) == 0 && S_ISREG(status.st_mode) && take_lock(left) &&
+                         ::unlink(fresh_.c_str()) == 0;
+    ::close(left);
+    errno = EEXIST;
+    return removed;
+  }
+
+  [[noreturn]] void refuse(const char* what) const {
+    throw Error(fmt::format("'{}' {}: {}", path_, what, std::strerror(errno)));
+  }
+
+  std::string path_, fresh_;
+  int descriptor_ = -1;
+};
+
+void write_to_device(const std::string& path, std::string_view bytes) {
   OutputFile file(path, OutputFile::Mode::fresh);
   file.write(bytes);
-  if (lasting) file.sync();
   file.close();
 }
 
@@ -103,19 +179,9 @@ void replace_file(const std::string& given, std::string_view bytes) {
   namespace fs = std::filesystem;
   std::error_code none;
   const fs::file_status status = fs::status(given, none);
-  if (fs::exists(status) && !fs::is_regular_file(status)) return write_once(given, bytes, false);
-  const std::string path =
-      fs::is_symlink(given, none) && fs::exists(status) ? fs::canonical(given, none).string() : given;
-  const std::string fresh = path + ".new";
-  try {
-    write_once(fresh, bytes, true);
-  } catch (const Error&) {
-    fs::remove(fresh, none);
-    throw;
-  }
-  if (std::rename(fresh.c_str(), path.c_str()) != 0)
-    throw Error(fmt::format("'{}' could not be replaced: {}", path, std::strerror(errno)));
-  sync_folder_of(path);
+  if (fs::exists(status) && !fs::is_regular_file(status)) return write_to_device(given, bytes);
+  const bool link = fs::is_symlink(given, none) && fs::exists(status);
+  Replacement(link ? fs::canonical(given, none).string() : given).become(bytes);
 }
 
 }  // namespace diracstep

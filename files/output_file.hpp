@@ -6,6 +6,7 @@
 namespace diracstep {
 
 /// A file that is written to the end, or not without a word: every refusal of the system is an exception.
+/// While it is open no other OutputFile, of this or another process, writes it.
 class OutputFile {
  public:
   enum class Mode {
@@ -13,7 +14,8 @@ class OutputFile {
     existing,  ///< kept as it is, written at its end
   };
 
-  /// Throws Misuse, naming the path and the system's reason, where the file cannot be opened.
+  /// Throws Misuse, naming the path and the reason, where the file cannot be opened, where another run writes
+  /// it, and for a pipe that nobody reads.
   OutputFile(const std::string& path, Mode mode);
   OutputFile(const OutputFile&) = delete;
   OutputFile& operator=(const OutputFile&) = delete;
@@ -25,7 +27,7 @@ class OutputFile {
 
   /// All throw Error, naming the path and the reason: a full disk, a quota, an unplugged device.
   void write(std::string_view bytes);  ///< all or, where the file can be cut, none of them
-  void sync();                         ///< on the disk, not only in the system's memory
+  void sync();                         ///< on the disk, and its name too, not only in the system's memory
   void close();
   void cut(long size);  ///< leaves the first `size` bytes and goes on there
   long size() const;
@@ -37,10 +39,16 @@ class OutputFile {
 
   std::string path_;
   int descriptor_ = -1;
+  bool name_is_new_ = false;  ///< its folder has not been synchronised since it was opened
 };
 
 /// Replaces the file at `path` by `bytes` at once: whoever reads it, at whatever moment the machine stops,
-/// finds the old contents or the new ones.  A file PATH.new is used on the way.  Throws as OutputFile does.
+/// finds the old contents or the new ones.  A new file PATH.new is used on the way; a link or folder of that
+/// name is refused, and a file there is removed unless its writer lives.  Where `path` is a link, the file it
+/// leads to is replaced; the permissions stay.  Throws as OutputFile does.
 void replace_file(const std::string& path, std::string_view bytes);
+
+/// Makes the names in a folder last: where a system stops, a folder may be older than its files.
+void sync_folder(const std::string& folder);
 
 }  // namespace diracstep

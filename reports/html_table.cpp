@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <diracstep/files/shown_text.hpp>
 #include <diracstep/reports/html_table.hpp>
 
 namespace diracstep {
@@ -39,7 +40,7 @@ std::string cell_text(const HtmlCell& cell) {
 
 std::string html(std::string_view text) {
   std::string safe;
-  for (const char c : text) switch (c) {
+  for (const char c : shown_lines(text)) switch (c) {
       case '&':
         safe += "&amp;";
         break;

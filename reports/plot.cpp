@@ -6,6 +6,7 @@
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
+#include <diracstep/files/shown_text.hpp>
 #include <diracstep/reports/plot.hpp>
 #include <filesystem>
 #include <system_error>
@@ -66,7 +67,8 @@ std::string run_gnuplot(const std::string& script) {
 
 std::string gnuplot_text(std::string_view text) {
   std::string all = "'";
-  for (const char c : text) all += c == '\'' ? std::string("''") : std::string(1, c);
+  for (const char c : shown_line(text))  // a line end would begin a command
+    all += c == '\'' ? std::string("''") : std::string(1, c);
   return all + "'";
 }
 

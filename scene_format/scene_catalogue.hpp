@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace diracstep {
@@ -79,7 +80,9 @@ struct CatalogueScene {
   std::vector<KnownState> known = {};  ///< references that hold for the parameters, as the file lists them
   std::vector<Invariant> invariants = {};
   Recommendation recommended = {};
-  std::vector<SymbolNote> notes = {};     ///< coordinates, sizes and parameters
+  std::vector<SymbolNote> notes = {};  ///< coordinates, sizes and parameters
+  /// What a scene file says of the motion, entry by entry; none for scenes that are not from files.
+  std::vector<std::pair<std::string, std::string>> definition = {};
   std::string code = {};                  ///< how the formulas are computed: compiled, or interpreted and why
   std::vector<std::string> changes = {};  ///< what is not as given: a start that was moved, rows left out
 };

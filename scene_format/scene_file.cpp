@@ -4,14 +4,15 @@
 #include <cmath>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/system/consistent_start.hpp>
+#include <diracstep/files/input_file.hpp>
+#include <diracstep/scene_format/compiler/size_limits.hpp>
 #include <diracstep/scene_format/loader/defined_start.hpp>
+#include <diracstep/scene_format/loader/scene_definition.hpp>
 #include <diracstep/scene_format/loader/scene_functions.hpp>
 #include <diracstep/scene_format/loader/scene_kinks.hpp>
 #include <diracstep/scene_format/scene_file.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
-#include <fstream>
 #include <limits>
-#include <sstream>
 
 namespace diracstep {
 
@@ -298,6 +299,7 @@ CatalogueScene load(const std::string& file, const std::string& text, const Para
   entry.natural_step = document.step;
   entry.needs = document.needs;
   entry.code = loaded->library.origin;
+  entry.definition = scene_definition(document);
   entry.recommended = recommendation(document);
   describe(entry, *loaded);
   const References references(loaded);
@@ -321,11 +323,7 @@ CatalogueScene scene_from_text(const std::string& file, const std::string& text,
 }
 
 CatalogueScene scene_from_file(const std::string& path, const Parameters& changes) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file) throw Misuse(fmt::format("the scene file '{}' cannot be read", path));
-  std::ostringstream text;
-  text << file.rdbuf();
-  return scene_from_text(path, text.str(), changes);
+  return scene_from_text(path, read_file(path, "the scene file", size_limits().file_bytes), changes);
 }
 
 }  // namespace diracstep

@@ -1,14 +1,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <cstring>
 #include <diracstep/command/files/checkpoint_file.hpp>
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/files/input_file.hpp>
 #include <diracstep/files/output_file.hpp>
-#include <fstream>
 #include <nlohmann/json.hpp>
-#include <sstream>
 
 namespace diracstep {
 
@@ -92,11 +90,7 @@ void write_checkpoint(const std::string& path, const Checkpoint& checkpoint) {
 }
 
 Checkpoint read_checkpoint(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file) throw Misuse(fmt::format("'{}' cannot be read: {}", path, std::strerror(errno)));
-  std::ostringstream bytes;
-  bytes << file.rdbuf();
-  return decoded(bytes.view(), path);
+  return decoded(read_file(path, "the checkpoint", largest_checkpoint), path);
 }
 
 void require_same_run(const Checkpoint& saved, const std::vector<std::pair<std::string, std::string>>& run,
@@ -106,11 +100,16 @@ void require_same_run(const Checkpoint& saved, const std::vector<std::pair<std::
       if (name == key) return text;
     return std::string("nothing");
   };
-  for (const auto* list : {&run, &saved.run})
-    for (const auto& [key, text] : *list)
-      if (value(run, key) != value(saved.run, key))
-        throw Misuse(fmt::format("'{}' is of another run: its {} is {}, here it is {}", path, key,
-                                 value(saved.run, key), value(run, key)));
+  std::string differences;
+  const auto compare = [&](const std::string& key) {
+    if (value(run, key) != value(saved.run, key))
+      differences +=
+          fmt::format("\n  its {} is {}, here it is {}", key, value(saved.run, key), value(run, key));
+  };
+  for (const auto& [key, text] : run) compare(key);
+  for (const auto& [key, text] : saved.run)
+    if (std::ranges::find(run, key, &std::pair<std::string, std::string>::first) == run.end()) compare(key);
+  if (!differences.empty()) throw Misuse(fmt::format("'{}' is of another run:{}", path, differences));
 }
 
 }  // namespace diracstep

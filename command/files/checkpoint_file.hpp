@@ -28,11 +28,13 @@ Checkpoint decoded(std::string_view bytes, const std::string& path);
 /// The check sum at the end: 64 bits, Fowler-Noll-Vo 1a.
 std::uint64_t check_sum(std::string_view bytes);
 
+inline constexpr std::size_t largest_checkpoint = std::size_t{1} << 34;  ///< bytes that are read: 16 GiB
+
 /// The file at `path` is replaced at once: the old checkpoint stays whole until the new one is.
 void write_checkpoint(const std::string& path, const Checkpoint& checkpoint);
 Checkpoint read_checkpoint(const std::string& path);
 
-/// Throws Misuse, naming both values, unless the run saved is the one described.
+/// Throws Misuse, with every value that differs, unless the run saved is the one described.
 void require_same_run(const Checkpoint& saved, const std::vector<std::pair<std::string, std::string>>& run,
                       const std::string& path);
 

@@ -79,7 +79,7 @@ void TrajectoryFile::write(const Sample& sample) {
 }
 
 void TrajectoryFile::close() {
-  flush();
+  sync();
   file_.close();
 }
 

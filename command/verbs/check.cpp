@@ -158,6 +158,7 @@ class Examiner {
 };
 
 void check(const Options& options, Session& session) {
+  catch_interrupts();
   if (options.scenes && !options.names.empty()) throw Misuse("check takes either names or --scenes");
   if (options.scenes) return check_published_cases(options.json, session);
   const Wanted all = wanted(options, session);

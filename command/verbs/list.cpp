@@ -176,6 +176,7 @@ std::vector<Measurements> measure_all(const Session& session) {
 }
 
 void list(const Options& options, Session& session) {
+  if (options.measure) catch_interrupts();
   const auto wanted = [&](const char* what) { return options.what.empty() || options.what == what; };
   std::vector<Measurements> measured;
   if (options.measure && wanted("methods")) measured = measure_all(session);

@@ -20,7 +20,7 @@ struct Options {
 };
 
 void write_new(const std::string& path, const std::string& text) {
-  std::FILE* const file = std::fopen(path.c_str(), "wx");  // x: never over a file that is there
+  std::FILE* const file = std::fopen(path.c_str(), "wx");  // x: never over a file or a link that is there
   if (file == nullptr && errno == EEXIST)
     throw Misuse(fmt::format("'{}' is there already; choose another name", path));
   if (file == nullptr) throw std::system_error(errno, std::generic_category(), path);

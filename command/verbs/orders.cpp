@@ -6,8 +6,9 @@
 #include <diracstep/command/interrupt.hpp>
 #include <diracstep/command/verbs.hpp>
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/files/output_file.hpp>
+#include <diracstep/files/paths.hpp>
 #include <diracstep/validation/laws/order_table.hpp>
-#include <fstream>
 #include <memory>
 #include <nlohmann/json.hpp>
 
@@ -69,6 +70,8 @@ nlohmann::ordered_json as_json(const OrderTableRow& row, const std::vector<Order
 }
 
 void orders(const Options& options, Session& session) {
+  if (!options.out.empty()) require_outputs({{"--out", options.out}}, {});
+  catch_interrupts();
   const std::vector<OrderScene> scenes = order_scenes();
   std::vector<OrderTableRow> rows;
   for (const TableMethod& method : table_methods(session.registry)) {
@@ -83,9 +86,7 @@ void orders(const Options& options, Session& session) {
   const std::string table = order_table_markdown(rows, scenes) + '\n' + rule_table_markdown(rules) + '\n' +
                             circuit_table_markdown(circuits);
   if (!options.out.empty()) {
-    std::ofstream file(options.out);
-    file << explanation << table << std::flush;
-    if (!file) throw Misuse("cannot write '" + options.out + "'");
+    replace_file(options.out, explanation + table);
   }
   nlohmann::ordered_json json{{"orders", nlohmann::json::array()}};
   for (const OrderTableRow& row : rows) json["orders"].push_back(as_json(row, scenes));

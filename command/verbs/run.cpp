@@ -7,6 +7,7 @@
 #include <diracstep/command/interrupt.hpp>
 #include <diracstep/command/progress.hpp>
 #include <diracstep/command/run_control.hpp>
+#include <diracstep/command/run_identity.hpp>
 #include <diracstep/command/verbs.hpp>
 #include <diracstep/core/adaptive/adaptive_run.hpp>
 #include <diracstep/core/adaptive/error_control.hpp>
@@ -14,12 +15,17 @@
 #include <diracstep/core/adaptive/variable_run_checks.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/runs/run.hpp>
+#include <diracstep/files/file_lock.hpp>
+#include <diracstep/files/paths.hpp>
 #include <memory>
 #include <optional>
 
 namespace diracstep::command {
 
 namespace {
+
+constexpr long most_fixed_steps = 1'000'000'000'000;
+constexpr double most_seconds = 1e8;  // three years
 
 struct Options {
   std::string scene;
@@ -40,8 +46,8 @@ struct Options {
   std::optional<double> error;
   bool fixed = false;
   long max_solves = ErrorControlOptions::usual_max_solves;
-  double max_time = ErrorControlOptions::usual_max_time;
-  long max_steps = AdaptiveOptions{}.max_steps;
+  std::optional<double> max_time;
+  std::optional<long> max_steps;
   double smallest_step = 0.0;
   std::string doubt = "report";
   std::vector<std::string> set;
@@ -50,14 +56,31 @@ struct Options {
 
 constexpr double stated_to = 1e-6;  ///< relative, of an invariant's stated value
 
-StepGrid fitted_steps(const CatalogueScene& entry, double end, const std::optional<double>& wanted) {
-  const double start = entry.scene->start.time;
-  const double step = wanted.value_or(std::copysign(entry.natural_step, end - start));
-  const StepGrid grid = fit_steps(start, end, step);
+StepGrid fitted_steps(const CatalogueScene& entry, double end, double step, const Options& options) {
+  const StepGrid grid = fit_steps(entry.scene->start.time, end, step);
+  if (const long most = options.max_steps.value_or(most_fixed_steps); grid.steps > most)
+    throw Misuse(fmt::format("{} steps of {:g} lead to t = {:g}; --max-steps allows {}", grid.steps,
+                             grid.step, end, most));
   if (std::abs(grid.step - step) > 1e-9 * std::abs(step))
     say(fmt::format("step {:g} adjusted to {:.17g}, so that {} steps end at t = {:g}", step, grid.step,
                     grid.steps, end));
   return grid;
+}
+
+void require_limits(const Options& options) {
+  if (options.max_solves < 1)
+    throw Misuse(fmt::format("--max-solves = {}; 1 or more is needed", options.max_solves));
+  if (options.max_steps && *options.max_steps < 1)
+    throw Misuse(fmt::format("--max-steps = {}; 1 or more is needed", *options.max_steps));
+  if (options.max_steps && options.error)
+    throw Misuse("--max-steps does not go with --error: the work of its search is limited by --max-solves");
+  if (options.max_time && !(*options.max_time > 0.0 && *options.max_time <= most_seconds))
+    throw Misuse(fmt::format("--max-time = {:g}; a number of seconds above 0, up to {:g}, is needed",
+                             *options.max_time, most_seconds));
+  if (!(options.smallest_step >= 0.0) ||
+      (options.smallest_step > 0.0 && (!options.adaptive || options.error)))
+    throw Misuse(fmt::format("--smallest-step = {:g}; 0 or more is needed, and --adaptive without --error",
+                             options.smallest_step));
 }
 
 void require_sense(const Options& options) {
@@ -65,14 +88,7 @@ void require_sense(const Options& options) {
   if (options.every < 1) throw Misuse(fmt::format("--every = {}; 1 or more is needed", options.every));
   if (!options.at.empty() && !options.adaptive) throw Misuse("--at needs --adaptive");
   if (options.fixed && options.adaptive) throw Misuse("--fixed and --adaptive exclude each other");
-  if (options.max_solves < 1)
-    throw Misuse(fmt::format("--max-solves = {}; 1 or more is needed", options.max_solves));
-  if (options.max_steps < 1)
-    throw Misuse(fmt::format("--max-steps = {}; 1 or more is needed", options.max_steps));
-  if (!(options.max_time > 0.0))
-    throw Misuse(fmt::format("--max-time = {}; seconds above 0 are needed", options.max_time));
-  if (!(options.smallest_step >= 0.0))
-    throw Misuse(fmt::format("--smallest-step = {}; 0 or more is needed", options.smallest_step));
+  require_limits(options);
   if (options.doubt != "report" && options.doubt != "ignore")
     throw Misuse(fmt::format("--doubt: '{}' is not one of report, ignore", options.doubt));
   if (options.checkpoint_every < 0)
@@ -81,12 +97,29 @@ void require_sense(const Options& options) {
                     options.checkpoint_every));
   if (options.checkpoint_every > 0 && !checkpoints)
     throw Misuse("--checkpoint-every without --checkpoint FILE");
-  if (!options.out.empty() && options.out == options.checkpoint)
-    throw Misuse(fmt::format("--out and --checkpoint are both '{}'", options.out));
   if (checkpoints && options.adaptive)
     throw Misuse("--checkpoint and --resume do not go with --adaptive: checkpoints cover fixed steps only");
   if (checkpoints && options.error)
     throw Misuse("--checkpoint and --resume do not go with --error: name the method and the step instead");
+}
+
+/// The file that checkpoints go to, or empty.
+std::string checkpoint_path(const Options& options) {
+  return options.checkpoint.empty() ? options.resume : options.checkpoint;
+}
+
+/// Before anything is computed: what could not be written in the end, or would be written over something
+/// read.
+void require_files(const Options& options, const Session& session) {
+  std::vector<NamedPath> inputs, outputs;
+  if (options.scene.ends_with(".toml")) inputs.push_back({"the scene", options.scene});
+  for (const Plugin& plugin : session.plugins) inputs.push_back({"the plugin", plugin.path()});
+  if (!options.out.empty()) outputs.push_back({"--out", options.out});
+  if (const std::string checkpoint = checkpoint_path(options); !checkpoint.empty())
+    outputs.push_back({options.checkpoint.empty() ? "--resume" : "--checkpoint", checkpoint});
+  if (!options.resume.empty() && !options.out.empty() && same_file(options.resume, options.out))
+    throw Misuse(fmt::format("--out and --resume are both '{}'", options.resume));
+  require_outputs(outputs, inputs);
 }
 
 /// Where the file goes on: from the checkpoint, or from its beginning.
@@ -113,12 +146,9 @@ void go_on(const Checkpoint& saved, const Options& options, Integrator& integrat
 void run_fixed(const Options& options, const CatalogueScene& entry, const Session& session,
                Integrator& integrator, long steps, std::optional<TrajectoryFile>& file, RunResult& result) {
   Keeping keeping{.momentum = result.momentum, .every = options.every};
-  keeping.checkpoint = options.checkpoint.empty() ? options.resume : options.checkpoint;
+  keeping.checkpoint = checkpoint_path(options);
   keeping.checkpoint_every = options.checkpoint_every;
-  keeping.identity = identity(entry, integrator, keeping, !options.out.empty());
-  keeping.identity.emplace_back("rule", options.method.rule.value_or("the method's own"));
-  keeping.identity.emplace_back("solver", name(session.solver_options.iteration));
-  keeping.identity.emplace_back("Jacobian", name(session.solver_options.jacobian));
+  keeping.identity = run_identity(entry, session, options.method, integrator, keeping, !options.out.empty());
   std::optional<Checkpoint> saved;
   if (!options.resume.empty()) {
     saved = read_checkpoint(options.resume);
@@ -147,7 +177,7 @@ void run_variable(const Options& options, const CatalogueScene& entry, AdaptiveI
                                : run_at(integrator, times, result.momentum, keep, &checks);
   result.failure = report.last.failure;
   if (result.failure.empty() && interrupted())
-    result.failure = fmt::format("interrupted at t = {:.17g}", integrator.time());
+    result.failure = fmt::format("{} at t = {:.17g}", interruption(), integrator.time());
   result.work = integrator.work();
   result.doubt = checks.text();
   result.variable =
@@ -175,14 +205,14 @@ IntegratorOptions run_once(const Options& options, const CatalogueScene& entry, 
                                    .control = step_control(options.control),
                                    .end = end,
                                    .smallest_step = options.smallest_step,
-                                   .max_steps = options.max_steps});
+                                   .max_steps = options.max_steps.value_or(AdaptiveOptions{}.max_steps)});
     VariableRunChecks checks(integrator,
                              {entry.scene, session.registry, session.solvers, integrator.options()});
     open_trajectory(file, options, entry, std::nullopt);
     run_variable(options, entry, integrator, checks, end, file ? &*file : nullptr, result);
     chosen = integrator.options();
   } else {
-    const StepGrid grid = fitted_steps(entry, end, chosen.step);
+    const StepGrid grid = fitted_steps(entry, end, chosen.step, options);
     chosen.step = grid.step;
     Integrator integrator(entry.scene, session.registry, session.solvers, chosen);
     run_fixed(options, entry, session, integrator, grid.steps, file, result);
@@ -207,7 +237,7 @@ ErrorControlReport search(const Options& options, const CatalogueScene& entry, c
     wanted.first_step = std::abs(entry.natural_step);
   wanted.integrator = chosen;
   wanted.max_solves = options.max_solves;
-  wanted.max_time = options.max_time;
+  wanted.max_time = options.max_time.value_or(wanted.max_time);
   wanted.go_on = [] { return !interrupted(); };
   return solve_to_error(entry.scene, session.registry, session.solvers, end, wanted);
 }
@@ -239,7 +269,7 @@ IntegratorOptions take_found(const Options& options, const CatalogueScene& entry
                                     });
   result.failure = again.last.failure;
   if (result.failure.empty() && interrupted())
-    result.failure = fmt::format("interrupted at t = {:.17g}", result.end.time);
+    result.failure = fmt::format("{} at t = {:.17g}", interruption(), result.end.time);
   finish(file, options, result);
   return used;
 }
@@ -283,7 +313,13 @@ void report(const RunResult& result, const Options& options, const CatalogueScen
 void run(const Options& given, Session& session) {
   Options options = given;
   require_sense(options);
+  require_files(options, session);
+  std::optional<FileLock> lock;
+  if (const std::string checkpoint = checkpoint_path(options); !checkpoint.empty()) lock.emplace(checkpoint);
   const CatalogueScene entry = make_scene(session, options.scene, parameters(options.set));
+  catch_interrupts();
+  // The search of --error looks at the clock itself and ends with its best answer: it is to come first.
+  if (options.max_time) limit_time(*options.max_time + (options.error ? grace_seconds : 0.0));
   RunResult result;
   result.momentum = momentum(options.momentum);
   const double end =
@@ -334,6 +370,13 @@ void add_run(CLI::App& app, Session& session) {
   verb->add_option("--resume", options->resume,
                    "Go on from a checkpoint, with the same bits as if never interrupted")
       ->type_name("FILE");
+  verb->add_option("--max-steps", options->max_steps,
+                   "Refuse a run of more steps; with --adaptive it fails at the next one")
+      ->type_name("N");
+  verb->add_option("--max-time", options->max_time,
+                   "End the run after so many seconds, as an interrupt does: with its checkpoint;\n"
+                   "with --error the whole search, which then shows its best answer (30 without)")
+      ->type_name("S");
   verb->add_flag("--adaptive", options->adaptive, "Reversible steps of varying size");
   verb->add_option("--eps", options->eps, "Radians of a step of varying size")->capture_default_str();
   verb->add_option("--control", options->control,
@@ -351,12 +394,6 @@ void add_run(CLI::App& app, Session& session) {
   verb->add_option("--max-solves", options->max_solves,
                    "With --error: nonlinear systems, of each kind of steps tried; the best answer so far is "
                    "then shown")
-      ->type_name("N")
-      ->capture_default_str();
-  verb->add_option("--max-time", options->max_time, "With --error: seconds on the clock in all")
-      ->type_name("S")
-      ->capture_default_str();
-  verb->add_option("--max-steps", options->max_steps, "With --adaptive: the run fails at the next one")
       ->type_name("N")
       ->capture_default_str();
   verb->add_option("--smallest-step", options->smallest_step,

@@ -8,6 +8,8 @@
 #include <diracstep/command/progress.hpp>
 #include <diracstep/command/verbs.hpp>
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/files/input_file.hpp>
+#include <diracstep/files/paths.hpp>
 #include <diracstep/reports/stability_report.hpp>
 #include <diracstep/validation/studies/convergence_study.hpp>
 #include <diracstep/validation/studies/stability_cases.hpp>
@@ -95,10 +97,10 @@ std::vector<StabilityCase> chosen_cases(const Options& options, const Session& s
 
 /// The file with what stands between the two marks replaced.  Throws Misuse where it has no such marks.
 std::string with_tables(const std::string& path, const std::string& tables) {
-  std::ifstream file(path);
-  const std::string text = (std::ostringstream() << file.rdbuf()).str();
+  constexpr std::size_t largest_page = 10'000'000;  // bytes
+  const std::string text = read_file(path, "--write:", largest_page);
   const std::size_t begin = text.find(table_begin), end = text.find(table_end);
-  if (!file || begin == std::string::npos || end == std::string::npos || end < begin)
+  if (begin == std::string::npos || end == std::string::npos || end < begin)
     throw Misuse(fmt::format("--write: '{}' has no lines '{}' and '{}' to write between", path,
                              std::string(table_begin, std::char_traits<char>::length(table_begin) - 1),
                              std::string(table_end, std::char_traits<char>::length(table_end) - 1)));
@@ -140,7 +142,11 @@ void stability(const Options& options, Session& session) {
   const std::vector<StabilityMethod> methods = chosen_methods(options, session.registry);
   const std::vector<StabilityCase> cases = chosen_cases(options, session);
   const auto out = options.out.empty() ? std::nullopt : std::optional(output_directory(options.out));
-  if (!options.write.empty()) (void)with_tables(options.write, {});
+  if (!options.write.empty()) {
+    require_outputs({{"--write", options.write}}, {});
+    (void)with_tables(options.write, {});
+  }
+  catch_interrupts();
   Progress progress;
   const std::vector<LinearStability> linear = measure_linear(methods, session, progress);
   const std::vector<StabilityResult> results =

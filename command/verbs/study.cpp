@@ -9,6 +9,8 @@
 #include <diracstep/command/scene_selection.hpp>
 #include <diracstep/command/verbs.hpp>
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/files/input_file.hpp>
+#include <diracstep/files/paths.hpp>
 #include <diracstep/reports/build_facts.hpp>
 #include <diracstep/reports/plot.hpp>
 #include <diracstep/reports/report.hpp>
@@ -16,10 +18,8 @@
 #include <diracstep/reports/study_page.hpp>
 #include <diracstep/reports/study_plot.hpp>
 #include <filesystem>
-#include <fstream>
 #include <memory>
 #include <optional>
-#include <sstream>
 
 namespace diracstep::command {
 
@@ -224,11 +224,22 @@ Study one_study(const CatalogueScene& scene, const StudyOptions& options, const 
                            });
 }
 
-std::string read_file(const std::string& path) {
-  std::ifstream file(path);
-  const std::string text = (std::ostringstream() << file.rdbuf()).str();
-  if (text.empty()) throw Misuse(fmt::format("--compare: '{}' cannot be read, or is empty", path));
+constexpr std::size_t largest_study = 100'000'000;  // bytes of an earlier study.json
+
+std::string earlier_study(const std::string& path) {
+  std::string text = read_file(path, "--compare:", largest_study);
+  if (text.empty()) throw Misuse(fmt::format("--compare: '{}' is empty", path));
   return text;
+}
+
+/// Before anything is computed: a table that would be written over something read, or that cannot be written.
+void require_files(const Options& options, const Session& session) {
+  std::vector<NamedPath> inputs;
+  for (const std::string& scene : options.scenes)
+    if (scene.ends_with(".toml")) inputs.push_back({"the scene", scene});
+  for (const Plugin& plugin : session.plugins) inputs.push_back({"the plugin", plugin.path()});
+  if (!options.compare.empty()) inputs.push_back({"--compare", options.compare});
+  if (!options.table.empty()) require_outputs({{"--table", options.table}}, inputs);
 }
 
 PageEntry page_entry(const Study& study, const CatalogueScene& scene, const Session& session) {
@@ -246,10 +257,12 @@ std::optional<OutputDirectory> report_directory(const Options& options) {
 }
 
 void study(const Options& options, Session& session) {
+  require_files(options, session);
   const std::vector<CatalogueScene> scenes = chosen_scenes(options, session);
   const StudyOptions chosen = study_options(options);
-  const std::string before = options.compare.empty() ? "" : read_file(options.compare);
+  const std::string before = options.compare.empty() ? "" : earlier_study(options.compare);
   const std::optional<OutputDirectory> out = report_directory(options);
+  catch_interrupts();
   for (const auto& [name, value] : build_facts()) say(name + ": " + value);
   std::vector<Study> studies;
   std::vector<PageEntry> page;

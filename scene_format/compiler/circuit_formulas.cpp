@@ -3,14 +3,16 @@
 #include <algorithm>
 #include <diracstep/constraints/kirchhoff.hpp>
 #include <diracstep/scene_format/compiler/circuit_formulas.hpp>
+#include <string>
+#include <unordered_map>
+#include <vector>
 
 namespace diracstep::scene_compiler {
 
 Node CircuitFormulas::coordinate(const std::string& branch, Place place, Role role) {
-  const auto family = std::ranges::find(symbols_.families, "q" + branch, &Symbols::Family::name);
-  if (family == symbols_.families.end())
-    throw SceneError(document_.file, place, fmt::format("there is no branch '{}'", branch));
-  return graph_.coordinate(static_cast<int>(family - symbols_.families.begin()), none, role);
+  const int family = symbols_.family("q" + branch);
+  if (family == none) throw SceneError(document_.file, place, fmt::format("there is no branch '{}'", branch));
+  return graph_.coordinate(family, none, role);
 }
 
 Node CircuitFormulas::value(const FormulaText& text, const std::string& what) {
@@ -54,13 +56,16 @@ Node CircuitFormulas::dissipation() {
 std::vector<std::pair<std::string, Node>> CircuitFormulas::current_laws() {
   std::vector<std::pair<std::string, std::string>> ends;
   for (const auto& branch : document_.branches) ends.emplace_back(branch.from, branch.to);
+  std::unordered_map<std::string, std::vector<const SceneDocument::Branch*>> at;  // each node, in file order
+  for (const auto& branch : document_.branches)
+    for (const std::string* end : {&branch.from, &branch.to}) at[*end].push_back(&branch);
   std::vector<std::pair<std::string, Node>> laws;
   for (const std::string& node : nodes_with_rows(ends)) {
     Node sum = graph_.number(0.0);
-    for (const auto& branch : document_.branches) {
-      const Node i = coordinate(branch.name, branch.place, Role::second);
-      if (branch.from == node) sum = graph_.add(sum, i);
-      if (branch.to == node) sum = graph_.subtract(sum, i);
+    for (const SceneDocument::Branch* branch : at[node]) {
+      const Node i = coordinate(branch->name, branch->place, Role::second);
+      if (branch->from == node) sum = graph_.add(sum, i);
+      if (branch->to == node) sum = graph_.subtract(sum, i);
     }
     laws.emplace_back(node, sum);
   }

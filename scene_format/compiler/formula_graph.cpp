@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <diracstep/scene_format/compiler/formula_graph.hpp>
 #include <diracstep/scene_format/compiler/operations.hpp>
+#include <utility>
 
 namespace diracstep::scene_compiler {
 
@@ -76,8 +77,8 @@ Known FormulaGraph::known_of(const NodeData& node) const {
 Node FormulaGraph::insert(const NodeData& node) {
   const auto found = index_.find(node);
   if (found != index_.end()) return found->second;
-  if (nodes_.size() >= size_limit)
-    throw TooLarge("a formula graph of more than " + std::to_string(size_limit) + " nodes");
+  if (nodes_.size() >= limits_.graph_nodes)
+    throw TooLarge("a formula graph of more than " + std::to_string(limits_.graph_nodes) + " nodes");
   const Node id = static_cast<Node>(nodes_.size());
   known_.push_back(known_of(node));
   nodes_.push_back(node);
@@ -184,24 +185,28 @@ Node FormulaGraph::raise(Node a, Node exponent) {
   return fold({Op::pow, a, exponent});
 }
 
+/// Visits only what is reached: files of many small formulas are read in a time that grows with their length.
 std::vector<Node> FormulaGraph::reachable(std::span<const Node> roots, bool with_indices) const {
-  std::vector<bool> seen(nodes_.size(), false);
-  Node last = none;
-  for (const Node root : roots) {
-    seen[static_cast<std::size_t>(root)] = true;
-    last = std::max(last, root);
-  }
+  visits_.resize(nodes_.size(), 0);
+  ++searches_;
   std::vector<Node> nodes;
-  for (Node node = last; node >= 0; --node) {
-    if (!seen[static_cast<std::size_t>(node)]) continue;
-    nodes.push_back(node);
-    const NodeData& data = (*this)[node];
-    if (arity(data.op) >= 1) seen[static_cast<std::size_t>(data.a)] = true;
+  const auto reach = [&](Node node) {
+    unsigned& last = visits_[static_cast<std::size_t>(node)];
+    if (std::exchange(last, searches_) != searches_) nodes.push_back(node);
+  };
+  for (const Node root : roots) reach(root);
+  for (std::size_t next = 0; next < nodes.size(); ++next) {
+    const NodeData& data = (*this)[nodes[next]];
+    if (arity(data.op) >= 1) reach(data.a);
     const bool index =
         with_indices && (data.op == Op::element || data.op == Op::coordinate) && data.b != none;
-    if (arity(data.op) == 2 || index) seen[static_cast<std::size_t>(data.b)] = true;
+    if (arity(data.op) == 2 || index) reach(data.b);
   }
-  std::ranges::reverse(nodes);
+  visited_ += nodes.size();
+  if (visited_ > limits_.graph_visits)
+    throw TooLarge("more than " + std::to_string(limits_.graph_visits) +
+                   " visits of nodes of a formula graph");
+  std::ranges::sort(nodes);
   return nodes;
 }
 

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/scene_format/compiler/size_limits.hpp>
 #include <span>
 #include <string>
 #include <unordered_map>
@@ -88,7 +89,7 @@ struct NodeData {
 /// give the same graph: no result depends on addresses or hashes.
 class FormulaGraph {
  public:
-  static constexpr std::size_t size_limit = 400'000;  ///< nodes; more throw TooLarge
+  /// More nodes, or more visits of nodes, than the limits allow.
   class TooLarge : public Error {
     using Error::Error;
   };
@@ -96,7 +97,8 @@ class FormulaGraph {
   /// `as_written`: products and quotients are computed as they stand.  Else what is known early is gathered,
   /// c·(d·x) = (c·d)·x and x/c = (1/c)·x, which saves time in every call but leaves the range of numbers
   /// where c·d or 1/c does.
-  explicit FormulaGraph(bool as_written = false) : as_written_(as_written) {}
+  explicit FormulaGraph(bool as_written = false, const SizeLimits& limits = {})
+      : as_written_(as_written), limits_(limits) {}
 
   Node number(double value) { return insert({Op::number, none, none, 0, value}); }
   Node parameter(int id) { return insert({Op::parameter, id}); }
@@ -156,9 +158,13 @@ class FormulaGraph {
   bool may_gather(Node a, Node b) const;
 
   bool as_written_;
+  SizeLimits limits_;
   std::vector<NodeData> nodes_;
   std::vector<Known> known_;
   std::unordered_map<NodeData, Node, Hash> index_;
+  mutable std::vector<unsigned> visits_;  ///< the last search that reached each node
+  mutable unsigned searches_ = 0;
+  mutable std::size_t visited_ = 0;  ///< nodes, in all searches
 };
 
 /// How many arguments an operation takes: 0 for leaves.

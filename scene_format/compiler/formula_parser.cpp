@@ -161,8 +161,7 @@ class FormulaParser::Reader : FormulaScanner {
       if (!context_.time) fail(place, "the time t may not stand in " + context_.what);
       return graph_.time();
     }
-    for (std::size_t i = 0; i < symbols_.parameters.size(); ++i)
-      if (symbols_.parameters[i].name == name) return parameter(place, static_cast<int>(i));
+    if (const int id = symbols_.parameter(name); id != none) return parameter(place, id);
     if (const auto found = symbols_.definitions.find(name); found != symbols_.definitions.end())
       return definition(place, found->first, found->second);
     if (const Node node = coordinate(place, name, Role::position); node != none) return node;
@@ -189,18 +188,17 @@ class FormulaParser::Reader : FormulaScanner {
   }
 
   Node coordinate(std::size_t place, const std::string& name, Role role) {
-    const std::string_view base = role == Role::position ? name : std::string_view(name).substr(2);
-    const auto family = std::ranges::find(symbols_.families, base, &Symbols::Family::name);
-    if (family == symbols_.families.end()) return none;
+    const std::string base = role == Role::position ? name : name.substr(2);
+    const int id = symbols_.family(base);
+    if (id == none) return none;
     if (role == Role::position && !context_.positions)
       fail(place, "the coordinate '" + name + "' may not stand in " + context_.what);
     if (role == Role::second && name[0] != context_.second)
-      fail(place,
-           "'" + name + "' may not stand in " + context_.what +
-               (context_.second != 0 ? std::string("; expected ") + context_.second + '_' + std::string(base)
-                                     : std::string()));
-    const int id = static_cast<int>(family - symbols_.families.begin());
-    return graph_.coordinate(id, subscript(place, name, family->loops.size()), role);
+      fail(place, "'" + name + "' may not stand in " + context_.what +
+                      (context_.second != 0 ? std::string("; expected ") + context_.second + '_' + base
+                                            : std::string()));
+    const std::size_t loops = symbols_.families[static_cast<std::size_t>(id)].loops.size();
+    return graph_.coordinate(id, subscript(place, name, loops), role);
   }
 
   Node subscript(std::size_t place, const std::string& name, std::size_t count) {

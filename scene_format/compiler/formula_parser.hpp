@@ -35,6 +35,25 @@ struct Symbols {
   std::map<std::string, FormulaText, std::less<>> definitions;
   std::vector<Loop> loops;
 
+  void add(Family family) {
+    family_numbers.emplace(family.name, static_cast<int>(families.size()));
+    families.push_back(std::move(family));
+  }
+  void add(Parameter parameter) {
+    parameter_numbers.emplace(parameter.name, static_cast<int>(parameters.size()));
+    parameters.push_back(std::move(parameter));
+  }
+  /// Their numbers; none for another name.
+  int family(const std::string& name) const { return number(family_numbers, name); }
+  int parameter(const std::string& name) const { return number(parameter_numbers, name); }
+
+  using Numbers = std::unordered_map<std::string, int>;
+  static int number(const Numbers& numbers, const std::string& name) {
+    const auto found = numbers.find(name);
+    return found == numbers.end() ? none : found->second;
+  }
+  Numbers family_numbers, parameter_numbers;  ///< files with very many are read in time that grows with them
+
   /// Where the nodes that came straight from the file stand there.
   std::unordered_map<Node, Place> places;
 };

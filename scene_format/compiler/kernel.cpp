@@ -1,7 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cstdint>
+#include <diracstep/files/sha256.hpp>
 #include <diracstep/scene_format/compiler/kernel.hpp>
 #include <diracstep/scene_format/compiler/operations.hpp>
 #include <set>
@@ -296,15 +296,6 @@ static inline double diracstep_where(double a, double b) { return a > 0.0 ? b : 
   return text;
 }
 
-std::string content_name(const std::string& text) {
-  std::uint64_t first = 14695981039346656037u, second = 0x9e3779b97f4a7c15u;
-  for (const char c : text) {
-    const auto byte = static_cast<std::uint64_t>(static_cast<unsigned char>(c));
-    first = (first ^ byte) * 1099511628211u;
-    second = (second + byte) * 0xff51afd7ed558ccdu;
-    second ^= second >> 31;
-  }
-  return fmt::format("{:016x}{:016x}", first, second);
-}
+std::string content_name(const std::string& text) { return sha256(text).substr(0, 32); }
 
 }  // namespace diracstep::scene_compiler

@@ -81,7 +81,7 @@ class Kernel {
 /// The first lines of every generated source: the struct KernelCall and helpers.
 const std::string& kernel_prelude();
 
-/// A name for a text that differs, for all practical purposes, from that of any other text.
+/// A name for a text that nobody can give another one: half of its SHA-256.
 std::string content_name(const std::string& text);
 
 }  // namespace diracstep::scene_compiler

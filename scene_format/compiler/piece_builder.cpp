@@ -25,6 +25,8 @@ Node PieceBuilder::leaf(const Piece& piece, std::size_t slot, Role role) {
 }
 
 PieceBuilder::Matrix PieceBuilder::gradients(const Piece& piece, const std::vector<Node>& roots, Role role) {
+  if (const std::size_t most = size_limits().derivatives; roots.size() * piece.slots.size() > most)
+    throw FormulaGraph::TooLarge("a piece of more than " + std::to_string(most) + " derivatives");
   Matrix rows(roots.size(), std::vector<Node>(piece.slots.size()));
   for (std::size_t k = 0; k < piece.slots.size(); ++k) {
     const std::vector<Node> column = graph_.derivative(roots, leaf(piece, k, role));

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <diracstep/scene_format/compiler/scene_document.hpp>
+#include <diracstep/scene_format/compiler/size_limits.hpp>
 #include <diracstep/scene_format/compiler/table_reader.hpp>
 #include <initializer_list>
 #include <set>
@@ -202,8 +203,7 @@ class DocumentReader : TableReader {
       const Place place = place_of(row->source());
       const std::string name = string(*row, "name", fmt::format("row{}", document_.rows.size() + 1));
       if (!is_name(name)) fail(place, fmt::format("'{}' is no name for a row", name));
-      for (const auto& other : document_.rows)
-        if (other.name == name) fail(place, fmt::format("two rows are named '{}'", name));
+      if (!row_names_.insert(name).second) fail(place, fmt::format("two rows are named '{}'", name));
       document_.rows.push_back(
           {name, required_formula(*row, "equation", "[[rows]]"), optional_formula(*row, "for"), place});
     }
@@ -304,14 +304,57 @@ class DocumentReader : TableReader {
   }
 
   SceneDocument document_;
-  std::set<std::string> names_;
+  std::set<std::string> names_, row_names_;
 };
+
+/// The position after a quoted text that begins at `at`, or after three quotes and all up to the next three.
+std::size_t after_quotes(const std::string& text, std::size_t at) {
+  const char quote = text[at];
+  const std::string three(3, quote);
+  const bool long_text = text.compare(at, 3, three) == 0;
+  std::size_t i = at + (long_text ? 3 : 1);
+  for (; i < text.size(); ++i) {
+    if (text[i] == '\\' && quote == '"') {
+      ++i;
+    } else if (long_text ? text.compare(i, 3, three) == 0 : text[i] == quote) {
+      return i + (long_text ? 3 : 1);
+    } else if (!long_text && text[i] == '\n') {
+      return i;  // an error, which the reader of TOML will tell
+    }
+  }
+  return text.size();
+}
+
+/// The line of a key a.b.c… of more than `most` parts, 0 where there is none: the reader of TOML follows
+/// these keys by recursion, as deep as they are long.
+int line_of_long_key(const std::string& text, std::size_t most) {
+  std::size_t dots = 0;
+  for (std::size_t i = 0; i < text.size();) {
+    const char c = text[i];
+    if (c == '"' || c == '\'') {
+      i = after_quotes(text, i);
+      continue;
+    }
+    if (c == '#') i = std::min(text.find('\n', i), text.size());
+    if (c == '.' && ++dots >= most)
+      return static_cast<int>(std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(i), '\n')) +
+             1;
+    if (c == '=' || c == ',' || c == '[' || c == ']' || c == '{' || c == '}' || c == '\n' || c == '#')
+      dots = 0;
+    if (i < text.size()) ++i;
+  }
+  return 0;
+}
 
 }  // namespace
 
 SceneDocument read_document(const std::string& file, const std::string& text) {
-  if (text.size() > largest_file)
-    throw SceneError(file, {}, fmt::format("{} bytes; the limit is {}", text.size(), largest_file));
+  const SizeLimits limits = size_limits();
+  if (text.size() > limits.file_bytes)
+    throw SceneError(file, {}, fmt::format("{} bytes; the limit is {}", text.size(), limits.file_bytes));
+  if (const int line = line_of_long_key(text, limits.key_parts); line > 0)
+    throw SceneError(file, {line, 1},
+                     fmt::format("nested too deep: a key of more than {} parts", limits.key_parts));
   try {
     const toml::table root = toml::parse(std::string_view(text), std::string_view(file));
     return DocumentReader(file, text).read(root);

@@ -103,8 +103,6 @@ struct SceneDocument {
   Recommended recommended;
 };
 
-inline constexpr std::size_t largest_file = 16'000'000;  ///< bytes
-
 /// Reads the text of a scene file.  Throws SceneError.
 SceneDocument read_document(const std::string& file, const std::string& text);
 

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <diracstep/files/shown_text.hpp>
 #include <diracstep/scene_format/compiler/scene_error.hpp>
 #include <numeric>
 
@@ -34,7 +35,7 @@ std::size_t distance(std::string_view a, std::string_view b) {
 }  // namespace
 
 SceneError::SceneError(const std::string& file, Place place, const std::string& message)
-    : Misuse(with_place(file, place, message)) {}
+    : Misuse(shown_line(with_place(file, place, message))) {}
 
 std::string suggestion(std::string_view name, const std::vector<std::string>& known) {
   if (known.empty()) return "";

@@ -56,7 +56,7 @@ class SceneCompiler {
   void declare() {
     if (document_.coordinates.empty()) fail({}, "the scene has no [coordinates]");
     for (const auto& parameter : document_.parameters)
-      symbols_.parameters.push_back({parameter.name, parameter.array});
+      symbols_.add(Symbols::Parameter{parameter.name, parameter.array});
     symbols_.definitions = document_.definitions;
     for (const auto& coordinate : document_.coordinates) {
       Symbols::Family family{coordinate.name, {}, coordinate.cyclic};
@@ -64,7 +64,7 @@ class SceneCompiler {
         family.loops = parser_.loops(*coordinate.loops, {.what = "the range of '" + coordinate.name + "'"});
       if (family.loops.size() > 2)
         fail(coordinate.place, "a coordinate is repeated over one or two loops, no more");
-      symbols_.families.push_back(std::move(family));
+      symbols_.add(std::move(family));
     }
   }
 
@@ -222,16 +222,16 @@ class SceneCompiler {
 
   void add_force(SceneFunction& function, Piece& single, const SceneDocument::Entry& entry) {
     const std::string& name = entry.key.text;
-    const auto family = std::ranges::find(symbols_.families, name, &Symbols::Family::name);
-    if (family == symbols_.families.end())
+    const int number = symbols_.family(name);
+    if (number == none)
       fail(entry.key.start,
            fmt::format("[force]: there is no coordinate '{}'{}", name, suggestion(name, coordinates())));
+    const Symbols::Family family = symbols_.families[static_cast<std::size_t>(number)];
     if (entry.array) fail(entry.key.start, "[force]: expected one formula for each coordinate");
     const std::string what = "the force on '" + name + "'";
-    const Node node = parser_.formula(entry.values[0], mechanics(what, 'v', family->loops));
-    const Node target = graph_.coordinate(static_cast<int>(family - symbols_.families.begin()),
-                                          own_index(*family), Role::position);
-    add_force_terms(function, single, terms_.of(node, family->loops, what, entry.values[0].start), target);
+    const Node node = parser_.formula(entry.values[0], mechanics(what, 'v', family.loops));
+    const Node target = graph_.coordinate(number, own_index(family), Role::position);
+    add_force_terms(function, single, terms_.of(node, family.loops, what, entry.values[0].start), target);
   }
 
   /// The force −∂R/∂v of Rayleigh's function R.
@@ -278,11 +278,11 @@ class SceneCompiler {
     const std::string bare = key.size() > 2 && (key.starts_with("v_") || momentum) ? key.substr(2) : key;
     NamedValue named{none, none, Role::position, momentum, {}, entry.key.start};
     for (const bool second : {false, true}) {
-      const auto family = std::ranges::find(symbols_.families, second ? bare : key, &Symbols::Family::name);
-      if (named.family != none || family == symbols_.families.end()) continue;
-      named.family = static_cast<int>(family - symbols_.families.begin());
+      const int family = symbols_.family(second ? bare : key);
+      if (named.family != none || family == none) continue;
+      named.family = family;
       named.role = second ? Role::second : Role::position;
-      context.loops = family->loops;
+      context.loops = symbols_.families[static_cast<std::size_t>(family)].loops;
     }
     if (named.family == none) {
       const NodeData leaf = graph_[parser_.coordinate(
@@ -395,15 +395,17 @@ std::vector<const SceneFunction*> SceneProgram::functions() const {
 
 std::unique_ptr<SceneProgram> compile_scene(const std::string& file, const std::string& text,
                                             bool as_written) {
-  auto program = std::make_unique<SceneProgram>(read_document(file, text), as_written);
+  const SizeLimits limits = size_limits();
+  auto program = std::make_unique<SceneProgram>(read_document(file, text), as_written, limits);
   try {
     SceneCompiler(*program).compile();
   } catch (const FormulaGraph::TooLarge&) {
     throw SceneError(
         file, {},
-        fmt::format("the formulas and their derivatives have more than {} parts, the limit; write "
-                    "repeated elements with for = \"i = 1..N\" and sum(i = 1..N, …)",
-                    FormulaGraph::size_limit));
+        fmt::format(
+            "the formulas and their derivatives have more than {} parts, the limit, or take more than {} "
+            "visits of these; write repeated elements with for = \"i = 1..N\" and sum(i = 1..N, …)",
+            limits.graph_nodes, limits.graph_visits));
   }
   return program;
 }

@@ -94,7 +94,8 @@ struct KinkProgram {
 
 /// A scene file compiled: everything but the numbers.
 struct SceneProgram {
-  SceneProgram(SceneDocument scene, bool as_written) : document(std::move(scene)), graph(as_written) {}
+  SceneProgram(SceneDocument scene, bool as_written, const SizeLimits& limits)
+      : document(std::move(scene)), graph(as_written, limits) {}
   SceneDocument document;
   FormulaGraph graph;
   Symbols symbols;

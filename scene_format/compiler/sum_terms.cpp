@@ -1,9 +1,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <diracstep/scene_format/compiler/size_limits.hpp>
 #include <diracstep/scene_format/compiler/sum_terms.hpp>
 #include <functional>
 #include <map>
+#include <utility>
 
 namespace diracstep::scene_compiler {
 
@@ -17,8 +19,10 @@ using Parts = std::map<std::pair<Node, std::vector<int>>, Node, std::greater<>>;
 
 std::vector<Term> SumTerms::of(Node whole, const std::vector<int>& outer, const std::string& what,
                                Place place) {
-  const std::vector<bool> with_sum = holds_sum(whole);
-  const auto has_sum = [&](Node node) { return with_sum[static_cast<std::size_t>(node)]; };
+  const std::unordered_set<Node> with_sum = holding_sums(whole);
+  const auto has_sum = [&](Node node) { return with_sum.contains(node); };
+  const std::size_t most = size_limits().sum_terms;
+  std::size_t taken_apart = 0;
   std::vector<Term> terms;
   Parts parts{{{whole, outer}, graph_.number(1.0)}};
   const auto add = [&](Node node, std::vector<int> loops, Node factor) {
@@ -26,6 +30,11 @@ std::vector<Term> SumTerms::of(Node whole, const std::vector<int>& outer, const 
     if (!added) found->second = graph_.add(found->second, factor);
   };
   while (!parts.empty()) {
+    if (++taken_apart > most)  // two loops in each of many nested definitions double the terms each time
+      throw SceneError(
+          file_, place,
+          fmt::format("the sums in {} have more than {} terms when they are taken apart, the limit", what,
+                      most));
     const auto part = parts.extract(parts.begin());
     const auto& [node, loops] = part.key();
     const Node factor = part.mapped();
@@ -54,17 +63,15 @@ std::vector<Term> SumTerms::of(Node whole, const std::vector<int>& outer, const 
   return joined(std::move(terms), outer);
 }
 
-/// Of each node of the formula, by its number.
-std::vector<bool> SumTerms::holds_sum(Node whole) const {
-  std::vector<bool> with_sum;
-  const auto holds = [&](Node node) { return with_sum[static_cast<std::size_t>(node)]; };
+/// The nodes of the formula that are a sum or have one among their arguments.
+std::unordered_set<Node> SumTerms::holding_sums(Node whole) const {
+  std::unordered_set<Node> with_sum;
   for (const Node node : graph_.reachable(std::span(&whole, 1))) {  // arguments first
     const NodeData& data = graph_[node];
     const int arguments = arity(data.op);
-    const auto number = static_cast<std::size_t>(node);
-    if (number >= with_sum.size()) with_sum.resize(number + 1);
-    with_sum[number] =
-        data.op == Op::sum || (arguments >= 1 && holds(data.a)) || (arguments == 2 && holds(data.b));
+    if (data.op == Op::sum || (arguments >= 1 && with_sum.contains(data.a)) ||
+        (arguments == 2 && with_sum.contains(data.b)))
+      with_sum.insert(node);
   }
   return with_sum;
 }

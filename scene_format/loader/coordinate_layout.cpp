@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <diracstep/scene_format/compiler/size_limits.hpp>
 #include <diracstep/scene_format/loader/coordinate_layout.hpp>
 
 namespace diracstep {
@@ -10,6 +11,7 @@ using scene_compiler::SceneError;
 
 CoordinateLayout::CoordinateLayout(const scene_compiler::SceneProgram& program,
                                    const scene_compiler::ParameterValues& parameters) {
+  const long max_coordinates = static_cast<long>(scene_compiler::size_limits().coordinates);
   long total = 0;
   for (std::size_t f = 0; f < program.symbols.families.size(); ++f) {
     const auto& symbol = program.symbols.families[f];

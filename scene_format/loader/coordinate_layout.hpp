@@ -11,8 +11,7 @@ namespace diracstep {
 /// other in the file are interleaved, so that the coordinates of one body are neighbours: x_1 y_1 x_2 y_2 …
 class CoordinateLayout {
  public:
-  static constexpr long max_coordinates = 2'000'000;
-
+  /// More coordinates than SizeLimits::coordinates throw SceneError.
   CoordinateLayout(const scene_compiler::SceneProgram& program,
                    const scene_compiler::ParameterValues& parameters);
 

@@ -1,19 +1,26 @@
+#include <diracstep/version.h>
 #include <dlfcn.h>
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <spawn.h>
-#include <sys/wait.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
-#include <atomic>
+#include <array>
+#include <cmath>
 #include <cstdlib>
+#include <diracstep/files/output_file.hpp>
+#include <diracstep/files/sha256.hpp>
+#include <diracstep/files/shown_text.hpp>
+#include <diracstep/scene_format/compiler/size_limits.hpp>
+#include <diracstep/scene_format/loader/compiler_process.hpp>
+#include <diracstep/scene_format/loader/kernel_cache.hpp>
 #include <diracstep/scene_format/loader/kernel_library.hpp>
 #include <diracstep/scene_format/loader/shipped_scenes.hpp>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
-
-extern char** environ;
+#if defined(__GLIBC__)
+#include <gnu/libc-version.h>
+#endif
 
 namespace diracstep {
 
@@ -23,94 +30,112 @@ namespace fs = std::filesystem;
 using scene_compiler::CompiledKernel;
 using scene_compiler::SceneProgram;
 
+constexpr std::array<const char*, 7> flags{"-std=c11", "-O3", "-ffp-contract=off", "-fno-math-errno", "-fPIC",
+                                           "-shared",  "-w"};
+constexpr double usual_seconds = 120.0;
+
 std::string variable(const char* name) {
   const char* value = std::getenv(name);
   return value == nullptr ? "" : value;
 }
 
-/// Empty where there is no place for one.
-fs::path cache_directory() {
-  if (const std::string own = variable("DIRACSTEP_CACHE"); !own.empty()) return own;
-  if (const std::string cache = variable("XDG_CACHE_HOME"); !cache.empty())
-    return fs::path(cache) / "diracstep";
-  if (const std::string home = variable("HOME"); !home.empty())
-    return fs::path(home) / ".cache" / "diracstep";
-  return {};
+double compiler_seconds() {
+  const double given = std::strtod(variable("DIRACSTEP_CC_SECONDS").c_str(), nullptr);
+  return std::isfinite(given) && given > 0.0 ? given : usual_seconds;
 }
 
-std::vector<std::string> compilers() {
-  if (const std::string own = variable("DIRACSTEP_CC"); !own.empty()) return {own};
-  return {"cc", "gcc", "clang"};
+/// The first compiler there is, as a path; empty where there is none.
+std::string found_compiler() {
+  const std::string own = variable("DIRACSTEP_CC");
+  const auto is_program = [](const std::string& path) { return ::access(path.c_str(), X_OK) == 0; };
+  if (own.find('/') != std::string::npos) return is_program(own) ? own : "";
+  std::vector<std::string> names{"cc", "gcc", "clang"};
+  if (!own.empty()) names = {own};
+  for (const std::string& name : names) {
+    std::istringstream folders(variable("PATH"));
+    for (std::string folder; std::getline(folders, folder, ':');)
+      if (const std::string path = folder + '/' + name; !folder.empty() && is_program(path)) return path;
+  }
+  return "";
 }
 
-/// Runs a program without a shell, its messages in a file; its exit status, or -1 where it does not start.
-int run(const std::vector<std::string>& command, const fs::path& messages) {
-  std::vector<char*> arguments;
-  for (const auto& part : command) arguments.push_back(const_cast<char*>(part.c_str()));
-  arguments.push_back(nullptr);
-  posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_addopen(&actions, 0, "/dev/null", O_RDONLY, 0);
-  posix_spawn_file_actions_addopen(&actions, 1, "/dev/null", O_WRONLY, 0);
-  posix_spawn_file_actions_addopen(&actions, 2, messages.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
-  pid_t child = 0;
-  const int error = posix_spawnp(&child, arguments[0], &actions, nullptr, arguments.data(), environ);
-  posix_spawn_file_actions_destroy(&actions);
-  if (error != 0) return -1;
-  int status = 0;
-  while (waitpid(child, &status, 0) < 0)
-    if (errno != EINTR) return -1;
-  return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+/// What the bits of an object depend on beside its source.
+std::string circumstances(const std::string& compiler) {
+  struct stat status {};
+  std::error_code error;
+  const fs::path program = fs::canonical(compiler, error);
+  if (::stat(program.c_str(), &status) != 0) status = {};
+  std::string text = fmt::format("{} {} {} {}.{} ", DIRACSTEP_VERSION, program.string(), status.st_size,
+                                 status.st_mtim.tv_sec, status.st_mtim.tv_nsec);
+  for (const char* flag : flags) text += std::string(flag) + ' ';
+#if defined(__GLIBC__)
+  text += std::string("glibc ") + gnu_get_libc_version();
+#endif
+  return text;
 }
 
 std::string first_line(const fs::path& path) {
   std::ifstream file(path);
   std::string line;
   std::getline(file, line);
-  return line.substr(0, 200);
-}
-
-KernelLibrary opened(const fs::path& path, const SceneProgram& program, const std::string& origin) {
-  const auto close = [](void* handle) {
-    if (handle != nullptr) dlclose(handle);
-  };
-  std::shared_ptr<void> handle(dlopen(path.c_str(), RTLD_NOW | RTLD_LOCAL), close);
-  if (!handle) return {};
-  void* const table = dlsym(handle.get(), ("diracstep_kernels_" + program.name).c_str());
-  return {static_cast<const CompiledKernel*>(table), handle, origin};
+  return shown_line(line.substr(0, 200));
 }
 
 /// Empty, or why it failed.
-std::string compile(const SceneProgram& program, const fs::path& object) {
-  static std::atomic<int> number = 0;
-  const fs::path work = object.string() + fmt::format(".{}.{}", getpid(), number++);
-  const fs::path source = work.string() + ".c", messages = work.string() + ".txt";
-  {
-    std::ofstream file(source, std::ios::binary);
-    file << program.source;
+std::string compile(const SceneProgram& program, const std::string& compiler, const fs::path& folder) {
+  const fs::path source = folder / "kernels.c", messages = folder / "messages.txt";
+  try {
+    OutputFile file(source.string(), OutputFile::Mode::fresh);
+    file.write(program.source);
     file.close();
-    if (!file) return fmt::format("{} cannot be written", source.string());
+  } catch (const std::exception& error) {
+    return error.what();
   }
-  std::string failure = "no C compiler was found (cc, gcc or clang; Debian: apt-get install gcc libc6-dev)";
-  if (!variable("DIRACSTEP_CC").empty())
-    failure = fmt::format("DIRACSTEP_CC={} could not be run", variable("DIRACSTEP_CC"));
-  for (const auto& compiler : compilers()) {
-    const int status = run({compiler, "-std=c11", "-O3", "-ffp-contract=off", "-fno-math-errno", "-fPIC",
-                            "-shared", "-w", "-o", work.string(), source.string(), "-lm"},
-                           messages);
-    if (status == -1 || status == 127) continue;
-    std::error_code ignored;
-    if (status == 0) {
-      fs::rename(work, object, ignored);  // at once: another process may be doing the same
-      failure = ignored ? fmt::format("{} cannot be written", object.string()) : "";
-    } else {
-      failure = fmt::format("{} failed: {}", compiler, first_line(messages));
-    }
-    break;
+  std::vector<std::string> command{compiler};
+  command.insert(command.end(), flags.begin(), flags.end());
+  for (const auto& part :
+       {std::string("-o"), (folder / "kernels.so").string(), source.string(), std::string("-lm")})
+    command.push_back(part);
+  const ProcessEnd end = run_process(command, messages.string(), compiler_seconds());
+  switch (end.kind) {
+    case ProcessEnd::Kind::not_started:
+      return fmt::format("{} could not be run", compiler);
+    case ProcessEnd::Kind::out_of_time:
+      return fmt::format("{} was ended after {:g} s (DIRACSTEP_CC_SECONDS)", compiler, compiler_seconds());
+    case ProcessEnd::Kind::killed:
+      return fmt::format("{} was ended by signal {}", compiler, end.status);
+    case ProcessEnd::Kind::exited:
+      break;
+  }
+  return end.status == 0 ? "" : fmt::format("{} failed: {}", compiler, first_line(messages));
+}
+
+KernelLibrary with_table(std::shared_ptr<void> object, const SceneProgram& program,
+                         const std::string& origin) {
+  if (!object) return {};
+  void* const table = dlsym(object.get(), ("diracstep_kernels_" + program.name).c_str());
+  return {static_cast<const CompiledKernel*>(table), std::move(object), origin};
+}
+
+KernelLibrary interpreted(const std::string& why) { return {.origin = "interpreted, slowly: " + why}; }
+
+KernelLibrary compiled_now(const SceneProgram& program, const KernelCache& cache, const std::string& compiler,
+                           const std::string& key, const std::string& complaint) {
+  const fs::path folder = cache.make_work_folder();
+  if (folder.empty()) return interpreted("no folder for a compiler's files can be made");
+  const std::string failure = compile(program, compiler, folder);
+  KernelLibrary made;
+  if (failure.empty()) {
+    std::string origin = "compiled now";
+    if (!complaint.empty()) origin += fmt::format("; what was in the cache {}", complaint);
+    if (!cache.keep(folder / "kernels.so", key))
+      origin += "; not kept: " + (cache.refusal().empty() ? "the cache cannot be written" : cache.refusal());
+    made = with_table(loaded_object(folder / "kernels.so"), program, origin);
   }
   std::error_code ignored;
-  for (const auto& leftover : {work, source, messages}) fs::remove(leftover, ignored);
-  return failure;
+  fs::remove_all(folder, ignored);
+  if (made.kernels != nullptr) return made;
+  return interpreted(failure.empty() ? "the compiled kernels cannot be loaded" : failure);
 }
 
 }  // namespace
@@ -119,18 +144,20 @@ KernelLibrary kernel_library(const SceneProgram& program) {
   if (variable("DIRACSTEP_CC") == "none") return {.origin = "interpreted, as DIRACSTEP_CC=none asks for"};
   for (const ShippedScene& shipped : shipped_scenes())
     if (shipped.program == program.name) return {shipped.kernels, {}, "compiled with the library"};
-  const fs::path directory = cache_directory();
-  if (directory.empty())
-    return {.origin = "interpreted, slowly: no cache directory; set DIRACSTEP_CACHE, XDG_CACHE_HOME or HOME"};
-  const fs::path object = directory / (program.name + ".so");
-  if (KernelLibrary found = opened(object, program, "compiled, from the cache"); found.kernels) return found;
-  std::error_code error;
-  fs::create_directories(directory, error);
-  const std::string failure = compile(program, object);
-  if (!failure.empty()) return {.origin = "interpreted, slowly: " + failure};
-  KernelLibrary made = opened(object, program, "compiled now");
-  if (made.kernels) return made;
-  return {.origin = fmt::format("interpreted, slowly: {} cannot be loaded", object.string())};
+  if (const std::size_t limit = scene_compiler::size_limits().source_bytes; program.source.size() > limit)
+    return interpreted(fmt::format("{} bytes of C code, the limit for a compiler is {} (DIRACSTEP_LIMITS)",
+                                   program.source.size(), limit));
+  const std::string compiler = found_compiler();
+  if (compiler.empty() && !variable("DIRACSTEP_CC").empty())
+    return interpreted(fmt::format("DIRACSTEP_CC={} could not be run", variable("DIRACSTEP_CC")));
+  if (compiler.empty())
+    return interpreted("no C compiler was found (cc, gcc or clang; Debian: apt-get install gcc libc6-dev)");
+  const KernelCache cache;
+  const std::string key = Sha256().add(circumstances(compiler)).add(program.source).hex();
+  std::string complaint;
+  KernelLibrary found = with_table(cache.load(key, complaint), program, "compiled, from the cache");
+  if (found.kernels != nullptr) return found;
+  return compiled_now(program, cache, compiler, key, complaint);
 }
 
 }  // namespace diracstep

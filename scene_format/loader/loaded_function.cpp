@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <diracstep/scene_format/compiler/size_limits.hpp>
 #include <diracstep/scene_format/loader/loaded_function.hpp>
 
 namespace diracstep {
@@ -77,7 +78,16 @@ void LoadedFunction::load(const Piece& piece) {
   Evaluator body(program, scene_->parameters, roots);
   Turns turns(program, scene_->parameters, piece.loops, piece.counting_loops);
   LoadedPiece loaded{&piece};
+  const std::size_t width = static_cast<std::size_t>(piece.layout.width()) + piece.entries.size() +
+                            piece.curvature.size() + piece.instance.nodes().size();
+  const std::size_t most = size_limits().entries / std::max<std::size_t>(width, 1);
   turns.run([&](long row) {
+    if (static_cast<std::size_t>(loaded.count) >= most)
+      throw SceneError(
+          program.document.file, {},
+          fmt::format("repeated elements of {} coordinates and derivatives each: more than {} turns, "
+                      "the limit",
+                      width, most));
     turns.set(body);
     body.evaluate();
     for (std::size_t k = 0; k < piece.slots.size(); ++k)

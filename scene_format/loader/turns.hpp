@@ -11,8 +11,7 @@ namespace diracstep {
 /// them.
 class Turns {
  public:
-  static constexpr long most = 20'000'000;  ///< turns; more throw SceneError
-
+  /// More turns than SizeLimits::repeated, empty inner loops counted as one, throw SceneError.
   /// `counting`: rows are counted by the turns of that many of the first loops.
   Turns(const scene_compiler::SceneProgram& program, const scene_compiler::ParameterValues& parameters,
         std::vector<int> loops, std::size_t counting);
@@ -28,6 +27,7 @@ class Turns {
   std::string text() const;
 
  private:
+  [[noreturn]] void refuse() const;
   void descend(std::size_t depth, const std::function<void(long)>& visit);
 
   const scene_compiler::SceneProgram& program_;
@@ -35,7 +35,7 @@ class Turns {
   std::size_t counting_;
   std::vector<long> values_;
   std::vector<scene_compiler::Evaluator> bounds_;
-  long rows_ = 0, turns_ = 0;
+  long rows_ = 0, turns_ = 0, most_;
 };
 
 }  // namespace diracstep

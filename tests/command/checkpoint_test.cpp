@@ -85,7 +85,7 @@ TEST_F(CheckpointCommand, OtherRunsAreRefusedWithBothValues) {
   expect_misuse("run knife_edge --method type1/midpoint --step 0.05 --end 2" + control,
                 {"step is 0.1", "here it is 0.05"});
   expect_misuse("run knife_edge --method type1/midpoint --step 0.1 --end 2 --set m=2" + control,
-                {"its m is 1", "here it is 2"});
+                {"its parameter m is 1", "here it is 2"});
   expect_misuse("run knife_edge --step 0.1 --end 2 --method type1/gl:2" + control,
                 {"type1/midpoint", "type1/gl:2"});
   expect_misuse("run kepler_e06 --step 0.1 --end 2" + control, {"knife_edge", "kepler_e06"});
@@ -128,7 +128,7 @@ TEST_F(CheckpointCommand, ThatCannotBeWrittenIsAnError) {
   }
   expect_misuse("run knife_edge --checkpoint-every 5", {"--checkpoint FILE"});
   expect_misuse("run knife_edge --checkpoint c --checkpoint-every=-5", {"-5"});
-  expect_misuse("run knife_edge --checkpoint c --out c", {"both 'c'"});
+  expect_misuse("run knife_edge --checkpoint c --out c", {"--checkpoint and --out are both 'c'"});
   expect_misuse("run knife_edge --adaptive --checkpoint c",
                 {"--checkpoint", "--adaptive", "fixed steps only"});
   expect_misuse("run knife_edge --error 1e-6 --resume c", {"--resume", "--error"});

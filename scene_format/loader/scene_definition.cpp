@@ -1,0 +1,75 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <diracstep/files/sha256.hpp>
+#include <diracstep/scene_format/loader/scene_definition.hpp>
+
+namespace diracstep {
+
+using namespace scene_compiler;
+
+namespace {
+
+constexpr std::size_t longest = 200;  // characters of an entry that is stated in full
+
+std::string stated(const std::string& text) {
+  return text.size() <= longest ? text : fmt::format("{} characters, SHA-256 {}", text.size(), sha256(text));
+}
+
+std::string without_spaces(std::string text) {
+  std::erase_if(text, [](char c) { return c == ' ' || c == '\t' || c == '\n' || c == '\r'; });
+  return text;
+}
+
+std::string formula(const FormulaText& text) { return without_spaces(text.text); }
+
+class Definition {
+ public:
+  void add(std::string what, const std::string& text) {
+    entries_.emplace_back(std::move(what), stated(text));
+  }
+  void add(std::string what, const std::optional<FormulaText>& text) {
+    if (text) add(std::move(what), formula(*text));
+  }
+  void add(const std::string& what, const SceneDocument::Entry& entry) {
+    std::string text;
+    for (const FormulaText& value : entry.values) text += (text.empty() ? "" : ", ") + formula(value);
+    add(what + ' ' + entry.key.text, text);
+  }
+  std::vector<std::pair<std::string, std::string>> take() { return std::move(entries_); }
+
+ private:
+  std::vector<std::pair<std::string, std::string>> entries_;
+};
+
+}  // namespace
+
+std::vector<std::pair<std::string, std::string>> scene_definition(const SceneDocument& document) {
+  Definition all;
+  all.add("lagrangian", document.lagrangian);
+  all.add("hamiltonian", document.hamiltonian);
+  all.add("dissipation", document.dissipation);
+  for (const auto& coordinate : document.coordinates)
+    all.add("coordinate " + coordinate.name, (coordinate.loops ? formula(*coordinate.loops) : "single") +
+                                                 (coordinate.cyclic ? ", cyclic" : ""));
+  for (const auto& parameter : document.parameters)  // single values are known as they are used
+    if (parameter.array)
+      all.add("array " + parameter.name, fmt::format("{:.17g}", fmt::join(parameter.values, ", ")));
+  for (const auto& [name, text] : document.definitions) all.add("definition " + name, formula(text));
+  for (const auto& row : document.rows)
+    all.add("row " + row.name, formula(row.equation) + (row.loops ? " for " + formula(*row.loops) : ""));
+  for (const auto& entry : document.force) all.add("force on", entry);
+  for (const auto& branch : document.branches)
+    all.add(branch.kind + ' ' + branch.name,
+            fmt::format("{} from {} to {}", formula(branch.value), branch.from, branch.to));
+  for (const auto& mutual : document.mutuals)
+    all.add(fmt::format("mutual of {} and {}", mutual.first, mutual.second), formula(mutual.value));
+  all.add("start time", document.start_time);
+  for (const auto& entry : document.start) all.add("start of", entry);
+  all.add("start projected", document.project ? "yes" : "no");
+  for (const FormulaText& guess : document.guesses) all.add("guess " + formula(guess), "yes");
+  all.add("redundant rows dropped", document.drop_redundant_rows ? "yes" : "no");
+  return all.take();
+}
+
+}  // namespace diracstep
