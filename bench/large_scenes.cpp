@@ -150,8 +150,7 @@ void measure_bare(const Integrator& integrator, const char* method, Measurement&
   const auto ns = fewest_nanoseconds({times([&] { klu.refactor(); }), times([&] { klu.solve(); }),
                                       times([&] { bare.residual(); }), times([&] { bare.jacobian(); })},
                                      count, 5);
-  for (int k = 0; k < 4; ++k)
-    m.at(static_cast<std::size_t>(refactor + k)) = ns[static_cast<std::size_t>(k)] / m[unknowns];
+  for (std::size_t k = 0; k < 4; ++k) m.at(refactor + k) = ns[k] / m[unknowns];
 }
 
 /// Steps that grow with the length of a link, so that every size has the same step beside its fastest motion.

@@ -1,10 +1,9 @@
 #pragma once
 
-#include <time.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <ctime>
 #include <diracstep/solvers/sundials_build.hpp>
 #include <functional>
 #include <vector>

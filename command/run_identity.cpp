@@ -52,7 +52,7 @@ std::string c_library() {
 #if defined(__GLIBC__)
   return std::string("glibc ") + gnu_get_libc_version();
 #else
-  return "unknown";
+  return unknown_fact;
 #endif
 }
 

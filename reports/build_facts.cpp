@@ -16,12 +16,12 @@ std::string processor() {
   for (std::string line; std::getline(file, line);)
     if (line.rfind("model name", 0) == 0 && line.find(": ") != std::string::npos)
       return line.substr(line.find(": ") + 2);
-  return "unknown";
+  return unknown_fact;
 }
 
 std::string system() {
   utsname names{};
-  if (uname(&names) != 0) return "unknown";
+  if (uname(&names) != 0) return unknown_fact;
   return std::string(names.sysname) + ' ' + names.release + ", " + names.machine + ", " +
          std::to_string(std::thread::hardware_concurrency()) + " processors";
 }
@@ -32,7 +32,7 @@ std::string compiler() {
 #elif defined(__GNUC__)
   return "GCC " __VERSION__;
 #else
-  return "unknown";
+  return unknown_fact;
 #endif
 }
 

@@ -67,6 +67,14 @@ TEST(CheckpointFile, OtherRunsAreRefusedWithBothValues) {
       {"step is 0.1", "nothing"});
 }
 
+TEST(CheckpointFile, FactsThatCouldNotBeFoundOutDoNotTellRunsApart) {
+  Checkpoint saved = example();
+  saved.run.emplace_back("processor", "unknown");
+  auto run = example().run;
+  run.emplace_back("processor", "one of this machine");
+  require_same_run(saved, run, "c");
+}
+
 TEST(CheckpointFuzz, CorpusAndDamagedCopiesAreReadOrRefused) {
   std::mt19937 random(1);
   int inputs = 0;

@@ -179,30 +179,32 @@ int fflush(FILE *file) {
   return NEXT(fflush)(file);
 }
 
+#define NEXT_ALLOCATION(name)                         \
+  ({                                                  \
+    static __typeof__(name) *next;                    \
+    if (next == NULL) next = dlsym(RTLD_NEXT, #name); \
+    next;                                             \
+  })
 #define NO_MEMORY_IF_WANTED \
   if (fails(1)) {           \
     errno = ENOMEM;         \
     return NULL;            \
   }
 
-void *malloc(size_t size) {
+/* The command has a malloc of its own, which counts and then calls these (count_allocations.hpp). */
+void *__libc_malloc(size_t size) {
   NO_MEMORY_IF_WANTED
-  return __libc_malloc(size);
+  return NEXT_ALLOCATION(__libc_malloc)(size);
 }
-void *calloc(size_t count, size_t size) {
+void *__libc_calloc(size_t count, size_t size) {
   NO_MEMORY_IF_WANTED
-  return __libc_calloc(count, size);
+  return NEXT_ALLOCATION(__libc_calloc)(count, size);
 }
-void *realloc(void *old, size_t size) {
+void *__libc_realloc(void *old, size_t size) {
   NO_MEMORY_IF_WANTED
-  return __libc_realloc(old, size);
+  return NEXT_ALLOCATION(__libc_realloc)(old, size);
 }
-void *aligned_alloc(size_t alignment, size_t size) {
+void *__libc_memalign(size_t alignment, size_t size) {
   NO_MEMORY_IF_WANTED
-  return __libc_memalign(alignment, size);
-}
-int posix_memalign(void **result, size_t alignment, size_t size) {
-  if (fails(1)) return ENOMEM;
-  *result = __libc_memalign(alignment, size);
-  return *result == NULL ? ENOMEM : 0;
+  return NEXT_ALLOCATION(__libc_memalign)(alignment, size);
 }
