@@ -150,6 +150,13 @@ constexpr auto installers(std::index_sequence<N...>) {
   return std::array{&Operations<static_cast<int>(N)>::install...};
 }
 
+/// N_VClone of SUNDIALS 6.4 and 6.5 follows the null pointer it gets where memory is short.
+N_Vector clone(N_Vector vector) {
+  N_Vector copy = vector->ops->nvclone(vector);
+  if (copy != nullptr) copy->sunctx = vector->sunctx;
+  return copy;
+}
+
 }  // namespace
 
 VectorHandle make_view(int size, SUNContext context) {
@@ -167,7 +174,7 @@ VectorHandle make_view(int size, SUNContext context) {
 
 VectorHandle make_weights(N_Vector vector) {
   if (N_VGetLength(vector) <= static_cast<long>(longest_fixed))
-    return VectorHandle(require(N_VClone(vector), "N_VClone"));
+    return VectorHandle(require(clone(vector), "N_VClone"));
   VectorHandle w(require(N_VNewEmpty(vector->sunctx), "N_VNewEmpty"));
   w->content = new Weights;  // NOLINT(cppcoreguidelines-owning-memory): nvdestroy deletes it
   w->ops->nvdestroy = [](N_Vector v) {
