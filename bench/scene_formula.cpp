@@ -342,7 +342,7 @@ void compare(const char* name, std::shared_ptr<const Lagrangian> hand_l, Constra
 
 }  // namespace
 
-int main() {
+int main() try {
   std::printf("One residual and one Jacobian of type1/midpoint, ns; ratio = file / by hand\n");
   std::printf("%-20s %9s %9s %9s  %5s   %9s %9s %9s  %5s\n", "", "residual", "", "", "", "Jacobian", "", "",
               "");
@@ -360,4 +360,7 @@ int main() {
   std::printf("\nhanging_chain with %d unknowns loads in %.2f s (%s)\n",
               chain.scene->dimension() + chain.scene->rows(), processor_seconds() - begin,
               chain.code.c_str());
+} catch (const std::exception& error) {
+  std::fprintf(stderr, "scene_formula: %s\n", error.what());
+  return 1;
 }

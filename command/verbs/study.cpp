@@ -263,7 +263,7 @@ void study(const Options& options, Session& session) {
   const std::string before = options.compare.empty() ? "" : earlier_study(options.compare);
   const std::optional<OutputDirectory> out = report_directory(options);
   catch_interrupts();
-  for (const auto& [name, value] : build_facts()) say(name + ": " + value);
+  for (const auto& [name, value] : build_facts()) say(fmt::format("{}: {}", name, value));
   std::vector<Study> studies;
   std::vector<PageEntry> page;
   for (const CatalogueScene& scene : scenes) {

@@ -122,10 +122,10 @@ double ForcePolynomial::fit(const PathCubic& path, double a, double b, long poin
   // What rounding of F and of t leaves of F here, whatever is asked for.
   const double rounding = 2.0 * std::numeric_limits<double>::epsilon() * std::abs(middle);
   local_ = 1e-13 * samples_.cwiseAbs().rowwise().maxCoeff();
-  for (int k = 0; k + 1 < nodes; ++k) {
-    const double apart = std::abs(half) * (chebyshev.x[static_cast<std::size_t>(k)] -
-                                           chebyshev.x[static_cast<std::size_t>(k + 1)]);
-    local_ = local_.cwiseMax(rounding / apart * (samples_.col(k) - samples_.col(k + 1)).cwiseAbs());
+  for (std::size_t k = 0; k + 1 < chebyshev.x.size(); ++k) {
+    const double apart = std::abs(half) * (chebyshev.x[k] - chebyshev.x[k + 1]);
+    const auto i = static_cast<Eigen::Index>(k);
+    local_ = local_.cwiseMax(rounding / apart * (samples_.col(i) - samples_.col(i + 1)).cwiseAbs());
   }
   for (Eigen::Index i = 0; i < local_.size(); ++i)
     local_[i] = std::max(allowed_[i], std::isfinite(local_[i]) ? local_[i] : 0.0);

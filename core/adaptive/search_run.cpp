@@ -22,7 +22,7 @@ StepReport run_variable(AdaptiveIntegrator& integrator, double end, const AtNode
     const double left = end - integrator.time(), size = integrator.next_size();
     if (!at_node(read, false)) return {};
     if (std::abs(size) >= std::abs(left) * (1.0 - 1e-12)) break;
-    const StepReport report = integrator.step();
+    StepReport report = integrator.step();
     if (!report.ok()) return report;
   }
   StepReport report;

@@ -30,7 +30,7 @@ void DiscreteConstraint::plan_own(std::vector<int> places, int dimension) {
   own_.places = std::move(places);
   auto entries = own_.rows->pattern().entries();
   for (auto& [row, column] : entries) row = own_.places.at(static_cast<std::size_t>(row));
-  layout_.add({layout_.rows(), dimension, std::move(entries)}, 0, 0);
+  layout_.add({layout_.rows(), dimension, entries}, 0, 0);
   own_.values.setZero(own_.rows->rows());
   own_.derivative.setZero(own_.rows->pattern().nonzeros());
 }

@@ -166,7 +166,7 @@ int BlockPattern::add(const SparsityPattern& block, int row, int column, bool tr
 SparsityPattern BlockPattern::assemble(bool dense) {
   std::vector<std::pair<int, int>> all;
   for (const auto& entries : entries_) all.insert(all.end(), entries.begin(), entries.end());
-  const SparsityPattern whole =
+  SparsityPattern whole =
       dense ? SparsityPattern::dense(rows_, columns_) : SparsityPattern(rows_, columns_, all);
   for (const auto& entries : entries_) {
     auto& positions = positions_.emplace_back();
