@@ -72,7 +72,7 @@ void add_set_option(CLI::App& verb, std::vector<std::string>& assignments) {
 
 void add_redundancy_option(CLI::App& verb, Session& session) {
   verb.add_flag("--drop-redundant", session.drop_redundant_rows,
-                "Leave out rows that depend on others, and say which, instead of refusing the scene");
+                "Leave out redundant constraints, and say which, instead of refusing the scene");
 }
 
 void say(std::string_view message) {

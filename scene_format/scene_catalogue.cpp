@@ -20,7 +20,7 @@ void drop_redundant_rows(CatalogueScene& entry) {
   entry.scene = without_rows(*entry.scene, dependent);
   std::string names;
   for (const std::string& name : dependent) names += (names.empty() ? "'" : ", '") + name + "'";
-  entry.changes.push_back("rows left out, for they depend on others: " + names);
+  entry.changes.push_back("redundant constraints left out: " + names);
 }
 
 CatalogueScene make_scene(const std::string& name, const Parameters& changes) {

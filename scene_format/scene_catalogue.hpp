@@ -95,7 +95,7 @@ std::vector<std::string> scene_names();
 /// for a file that is wrong, with the line and column.
 CatalogueScene make_scene(const std::string& name, const Parameters& changes = {});
 
-/// Leaves out the rows that depend on others (redundant_rows.hpp) and notes which.
+/// Leaves out the redundant constraints (redundant_rows.hpp) and notes which.
 void drop_redundant_rows(CatalogueScene& entry);
 
 }  // namespace diracstep

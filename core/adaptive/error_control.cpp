@@ -15,8 +15,6 @@ constexpr double cost_of_variable = 1.4;   // of a variable step beside a fixed 
 constexpr double first_parts = 10.0;       // of the work allowed, of which the first run takes one
 constexpr double most_over_median = 30.0;  // of the rate that the first fixed step follows
 
-std::string text(double value) { return to_text(value, 3); }
-
 /// Adds the work of a search that was given up.
 void add_work(Work& all, const Work& part) {
   all.steps += part.steps;
@@ -68,8 +66,8 @@ ErrorControlReport search_both(const RefinementSearch::Motion& motion, const Err
   if (fixed_is_dearer)
     taken.reason += "; a fixed step would take more solves";
   else if (measured)
-    taken.reason += "; measured, a run to the error would cost " + text(of_variable) +
-                    " with variable steps, " + text(of_fixed) + " with fixed ones";
+    taken.reason += "; measured, a run to the error would cost " + to_text(of_variable, 3) +
+                    " with variable steps, " + to_text(of_fixed, 3) + " with fixed ones";
   else
     taken.reason += "; variable steps did not get there: " + variable.refusal;
   (take_variable ? by_variable : by_fixed).go();
@@ -108,7 +106,7 @@ ErrorControlReport solve_to_error(const std::shared_ptr<const Scene>& given, con
                                   const SolverFactory& solvers, double end,
                                   const ErrorControlOptions& options) {
   if (!(options.error > 0.0) || !(options.error < 1.0))
-    throw Misuse("error = " + text(options.error) + "; a relative error between 0 and 1 is needed");
+    throw Misuse("error = " + to_text(options.error, 3) + "; a relative error between 0 and 1 is needed");
   const auto scene = completed(given);
   const bool accelerates = has_accelerations(*scene);
   ErrorControlReport report;
@@ -120,7 +118,7 @@ ErrorControlReport solve_to_error(const std::shared_ptr<const Scene>& given, con
       scene, registry, solvers, end, options, survey.scales, RefinementSearch::Clock::now()};
   report.reason = options.adaptive       ? "as asked for"
                   : options.monitor.rate ? "a monitor is given"
-                                         : "max ω / min ω = " + text(survey.ratio());
+                                         : "max ω / min ω = " + to_text(survey.ratio(), 3);
   const bool may_pay =
       accelerates && survey.failure.empty() && (options.monitor.rate || survey.variable_steps_pay());
   if (!options.adaptive && may_pay) return search_both(motion, report, first);

@@ -24,9 +24,9 @@ struct PreparedScene;
 /// own.
 class Integrator {
  public:
-  /// Throws Misuse for a bad scene, start, method, order or step; for an inconsistent start, and for rows
-  /// that depend on others there, unless the options say otherwise.  What was moved or dropped stands in
-  /// plan().
+  /// Throws Misuse for a bad scene, start, method, order or step; for an inconsistent start, and for
+  /// constraints that are redundant there, unless the options say otherwise.  What was moved or dropped
+  /// stands in plan().
   Integrator(std::shared_ptr<const Scene> scene, const Registry& registry, const SolverFactory& solvers,
              const IntegratorOptions& options);
   Integrator(Integrator&& other) noexcept;

@@ -37,16 +37,15 @@ PreparedScene prepared(std::shared_ptr<const Scene> given, const IntegratorOptio
   if (scene->rows() > 0 && scene->start.q.allFinite()) {
     const std::vector<std::string> dependent = redundant_rows(*scene, scene->start);
     if (!dependent.empty() && singular_at_start_only(*scene, scene->start))
-      throw Misuse("scene '" + scene->name + "': rows that depend on others at the start, but not near it: " +
+      throw Misuse("scene '" + scene->name + "': redundant constraints at the start, but not near it: " +
                    joined(dependent) + "; the start is singular: move it");
     if (!dependent.empty() && !options.drop_redundant_rows)
-      throw Misuse("scene '" + scene->name +
-                   "': rows that depend on others at the start: " + joined(dependent) +
+      throw Misuse("scene '" + scene->name + "': redundant constraints at the start: " + joined(dependent) +
                    "; remove them, or drop them: --drop-redundant, redundant = \"drop\" in a scene file, or "
                    "IntegratorOptions::drop_redundant_rows");
     if (!dependent.empty()) {
       scene = without_rows(*scene, dependent);
-      result.lines.push_back({"dropped rows", joined(dependent), "they depend on others at the start"});
+      result.lines.push_back({"dropped rows", joined(dependent), "redundant constraints at the start"});
     }
   }
   const int own_rows = scene->rows();

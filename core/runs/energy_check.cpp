@@ -61,7 +61,7 @@ std::string EnergyCheck::text() const {
   if (!lost_on_the_way_ && !(worst_change_ > doubted * size)) return {};
   std::ostringstream text;
   text << "the energy, which this scene keeps, went from " << start_energy_ << " to " << worst_energy_
-       << " at t = " << worst_time_ << ": the step is too large to believe the result";
+       << " at t = " << worst_time_ << ": the step is too large for the result to be trusted";
   return text.str();
 }
 

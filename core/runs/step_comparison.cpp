@@ -15,7 +15,7 @@ constexpr long fewest_steps = 3;    // before velocities and momenta count
 std::string line(double time, double part, const char* of) {
   std::ostringstream text;
   text << "two half steps from t = " << time << " end " << std::round(100.0 * part) << " % of " << of
-       << " beside the whole one: the step is too large to believe the result";
+       << " beside the whole one: the step is too large for the result to be trusted";
   return text.str();
 }
 

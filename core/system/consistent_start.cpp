@@ -118,7 +118,7 @@ void require_projected(const Scene& scene, const Start& start) {
   }
 }
 
-/// The scene without the rows that depend on others, where only what is not held moves, at its start or at a
+/// The scene without the redundant constraints, where only what is not held moves, at its start or at a
 /// pose near it.
 std::shared_ptr<const Scene> independent(std::shared_ptr<const Scene> scene, const std::vector<int>& held) {
   if (scene->rows() == 0 || scene->rows() > largest_full) return scene;

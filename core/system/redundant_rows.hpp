@@ -17,7 +17,8 @@ std::optional<Vector> pose_near(const ConstraintBlocks& holonomic, double t, Vec
 /// coordinates `held` do not count.
 Columns full_one_forms(const ConstraintsAtPoint& rows, const std::vector<int>& held = {});
 
-/// Numbers of the columns that depend on others to within `tolerance`, found with column pivoting.
+/// Numbers of the redundant columns, combinations of the others to within `tolerance`, found with column
+/// pivoting.
 std::vector<int> dependent_columns(const Columns& one_forms, double tolerance);
 
 /// Names of the rows of A(t,q) that depend on the others at the start to within `tolerance` of their size; of

@@ -8,23 +8,13 @@
 #include <diracstep/scene_format/scene_file.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
 
+#include "stepping.hpp"
+
 /// Scenes in which nothing carries momentum: circuits without inductors, motions that rows alone determine.
 namespace diracstep {
 namespace {
 
-Sample end_of(const CatalogueScene& entry, double step, const std::string& method) {
-  const StepGrid grid = fit_steps(entry.scene->start.time, entry.t_end, step);
-  Integrator integrator(entry.scene, Registry::with_built_ins(), kinsol(),
-                        {.method = method, .step = grid.step});
-  Sample last;
-  const RunReport report =
-      run_steps(integrator, grid.steps, Momentum::projected, grid.steps, [&](const Sample& sample) {
-        last = sample;
-        return true;
-      });
-  EXPECT_TRUE(report.ok()) << report.last.failure;
-  return last;
-}
+using testing::end_of;
 
 const std::string low_pass = R"toml(
 name = "low_pass"
@@ -56,7 +46,7 @@ TEST(Massless, LowPassWithoutInductor) {
       (std::sin(w * t) - w * rc * (std::cos(w * t) - std::exp(-t / rc))) / (1.0 + w * rc * w * rc);
   ASSERT_NEAR(u, -0.15521604901698566, 1e-15);
   for (const char* method : {"type1/gl:3", "type1/midpoint"}) {
-    const Sample end = end_of(entry, 1e-5, method);
+    const Sample end = end_of(entry.scene, entry.t_end, 1e-5, method);
     const double allowed = std::string(method) == "type1/gl:3" ? 1e-9 : 1e-3;
     EXPECT_NEAR(end.q[2] / 1e-6, u, allowed) << method;
     EXPECT_NEAR(end.v[2], (std::sin(w * t) - u) / 1000.0, 1e-3 * allowed + 1e-9) << method;
@@ -91,7 +81,7 @@ end = 0.013
 step = 0.0005
 )toml");
   const double w = 2.0 * M_PI * 50.0, volt = 5.0 + std::sin(w * 0.013), rate = w * std::cos(w * 0.013);
-  const Sample end = end_of(entry, 0.0005, "type1/gl:3");
+  const Sample end = end_of(entry.scene, entry.t_end, 0.0005, "type1/gl:3");
   EXPECT_NEAR(end.q[1], 1e-5 * volt, 1e-14);
   EXPECT_NEAR(end.v[2], volt / 1000.0, 1e-10);
   EXPECT_NEAR(end.v[0], 1e-5 * rate + volt / 1000.0, 1e-10);
@@ -120,7 +110,7 @@ step = 0.02
 )toml";
   for (const char* head : {"name = \"rows\"\n", "name = \"rows\"\nlagrangian = \"-(x^2 + y^2)/2\"\n"}) {
     const CatalogueScene entry = scene_from_text("rows.toml", head + rows);
-    const Sample end = end_of(entry, 0.02, "type1/gl:3");
+    const Sample end = end_of(entry.scene, entry.t_end, 0.02, "type1/gl:3");
     Eigen::Vector2d z(2.0, 1.0);
     const auto f = [](const Eigen::Vector2d& at) {
       return Eigen::Vector2d(at[0] * (1.0 - at[1]), at[1] * (at[0] - 1.0));

@@ -7,10 +7,14 @@
 #include <diracstep/scene_format/scene_file.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
 
-/// What is given of a start stays, guesses are moved; rows that depend on others are left out where asked
+#include "stepping.hpp"
+
+/// What is given of a start stays, guesses are moved; redundant constraints are left out where asked
 /// for.
 namespace diracstep {
 namespace {
+
+using testing::end_of;
 
 std::string refusal(const std::string& text, const Parameters& changes = {}) {
   try {
@@ -20,20 +24,6 @@ std::string refusal(const std::string& text, const Parameters& changes = {}) {
     return misuse.what();
   }
   return {};
-}
-
-Sample end_of(const CatalogueScene& entry, double end, const std::string& method = "type1/gl:3") {
-  const StepGrid grid = fit_steps(entry.scene->start.time, end, entry.natural_step);
-  Integrator integrator(entry.scene, Registry::with_built_ins(), kinsol(),
-                        {.method = method, .step = grid.step});
-  Sample last;
-  const RunReport report =
-      run_steps(integrator, grid.steps, Momentum::projected, grid.steps, [&](const Sample& sample) {
-        last = sample;
-        return true;
-      });
-  EXPECT_TRUE(report.ok()) << report.last.failure;
-  return last;
 }
 
 const std::string four_bar = R"toml(
@@ -230,7 +220,7 @@ TEST(RedundantRows, AreDroppedWhereTheFileSaysSoAndTheMotionIsRight) {
   EXPECT_EQ(entry.scene->rows(), 5);
   ASSERT_EQ(entry.changes.size(), 1u);
   EXPECT_NE(entry.changes[0].find("rows left out"), std::string::npos);
-  const Sample end = end_of(entry, 1.0);
+  const Sample end = end_of(entry.scene, 1.0, entry.natural_step);
   const double angle = pendulum_angle(1.0, 1.0);
   EXPECT_NEAR(end.q[0], 1.0 + std::sin(angle), 1e-6);
   EXPECT_NEAR(end.q[1], -std::cos(angle), 1e-6);
