@@ -15,8 +15,9 @@ constexpr double round_off = 4.0 * std::numeric_limits<double>::epsilon();
 constexpr double divisor = 16.0;  // of the increment where they do not agree
 constexpr int most_divisions = 8;
 constexpr double scale_over_increment = 512.0;
-constexpr double known_to = 1e-5;  // relative error of derivatives from which they are doubted
-constexpr int most_rungs = 12;     // from a guess of a scale
+constexpr double known_to = 1e-5;         // relative error of derivatives from which they are doubted
+constexpr int most_rungs = 12;            // from a guess of a scale
+constexpr double slope_known_to = 1e-10;  // relative, from where a straight line asks for no larger scale
 
 /// The increment for a variable of this scale: a power of two, so that x + kδ is exact for most x.
 double increment(double scale) { return std::exp2(std::ceil(std::log2(scale))) / scale_over_increment; }
@@ -56,6 +57,15 @@ struct Sums {
   bool resolved(Eigen::Index r) const {
     const double apart = disagreement(r) + std::abs(bend[r] - bend_near[r]);
     return apart <= resolution * (std::abs(sixth[r]) + std::abs(bend[r])) + 8.0 * round_off * largest[r];
+  }
+  /// Whether f shows no curvature over some δ, so that it says nothing of how far it goes on like this.
+  bool straight(Eigen::Index r) const { return std::abs(bend[r]) <= 8.0 * round_off * largest[r]; }
+  /// Whether a larger δ is worth while: not for a constant, and for a straight line only to know its slope.
+  bool asks_for_more(Eigen::Index r) const {
+    return !straight(r) || round_off * largest[r] > slope_known_to * std::abs(sixth[r]);
+  }
+  bool constant(Eigen::Index r) const {
+    return straight(r) && std::abs(sixth[r]) <= 8.0 * round_off * largest[r];
   }
   bool agree(double factor) const { return misfit(factor) <= agreement; }
 };
@@ -171,8 +181,14 @@ DifferenceScales find_scales(const std::function<double(ConstVectorRef)>& f, Con
       if (best < HUGE_VAL) scales[i] = smaller;
     }
     if (best == HUGE_VAL) continue;
+    (void)error(scales[i]);  // whose sums tell what f looks like there
+    double further = scales[i];
+    for (int rung = 0; rung < most_rungs && sums.constant(0); ++rung) best = error(further *= divisor);
+    if (sums.constant(0) || best == HUGE_VAL) continue;
+    scales[i] = further;
     for (const double factor : {divisor, 1.0 / divisor})
       for (int rung = 0; rung < most_rungs; ++rung) {
+        if (factor > 1.0 && !sums.asks_for_more(0)) break;
         const double next = error(scales[i] * factor);
         if (!(next < 0.5 * best)) break;
         best = next;
