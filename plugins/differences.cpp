@@ -64,6 +64,9 @@ struct Sums {
   bool asks_for_more(Eigen::Index r) const {
     return !straight(r) || round_off * largest[r] > slope_known_to * std::abs(sixth[r]);
   }
+  /// Whether a smaller δ is worth while: not where round-off is all that both formulas differ by.  A smaller
+  /// one has less only where f is near zero at x by chance.
+  bool asks_for_less(Eigen::Index r) const { return disagreement(r) > 8.0 * round_off * largest[r]; }
   bool constant(Eigen::Index r) const {
     return straight(r) && std::abs(sixth[r]) <= 8.0 * round_off * largest[r];
   }
@@ -181,19 +184,21 @@ DifferenceScales find_scales(const std::function<double(ConstVectorRef)>& f, Con
       if (best < HUGE_VAL) scales[i] = smaller;
     }
     if (best == HUGE_VAL) continue;
-    (void)error(scales[i]);  // whose sums tell what f looks like there
+    (void)error(scales[i]);  // for the sums, which tell what f looks like there; so below
     double further = scales[i];
     for (int rung = 0; rung < most_rungs && sums.constant(0); ++rung) best = error(further *= divisor);
     if (sums.constant(0) || best == HUGE_VAL) continue;
     scales[i] = further;
-    for (const double factor : {divisor, 1.0 / divisor})
+    for (const double factor : {divisor, 1.0 / divisor}) {
+      (void)error(scales[i]);
       for (int rung = 0; rung < most_rungs; ++rung) {
-        if (factor > 1.0 && !sums.asks_for_more(0)) break;
+        if (factor > 1.0 ? !sums.asks_for_more(0) : !sums.asks_for_less(0)) break;
         const double next = error(scales[i] * factor);
         if (!(next < 0.5 * best)) break;
         best = next;
         scales[i] *= factor;
       }
+    }
   }
   return scales;
 }

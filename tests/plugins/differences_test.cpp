@@ -48,6 +48,11 @@ TEST(Differences, AConstantAndAStraightLineAskForNoLargerScale) {
   EXPECT_EQ(scales[1], 0.4);
 }
 
+TEST(Differences, AParabolaThatIsZeroAtThePointAsksForNoSmallerScale) {
+  const auto f = [](ConstVectorRef v) { return 0.5 * v[0] * v[0]; };
+  EXPECT_GE(find_scales(f, Vector{{0.0}}, Vector{{1.5}})[0], 1.5);
+}
+
 TEST(Differences, AngleOfManyTurnsIsNoScale) {
   const auto f = [](ConstVectorRef x) { return std::cos(x[0]); };
   Vector g(1);
