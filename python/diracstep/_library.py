@@ -11,7 +11,7 @@ from ctypes import (CFUNCTYPE, POINTER, Structure, byref, c_char_p, c_double, c_
 from pathlib import Path
 from typing import Any, Callable
 
-from .errors import Failure, raised
+from .errors import raised
 
 VERSION = 2  # DIRACSTEP_VERSION_OF_C_INTERFACE
 PLUGIN_VERSION = 1  # DIRACSTEP_PLUGIN_VERSION
@@ -28,9 +28,10 @@ class Pattern(Structure):
     _fields_ = [("column_starts", POINTER(c_int)), ("row_indices", POINTER(c_int))]
 
 
-VALUE = CFUNCTYPE(c_int, c_void_p, c_double, Numbers, Numbers, Numbers)
-POSITION = CFUNCTYPE(c_int, c_void_p, c_double, Numbers, Numbers)
-COEFFICIENTS = CFUNCTYPE(c_int, c_void_p, c_double, Numbers, Numbers, Numbers)
+# Columns go to callbacks as addresses: views of them are then made in half of the time.
+VALUE = CFUNCTYPE(c_int, c_void_p, c_double, c_void_p, c_void_p, c_void_p)
+POSITION = CFUNCTYPE(c_int, c_void_p, c_double, c_void_p, c_void_p)
+COEFFICIENTS = CFUNCTYPE(c_int, c_void_p, c_double, c_void_p, c_void_p, c_void_p)
 
 
 class Function(Structure):
@@ -72,7 +73,7 @@ class System(Structure):
                 ("start_v", Numbers)]
 
 
-GENERATING_VALUE = CFUNCTYPE(c_int, c_void_p, POINTER(System), Interval, Numbers, Numbers)
+GENERATING_VALUE = CFUNCTYPE(c_int, c_void_p, POINTER(System), Interval, c_void_p, c_void_p)
 
 
 class GeneratingMethod(Structure):
@@ -255,17 +256,17 @@ class KeptException:
     """The first exception of a Python function that the library called, which cannot pass through C."""
 
     def __init__(self) -> None:
-        self._kept: BaseException | None = None
+        self.kept: BaseException | None = None
 
     def keep(self, exception: BaseException) -> int:
-        if self._kept is None:
-            self._kept = exception
+        """Keeps it; the code to return for it."""
+        if self.kept is None:
+            self.kept = exception
         return 1
 
-    def raise_from(self, failure: Failure) -> None:
-        """Raises the failure with what a function raised as its cause."""
-        kept, self._kept = self._kept, None
-        raise failure from kept
+    def take(self) -> BaseException | None:
+        kept, self.kept = self.kept, None
+        return kept
 
 
 def call_interruptibly(call: Callable[[], int], stop: c_int,
@@ -276,6 +277,7 @@ def call_interruptibly(call: Callable[[], int], stop: c_int,
     times a second.
     """
     outcome: list[Any] = []
+    done = threading.Event()  # Thread.join takes a thread for ended where Ctrl-C comes in it (Python 3.11)
 
     def work() -> None:
         try:
@@ -283,14 +285,13 @@ def call_interruptibly(call: Callable[[], int], stop: c_int,
             outcome.extend((code, lib.message().decode() if code != OK else ""))  # messages belong to the thread
         except BaseException as error:  # noqa: BLE001  of a callback's machinery: raised below, in the caller
             outcome.extend((error, ""))
+        done.set()
 
-    thread = threading.Thread(target=work, name="diracstep", daemon=True)
-    thread.start()
+    threading.Thread(target=work, name="diracstep", daemon=True).start()
     interrupted = False
-    while thread.is_alive():
+    while not outcome:
         try:
-            thread.join(0.1)
-            if watch is not None:
+            if not done.wait(0.1) and watch is not None:
                 watch()
         except KeyboardInterrupt:
             stop.value = 1

@@ -27,7 +27,7 @@ def table(values: Any, shape: tuple[int, ...], what: str) -> np.ndarray:
     array = np.asarray(values)
     if array.dtype.kind not in "fiub" or array.dtype.itemsize > 8:
         raise Misuse(f"{what} is of type {array.dtype}; real numbers are needed")
-    array = np.ascontiguousarray(array, dtype=np.float64)
+    array = np.asarray(array, dtype=np.float64, order="C")
     if array.shape != shape:
         raise Misuse(f"{what} has shape {array.shape}; {shape} is needed")
     if not np.isfinite(array).all():

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from . import _library as c
-from .arrays import column, real, whole
-from .errors import Failure, Misuse
+from .arrays import column, real
+from .errors import Misuse
 from .options import momentum_from, options_from
 from .plan import TextTable
 from .run import Statistics
@@ -54,11 +54,14 @@ class Integrator:
     def step(self, count: int = 1, *, size: float | None = None) -> None:
         """Takes so many steps, or one of another size.  After a Failure the state is that before the failed step."""
         if size is None:
-            with self._lock:
-                code = self._step(self._handle, count)
-                if code == _OK:
-                    return
-                message = c.lib.message().decode()
+            try:
+                with self._lock:
+                    code = self._step(self._handle, count)
+                    if code == _OK:
+                        return
+                    message = c.lib.message().decode()
+            except ctypes.ArgumentError:
+                raise Misuse(f"steps is {count!r}; a whole number is needed") from None
             self.scene._raise(code, message)
         with self._lock:
             self._check(c.lib.step_by(self._handle, real(size, "size")))
@@ -144,10 +147,3 @@ class Integrator:
 
     def _check(self, code: int) -> None:
         self.scene._check(code)
-
-
-def whole_steps(count: Any) -> int:
-    return whole(count, "steps", 1)
-
-
-__all__ = ["Failure", "Integrator", "State"]

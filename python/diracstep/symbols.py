@@ -18,7 +18,7 @@ __all__ = ["Expression", "Column", "sin", "cos", "tan", "asin", "acos", "atan", 
 pi = math.pi
 
 _ATOM, _POWER, _PRODUCT, _SUM = 4, 3, 2, 1  # how strongly the outermost operator binds
-_LONGEST, _DEEPEST = 20000, 60  # characters and levels of a formula, below the limits of scene files
+_LONGEST = 20000  # characters of a formula, below the limit of scene files
 
 
 def _number(value: Any) -> str:
@@ -97,7 +97,7 @@ class Expression:
             for place in np.ndindex(results.shape):
                 results[place] = known(*(array[place] for array in arrays))
             return results
-        return known(*(entry.item() if isinstance(entry, np.ndarray) else entry for entry in inputs))
+        return known(*(entry.item() if isinstance(entry, (np.ndarray, np.generic)) else entry for entry in inputs))
 
     def __getattr__(self, name: str) -> Callable[..., Any]:
         # NumPy's ufuncs on arrays of objects look for a method of their name.
@@ -293,17 +293,13 @@ def formulas(roots: list[Any], prefix: str = "part") -> tuple[dict[str, str], li
             uses[id(argument)] = uses.get(id(argument), 0) + 1
     names: dict[int, str] = {}
     texts: dict[int, str] = {}
-    depths: dict[int, int] = {}
     definitions: dict[str, str] = {}
     for part in order:
         text = part.form.format(*(names.get(id(entry)) or texts[id(entry)] for entry in part.arguments))
         texts[id(part)] = text
-        depth = 1 + max((depths[id(entry)] for entry in part.arguments), default=0)
         repeated = uses.get(id(part), 0) > 1 and part.arguments and part.form != "({})"
-        if repeated or len(text) > _LONGEST or depth > _DEEPEST:
+        if repeated or len(text) > _LONGEST:
             name = f"{prefix}_{len(definitions) + 1}"
             definitions[name] = text
             names[id(part)] = name
-            depth = 1
-        depths[id(part)] = depth
     return definitions, [names.get(id(root)) or texts[id(root)] for root in wanted]
