@@ -118,7 +118,7 @@ class Run:
         if ax is None:
             ax = _pyplot().subplots()[1]
         for name in names or self.scene.coordinates:
-            ax.plot(self[x], self[name], label=name, **style)
+            ax.plot(self[x], self[name], **{"label": name, **style})
         ax.set_xlabel(_labelled(x, self.scene))
         if len(names) == 1:
             ax.set_ylabel(_labelled(names[0], self.scene))
