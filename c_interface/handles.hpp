@@ -35,7 +35,7 @@ struct diracstep_integrator {
   diracstep::Sample sample = {};
 
   diracstep::Integrator* fixed() { return std::get_if<diracstep::Integrator>(&stepper); }
-  const diracstep::Integrator& main() const;
+  const diracstep::Integrator& stepping() const;
 };
 
 namespace diracstep::c_interface {

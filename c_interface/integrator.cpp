@@ -75,7 +75,7 @@ Eigen::Map<const Vector> column(const double* numbers, const diracstep_integrato
 
 }  // namespace
 
-const Integrator& diracstep_integrator::main() const {
+const Integrator& diracstep_integrator::stepping() const {
   if (const auto* const varying = std::get_if<AdaptiveIntegrator>(&stepper)) return varying->integrator();
   return std::get<Integrator>(stepper);
 }
@@ -144,7 +144,7 @@ int diracstep_read(diracstep_integrator* integrator, int momentum, diracstep_sta
 }
 
 double diracstep_time(const diracstep_integrator* integrator) {
-  return integrator != nullptr ? integrator->main().time() : 0.0;
+  return integrator != nullptr ? integrator->stepping().time() : 0.0;
 }
 
 int diracstep_reset(diracstep_integrator* integrator, double time, const double* q, const double* v) {
@@ -176,7 +176,7 @@ int diracstep_restore(diracstep_integrator* integrator, const char* bytes, size_
 
 const char* diracstep_doubt(const diracstep_integrator* integrator) {
   if (integrator == nullptr) return "";
-  const Scene& scene = integrator->main().scene();
+  const Scene& scene = integrator->stepping().scene();
   if (!integrator->doubt.empty() || !scene.doubt) return keep(integrator->doubt);
   return keep(scene.doubt());
 }
@@ -185,8 +185,8 @@ int diracstep_read_statistics(const diracstep_integrator* integrator, diracstep_
   return guarded([&] {
     const diracstep_integrator& from = given(integrator, "the integrator");
     diracstep_statistics& to = given(statistics, "where the statistics go");
-    const Work& work = from.main().work();
-    const IntegratorOptions& options = from.main().options();
+    const Work& work = from.stepping().work();
+    const IntegratorOptions& options = from.stepping().options();
     to = {};
     to.steps = work.steps;
     to.solves = work.solves;

@@ -1,7 +1,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <deque>
 #include <diracstep/plugins/differences.hpp>
+#include <functional>
 #include <limits>
 #include <sstream>
 
@@ -73,6 +75,46 @@ struct Sums {
   bool agree(double factor) const { return misfit(factor) <= agreement; }
 };
 
+/// What differences of `rows` functions of n variables are computed in.
+struct Workspace {
+  Workspace(Eigen::Index n, Eigen::Index rows)
+      : shifted(n), deltas(n), ahead(rows), behind(rows), sums(rows), next(rows) {}
+  bool fits(Eigen::Index n, Eigen::Index rows) const {
+    return !taken && shifted.size() == n && ahead.size() == rows;
+  }
+
+  Vector shifted, deltas, ahead, behind;
+  Sums sums, next;
+  bool taken = false;
+};
+
+/// A workspace of the thread, lent as long as this lives: differences of differences take two, and after the
+/// first ones of a size none allocates any more.
+class Lent {
+ public:
+  Lent(Eigen::Index n, Eigen::Index rows) : work_(free_one(n, rows)) { work_.taken = true; }
+  Lent(const Lent&) = delete;
+  Lent& operator=(const Lent&) = delete;
+  ~Lent() { work_.taken = false; }
+
+  Workspace* operator->() { return &work_; }
+  Workspace& operator*() { return work_; }
+
+ private:
+  static Workspace& free_one(Eigen::Index n, Eigen::Index rows) {
+    thread_local std::deque<Workspace> all;  // none moves when one is added
+    const auto found =
+        std::find_if(all.begin(), all.end(), [&](const Workspace& work) { return work.fits(n, rows); });
+    if (found != all.end()) return *found;
+    if (all.size() >= most_lent && std::none_of(all.begin(), all.end(), std::mem_fn(&Workspace::taken)))
+      all.clear();
+    return all.emplace_back(n, rows);
+  }
+
+  static constexpr std::size_t most_lent = 64;
+  Workspace& work_;
+};
+
 /// The sums of f(k · factor, out), which evaluates at k increments.
 template <class F>
 void take(const F& f, double factor, Vector& ahead, Vector& behind, Sums& sums) {
@@ -97,12 +139,13 @@ void take(const F& f, double factor, Vector& ahead, Vector& behind, Sums& sums) 
 /// The same with increments that both formulas agree at; returns the factor of the increments, or of those
 /// with the smallest misfit where none do: what is not smooth, or lost in round-off, only becomes worse.
 template <class F>
-double take_checked(const F& f, Vector& ahead, Vector& behind, Sums& sums) {
+double take_checked(const F& f, Workspace& work) {
+  Vector &ahead = work.ahead, &behind = work.behind;
+  Sums &sums = work.sums, &next = work.next;
   double factor = 1.0;
   take(f, factor, ahead, behind, sums);
   double misfit = sums.misfit(factor);
   if (misfit <= agreement) return factor;
-  Sums next(sums.sixth.size());
   double smaller = factor;
   for (int k = 0; k < most_divisions && misfit > agreement; ++k) {
     smaller /= divisor;
@@ -162,8 +205,9 @@ std::string DifferenceQuality::doubt() const {
 DifferenceScales find_scales(const std::function<double(ConstVectorRef)>& f, ConstVectorRef x,
                              const Vector& guesses) {
   DifferenceScales scales = guesses;
-  Vector shifted = x, ahead(1), behind(1);
-  Sums sums(1);
+  Lent work(x.size(), 1);
+  Vector& shifted = work->shifted = x;
+  Sums& sums = work->sums;
   for (Eigen::Index i = 0; i < x.size(); ++i) {
     const auto error = [&](double scale) {
       const double delta = increment(scale);
@@ -171,7 +215,7 @@ DifferenceScales find_scales(const std::function<double(ConstVectorRef)>& f, Con
         shifted[i] = x[i] + k * delta;
         out[0] = f(shifted);
       };
-      take(at, 1.0, ahead, behind, sums);
+      take(at, 1.0, work->ahead, work->behind, sums);
       shifted[i] = x[i];
       if (!sums.resolved(0)) return HUGE_VAL;
       const double sum = (sums.disagreement(0) + round_off * sums.largest[0]) / delta;
@@ -205,15 +249,16 @@ DifferenceScales find_scales(const std::function<double(ConstVectorRef)>& f, Con
 
 void gradient_by_differences(const std::function<double(ConstVectorRef)>& f, ConstVectorRef x, VectorRef g,
                              const DifferenceScales& scales, DifferenceQuality* quality) {
-  Vector shifted = x, ahead(1), behind(1);
-  Sums sums(1);
+  Lent work(x.size(), 1);
+  Vector& shifted = work->shifted = x;
+  const Sums& sums = work->sums;
   for (Eigen::Index i = 0; i < x.size(); ++i) {
     const double scale = scale_at(scales, i, x[i]), delta = increment(scale);
     const auto at = [&](double k, VectorRef out) {
       shifted[i] = x[i] + k * delta;
       out[0] = f(shifted);
     };
-    const double factor = take_checked(at, ahead, behind, sums);
+    const double factor = take_checked(at, *work);
     shifted[i] = x[i];
     g[i] = sums.sixth[0] / (factor * delta);
     if (quality == nullptr) continue;
@@ -226,12 +271,11 @@ void gradient_by_differences(const std::function<double(ConstVectorRef)>& f, Con
 
 void rate_by_differences(const std::function<void(double, VectorRef)>& f, double t, VectorRef rate,
                          double scale) {
-  Vector ahead(rate.size()), behind(rate.size());
-  Sums sums(rate.size());
+  Lent work(1, rate.size());
   const double delta = increment(std::max(scale, std::ldexp(std::abs(t), -20)));
   const auto at = [&](double k, VectorRef out) { f(t + k * delta, out); };
-  const double factor = take_checked(at, ahead, behind, sums);
-  rate = sums.sixth / (factor * delta);
+  const double factor = take_checked(at, *work);
+  rate = work->sums.sixth / (factor * delta);
 }
 
 JacobianByDifferences::JacobianByDifferences(SparsityPattern pattern) : pattern_(std::move(pattern)) {
@@ -252,15 +296,16 @@ JacobianByDifferences::JacobianByDifferences(SparsityPattern pattern) : pattern_
 void JacobianByDifferences::evaluate(const std::function<void(ConstVectorRef, VectorRef)>& f,
                                      ConstVectorRef x, VectorRef values, const DifferenceScales& scales,
                                      DifferenceQuality* quality) const {
-  Vector shifted = x, deltas(x.size()), ahead(pattern_.rows()), behind(pattern_.rows());
-  Sums sums(pattern_.rows());
+  Lent work(x.size(), pattern_.rows());
+  Vector &shifted = work->shifted = x, &deltas = work->deltas;
+  const Sums& sums = work->sums;
   for (Eigen::Index i = 0; i < x.size(); ++i) deltas[i] = increment(scale_at(scales, i, x[i]));
   for (const std::vector<int>& group : groups_) {
     const auto at = [&](double k, VectorRef out) {
       for (const int column : group) shifted[column] = x[column] + k * deltas[column];
       f(shifted, out);
     };
-    const double factor = take_checked(at, ahead, behind, sums);
+    const double factor = take_checked(at, *work);
     for (const int column : group) {
       shifted[column] = x[column];
       const int begin = pattern_.column_starts()[static_cast<std::size_t>(column)];

@@ -1,4 +1,4 @@
-"""DiracStep: structure-preserving time stepping of mechanical and electrical systems with constraints.
+"""DiracStep: structure-preserving time stepping of mechanical and electrical systems with constraints::
 
     import diracstep as ds
 
