@@ -54,9 +54,13 @@ class Interruption : public Error {
 /// Keeps the text of the exception in flight for diracstep_message; the code that a function returns for it.
 int code_of_exception() noexcept;
 
+/// Forgets the texts that the last call of this thread has given.
+void begin_call() noexcept;
+
 /// Runs `action`; no exception leaves.
 template <class Action>
 int guarded(Action action) noexcept {
+  begin_call();
   try {
     action();
     return DIRACSTEP_OK;

@@ -175,6 +175,7 @@ int diracstep_restore(diracstep_integrator* integrator, const char* bytes, size_
 }
 
 const char* diracstep_doubt(const diracstep_integrator* integrator) {
+  begin_call();
   if (integrator == nullptr) return "";
   const Scene& scene = integrator->stepping().scene();
   if (!integrator->doubt.empty() || !scene.doubt) return keep(integrator->doubt);

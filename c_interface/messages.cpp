@@ -1,6 +1,7 @@
 #include <diracstep/version.h>
 
 #include <atomic>
+#include <deque>
 #include <diracstep/c_interface/handles.hpp>
 
 using namespace diracstep;
@@ -12,7 +13,7 @@ namespace {
 /// What C reads of the last calls of a thread.
 struct Answers {
   std::string message;
-  std::vector<std::string> texts;  ///< of keep(text), as many as are asked for at once
+  std::deque<std::string> texts;   ///< of keep(text) in this call
   std::vector<std::string> cells;  ///< of the table
   std::vector<const char*> cell_pointers;
 };
@@ -31,8 +32,6 @@ int told(int code, const char* message) noexcept {
   return code;
 }
 
-constexpr std::size_t texts_at_once = 8;
-
 }  // namespace
 
 int code_of_exception() noexcept {
@@ -49,11 +48,11 @@ int code_of_exception() noexcept {
   }
 }
 
+void begin_call() noexcept { answers().texts.clear(); }
+
 const char* keep(std::string text) {
-  std::vector<std::string>& texts = answers().texts;
-  texts.reserve(texts_at_once + 1);  // so that no text moves that C still reads
-  if (texts.size() >= texts_at_once) texts.clear();
-  return texts.emplace_back(std::move(text)).c_str();
+  std::deque<std::string>& texts = answers().texts;
+  return texts.emplace_back(std::move(text)).c_str();  // none moves when the next is added
 }
 
 diracstep_table keep(int columns, std::vector<std::string> cells) {

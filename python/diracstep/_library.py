@@ -273,8 +273,8 @@ def call_interruptibly(call: Callable[[], int], stop: c_int,
                        watch: Callable[[], None] | None = None) -> tuple[int, str]:
     """Makes a long call on a thread of its own and waits for it: the code, and the library's message.
 
-    Ctrl-C sets the flag ``stop``, which ends the call; a second one is raised as usual.  ``watch`` is called about ten
-    times a second.
+    Ctrl-C sets the flag ``stop``, which ends the call; a second one is raised as usual, and then the call may outlive this
+    function: ``call`` must keep all that it uses.  ``watch`` is called about ten times a second.
     """
     outcome: list[Any] = []
     done = threading.Event()  # Thread.join takes a thread for ended where Ctrl-C comes in it (Python 3.11)
@@ -287,8 +287,9 @@ def call_interruptibly(call: Callable[[], int], stop: c_int,
             outcome.extend((error, ""))
         done.set()
 
-    threading.Thread(target=work, name="diracstep", daemon=True).start()
+    thread = threading.Thread(target=work, name="diracstep", daemon=True)
     try:
+        thread.start()
         while not outcome:
             try:
                 if not done.wait(0.1) and watch is not None:

@@ -353,6 +353,11 @@ TEST_F(CInterface, SearchesForAnErrorAndTellsWhatItFound) {
   EXPECT_LT(found.estimate, 1e-8);
   EXPECT_NE(std::string(found.method).find("type1/"), std::string::npos);
   EXPECT_GE(found.runs.rows, 2);
+  ASSERT_EQ(create(), DIRACSTEP_OK);
+  for (int k = 0; k < 7; ++k) EXPECT_STREQ(diracstep_doubt(made_), "");  // texts of earlier calls are gone
+  ASSERT_EQ(diracstep_solve(model_, nullptr, nullptr, &error, &arrays.points, &found), DIRACSTEP_OK);
+  EXPECT_EQ(std::string(found.method).rfind("type1/", 0), 0u);
+  EXPECT_NE(std::string(found.reason).find("order"), std::string::npos);
   error.max_solves = 1;
   EXPECT_EQ(diracstep_solve(model_, nullptr, nullptr, &error, &arrays.points, &found), DIRACSTEP_FAILED);
   error.steps = 7;

@@ -42,6 +42,18 @@ def test_ctrl_c_ends_a_search_and_an_ensemble(skate):
     timer.join()
 
 
+def test_ctrl_c_at_any_moment_ends_the_call_and_harms_nothing(skate):
+    starts = np.zeros((20_000, 3))
+    for delay in np.linspace(0.0, 0.03, 16):
+        with pytest.raises(KeyboardInterrupt):
+            interrupt_soon(delay)
+            skate.ensemble(starts.copy(), until=100.0, step=0.01)
+        for thread in threading.enumerate():
+            if thread.name == "diracstep" and thread.ident is not None:
+                thread.join(10.0)
+                assert not thread.is_alive()
+
+
 def test_the_interpreter_runs_beside_a_run(skate):
     ticks = []
     done = threading.Event()
