@@ -46,11 +46,9 @@ void require_writable(const NamedPath& output) {
   if (::stat(path.c_str(), &status) == 0) {
     if (S_ISDIR(status.st_mode)) refuse(EISDIR);
     if (::access(path.c_str(), W_OK) != 0) refuse(errno);
-  } else if (errno != ENOENT) {
-    refuse(errno);
-  } else if (::access(folder_of(path).c_str(), W_OK | X_OK) != 0) {
-    refuse(errno);
+    return;
   }
+  if (errno != ENOENT || ::access(folder_of(path).c_str(), W_OK | X_OK) != 0) refuse(errno);
 }
 
 }  // namespace
