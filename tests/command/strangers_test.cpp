@@ -192,7 +192,9 @@ TEST_F(Strangers, SmallFilesOfLargeSystemsAreRefusedAtOnce) {
       "run " + scene("outer.toml", "v_x^2/2 - sum(i = 1..100000, j = 1..100000, k = 1..0, x)"),
       {"repeated elements"});
 
-  write("large.toml", std::string(17'000'000, '#'));
+  std::string large;
+  large.resize(17'000'000, '#');
+  write("large.toml", large);
   expect_refused_at_once("run '" + path("large.toml") + "'", {"16000000 bytes"});
 }
 
