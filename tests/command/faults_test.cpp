@@ -120,7 +120,7 @@ TEST_F(Faults, OfAStudy_slow) {
                   false,
                   {"out/study.csv", "out/study.json", "out/report.html", "t.md"}};
   fail_everywhere(task, "io", 1);
-  fail_everywhere(task, "memory", 11);
+  fail_everywhere(task, "memory", 23);
 }
 #endif
 
