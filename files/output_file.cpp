@@ -9,6 +9,7 @@
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/files/file_lock.hpp>
 #include <diracstep/files/output_file.hpp>
+#include <diracstep/files/paths.hpp>
 #include <filesystem>
 #include <utility>
 
@@ -180,8 +181,7 @@ void replace_file(const std::string& given, std::string_view bytes) {
   std::error_code none;
   const fs::file_status status = fs::status(given, none);
   if (fs::exists(status) && !fs::is_regular_file(status)) return write_to_device(given, bytes);
-  const bool link = fs::is_symlink(given, none) && fs::exists(status);
-  Replacement(link ? fs::canonical(given, none).string() : given).become(bytes);
+  Replacement(behind_links(given)).become(bytes);
 }
 
 }  // namespace diracstep

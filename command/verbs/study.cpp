@@ -229,10 +229,12 @@ constexpr std::size_t largest_study = 100'000'000;  // bytes of an earlier study
 std::string earlier_study(const std::string& path) {
   std::string text = read_file(path, "--compare:", largest_study);
   if (text.empty()) throw Misuse(fmt::format("--compare: '{}' is empty", path));
+  require_study(text);
   return text;
 }
 
-/// Before anything is computed: a table that would be written over something read, or that cannot be written.
+/// Before anything is computed: what would be written over something read or over another output, and a table
+/// that cannot be written.
 void require_files(const Options& options, const Session& session) {
   std::vector<NamedPath> inputs;
   for (const std::string& scene : options.scenes)
@@ -240,6 +242,13 @@ void require_files(const Options& options, const Session& session) {
   for (const Plugin& plugin : session.plugins) inputs.push_back({"the plugin", plugin.path()});
   if (!options.compare.empty()) inputs.push_back({"--compare", options.compare});
   if (!options.table.empty()) require_outputs({{"--table", options.table}}, inputs);
+  if (options.out.empty()) return;
+  if (!options.table.empty()) inputs.push_back({"--table", options.table});
+  for (const char* name : {"study.csv", "study.json", "report.html", "summary.md"})
+    for (const NamedPath& other : inputs)
+      if (same_file(options.out + '/' + name, other.path))
+        throw Misuse(fmt::format("--out: '{}' would write its {} over {} '{}'", options.out, name, other.what,
+                                 other.path));
 }
 
 PageEntry page_entry(const Study& study, const CatalogueScene& scene, const Session& session) {

@@ -1,8 +1,10 @@
+#include <algorithm>
 #include <diracstep/core/integrator/prepared_scene.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/system/consistent_start.hpp>
 #include <diracstep/core/system/hidden_rows.hpp>
 #include <diracstep/core/system/redundant_rows.hpp>
+#include <span>
 #include <sstream>
 #include <utility>
 
@@ -11,8 +13,11 @@ namespace diracstep {
 namespace {
 
 std::string joined(const std::vector<std::string>& names) {
+  constexpr std::size_t most = 50;
   std::string list;
-  for (const std::string& name : names) list += (list.empty() ? "'" : ", '") + name + "'";
+  for (const std::string& name : std::span(names).first(std::min(most, names.size())))
+    list += (list.empty() ? "'" : ", '") + name + "'";
+  if (names.size() > most) list += " and " + std::to_string(names.size() - most) + " more";
   return list;
 }
 

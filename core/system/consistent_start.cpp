@@ -133,6 +133,15 @@ std::shared_ptr<const Scene> independent(std::shared_ptr<const Scene> scene, con
   return left.empty() ? scene : without_rows(*scene, left);
 }
 
+/// Throws Misuse before memory is taken: the matrices of a projection are full.
+void require_few_unknowns(const Scene& scene) {
+  constexpr int most = 10000;
+  if (scene.dimension() + scene.rows() > most)
+    throw Misuse("scene '" + scene.name + "': the start cannot be projected: it has " +
+                 std::to_string(scene.dimension()) + " coordinates and " + std::to_string(scene.rows()) +
+                 " rows, and at most " + std::to_string(most) + " together are looked through");
+}
+
 /// The nearest point of the holonomic rows that differs in guesses alone.  Rows that these cannot move, or
 /// only together with others, are not solved for.
 Vector nearest_position(const Scene& scene, const Start& start, const Guesses& guesses,
@@ -191,6 +200,7 @@ ConsistentStart project_start(const Scene& given, const Start& given_start, cons
   const Start& start = complete->start;
   require_size("the start q", start.q.size(), scene.storage_size());
   require_size("the start v", start.v.size(), scene.dimension());
+  require_few_unknowns(scene);
   ConsistentStart result{start, 0.0, 0.0};
   const Eigen::Index n = start.q.size();
   result.start.q = nearest_position(scene, start, guesses, solvers);
