@@ -1,14 +1,18 @@
-/* DiracStep from C and from every language that can call C: a scene made of callbacks, steps, and what can be
- * read.  Link libdiracstep.
+/* DiracStep from C and from every language that can call C: scenes from files, from text or made of
+ * callbacks, plans, runs into the caller's arrays, single steps, ensembles.  Link libdiracstep.
  *
- * Every function that can fail returns DIRACSTEP_OK, DIRACSTEP_FAILED (a numerical failure or an error of a
- * callback) or DIRACSTEP_MISUSE (a wrong name, size, value or start); diracstep_message says what happened.
- * An integrator belongs to one thread at a time; different ones share nothing.
+ * Every function that can fail returns DIRACSTEP_OK or one of the codes below it; diracstep_message says what
+ * happened.  Structs that are all zero are the defaults.  Columns of a point hold n numbers (coordinates), m
+ * numbers (rows) or i numbers (invariants): see diracstep_facts.  Units are those of the scene.
+ *
+ * A model is not changed by anything: threads may share it.  An integrator belongs to one thread at a time;
+ * different ones share nothing.
  */
 #ifndef DIRACSTEP_H
 #define DIRACSTEP_H
 
 #include <diracstep/plugins/diracstep_scene.h>
+#include <stddef.h>
 
 #ifdef __cplusplus
 extern "C" {
@@ -16,7 +20,7 @@ extern "C" {
 
 /* Raised when a struct here or in diracstep_scene.h, or what a function does, changes; not for new functions.
  */
-#define DIRACSTEP_VERSION_OF_C_INTERFACE 1u
+#define DIRACSTEP_VERSION_OF_C_INTERFACE 2u
 
 #if defined(_WIN32)
 #define DIRACSTEP_API __declspec(dllexport)
@@ -25,24 +29,111 @@ extern "C" {
 #endif
 
 /* What a function returns. */
-enum { DIRACSTEP_OK = 0, DIRACSTEP_FAILED = 1, DIRACSTEP_MISUSE = 2 };
+enum {
+  DIRACSTEP_OK = 0,
+  DIRACSTEP_FAILED = 1,     /* a numerical failure, a search that was refused, an error of a callback */
+  DIRACSTEP_MISUSE = 2,     /* a wrong name, size, value or start */
+  DIRACSTEP_INTERRUPTED = 3 /* the stop flag was set */
+};
 
 /* Which representative of the momentum class [p] in T*Q/annihilator is read. */
-enum { DIRACSTEP_PLUS = 0, DIRACSTEP_MINUS = 1, DIRACSTEP_PROJECTED = 2 };
+enum { DIRACSTEP_PROJECTED = 0, DIRACSTEP_PLUS = 1, DIRACSTEP_MINUS = 2 };
 
-/* How a scene is stepped; all zero is the default. */
+/* What happened in the last call of this thread that did not return DIRACSTEP_OK; valid until its next call.
+ */
+DIRACSTEP_API const char *diracstep_message(void);
+
+/* The version of the library, "0.1.0"; that of the headers is DIRACSTEP_VERSION of <diracstep/version.h>. */
+DIRACSTEP_API const char *diracstep_version(void);
+
+/* ---- Models: a scene, and the methods that are known with it ---- */
+
+/* A parameter or size of a scene, changed. */
+typedef struct diracstep_parameter {
+  const char *name;
+  double value;
+} diracstep_parameter;
+
+/* Where a scene is from: one of the first three.  With none of them a model has no scene, and serves
+ * diracstep_list alone. */
+typedef struct diracstep_source {
+  const char *name; /* of a scene of the catalogue or of a plugin, or the path of a file NAME.toml */
+  const char *text; /* of a scene file (docs/scene_format.md); `name`, or NULL, then names it in messages */
+  const diracstep_scene *callbacks; /* what it points to must stay until the model and all that was made with
+                                     * it are gone */
+  int parameters;                   /* how many are changed; not with callbacks … */
+  const diracstep_parameter *parameter; /* … and they */
+  int drop_redundant;                   /* 1: redundant constraints are left out instead of refused */
+  int plugins;                          /* how many shared objects are loaded first … */
+  const char *const *plugin;            /* … and their paths */
+  int linked;                           /* plugins that are in memory, see diracstep_plugin.h … */
+  const struct diracstep_plugin *const *linked_plugin; /* … which stay as the callbacks do */
+} diracstep_source;
+
+typedef struct diracstep_model diracstep_model;
+
+/* Makes a model; *model is NULL where that fails.  `version` is DIRACSTEP_VERSION_OF_C_INTERFACE. */
+DIRACSTEP_API int diracstep_open(unsigned version, const diracstep_source *source, diracstep_model **model);
+/* Ends a model, NULL as well.  Integrators made with it stay usable. */
+DIRACSTEP_API void diracstep_close(diracstep_model *model);
+
+/* Sizes and times of a scene.  What it points to is there as long as the model. */
+typedef struct diracstep_facts {
+  int dimension;  /* n */
+  int rows;       /* m */
+  int invariants; /* i */
+  double start_time;
+  const double *start_q, *start_v; /* n numbers */
+  double end_time;                 /* where a run ends that is given no other end */
+  double step;                     /* a coarse but sensible step */
+} diracstep_facts;
+
+DIRACSTEP_API int diracstep_read_facts(const diracstep_model *model, diracstep_facts *facts);
+
+/* A table of texts, row after row; valid until the next call of this thread. */
+typedef struct diracstep_table {
+  int rows, columns;
+  const char *const *cells; /* rows * columns */
+} diracstep_table;
+
+/* What can be listed, and the columns. */
+enum {
+  DIRACSTEP_ABOUT = 0, /* what, text: name, kind, description, source, formulas, …; changes to what was given
+                        */
+  DIRACSTEP_COORDINATES, /* name, unit, meaning */
+  DIRACSTEP_ROWS,        /* name */
+  DIRACSTEP_INVARIANTS,  /* name, value that the scene states or "" */
+  DIRACSTEP_PARAMETERS,  /* name, value, unit, meaning */
+  DIRACSTEP_METHODS,     /* name, order, "self-adjoint" or "", formula */
+  DIRACSTEP_RULES,       /* name: rules for nonholonomic rows */
+  DIRACSTEP_SCENES,      /* name: of the catalogue and of the plugins */
+  DIRACSTEP_PLUGINS      /* name, path, description */
+};
+DIRACSTEP_API int diracstep_list(const diracstep_model *model, int what, diracstep_table *table);
+
+/* ---- Integrators ---- */
+
+/* How a scene is stepped. */
 typedef struct diracstep_options {
-  const char *method;        /* NULL: "type1/midpoint" */
-  int order;                 /* composed to this order; 0: the method's own */
-  double step;               /* step size, may be negative; 0: that of the scene */
-  const char *rule;          /* rule for nonholonomic rows; NULL: the method's own */
-  int project_start;         /* 1: an inconsistent start is moved onto the rows instead of refused */
-  int plugins;               /* how many shared objects are loaded first … */
-  const char *const *plugin; /* … and their paths */
+  const char *method;   /* NULL and no order: what the scene's file recommends, its step too; else "auto" */
+  int order;            /* composed to this order; 0: the method's own */
+  double step;          /* may be negative; 0: that of the scene, in the direction of `end` */
+  int ends;             /* 1: the motion is to end at `end`, and a fixed step is made so much smaller … */
+  double end;           /* … that whole steps lead there; 0: no such adjustment */
+  const char *rule;     /* rule for nonholonomic rows; NULL: the method's own */
+  const char *solver;   /* "newton", "fixed-point", "automatic"; NULL: the first */
+  const char *jacobian; /* "automatic", "fresh", "per-step", "kept"; NULL: the first */
+  int project_start;    /* 1: an inconsistent start is moved onto the rows instead of refused */
+  int substeps;         /* a step that cannot be solved is taken in 2, 4, … up to so many; 0: 1 */
+  int compensated_sums; /* 1: sums of a step in extended precision */
+  int pushed;           /* 1: diracstep_push will be used */
+  double eps;           /* above 0: steps vary, so many radians each; 0.2 is usual */
+  const char *control;  /* "integrating", "in-step", "irreversible"; NULL: the first */
+  double smallest_step; /* of steps that vary, without sign; 0: 1e-9 of the time to the end */
+  long max_steps;       /* of steps that vary: the next one fails; 0: ten million */
 } diracstep_options;
 
-/* One point of the motion.  Columns of n numbers, lambda of as many as there are rows; those that are NULL
- * are not written. */
+/* One point of the motion.  Columns that are NULL are not written. */
 typedef struct diracstep_state {
   double time;
   double energy;
@@ -54,33 +145,140 @@ typedef struct diracstep_state {
 
 typedef struct diracstep_integrator diracstep_integrator;
 
-/* The version of the library, "0.1.0"; that of the headers is DIRACSTEP_VERSION of <diracstep/version.h>. */
-DIRACSTEP_API const char *diracstep_version(void);
-
-/* Makes an integrator at the scene's start.  `options` may be NULL.  *integrator is set in any case, for
- * diracstep_message, and to be given to diracstep_destroy; only after DIRACSTEP_OK can it be used.  What the
- * scene points to must stay where it is until then.  `version` is DIRACSTEP_VERSION_OF_C_INTERFACE. */
-DIRACSTEP_API int diracstep_create(unsigned version, const diracstep_scene *scene,
-                                   const diracstep_options *options, diracstep_integrator **integrator);
+/* Makes an integrator at the scene's start; *integrator is NULL where that fails.  `options` may be NULL. */
+DIRACSTEP_API int diracstep_create(const diracstep_model *model, const diracstep_options *options,
+                                   diracstep_integrator **integrator);
 /* Ends an integrator, NULL as well. */
 DIRACSTEP_API void diracstep_destroy(diracstep_integrator *integrator);
+
+/* What is assembled, and what is left out and why: item, decision, reason. */
+DIRACSTEP_API int diracstep_plan(const diracstep_integrator *integrator, diracstep_table *table);
 
 /* Takes steps until `steps` are done or one fails; the state is then that before the failed step. */
 DIRACSTEP_API int diracstep_step(diracstep_integrator *integrator, long steps);
 
+/* One step of size h, which may change from step to step and be negative; not where steps vary. */
+DIRACSTEP_API int diracstep_step_by(diracstep_integrator *integrator, double h);
+
+/* Sets a further generalised force, n numbers, which acts from here on; zero at first.  Needs `pushed`. */
+DIRACSTEP_API int diracstep_push(diracstep_integrator *integrator, const double *force);
+
 /* Reads the current point. */
 DIRACSTEP_API int diracstep_read(diracstep_integrator *integrator, int momentum, diracstep_state *state);
 
-/* Starts anew from a consistent point; q and v NULL: from the scene's start. */
+/* The time of the current point. */
+DIRACSTEP_API double diracstep_time(const diracstep_integrator *integrator);
+
+/* Starts anew from a consistent point; q and v NULL: from the scene's start, the only one where steps vary.
+ */
 DIRACSTEP_API int diracstep_reset(diracstep_integrator *integrator, double time, const double *q,
                                   const double *v);
 
-/* What happened in the last call that did not return DIRACSTEP_OK; valid until the next call. */
-DIRACSTEP_API const char *diracstep_message(const diracstep_integrator *integrator);
+/* All that the next steps depend on, as bytes: *size becomes how many, and where there is room for so many
+ * they are written.  An integrator of the same scene and options goes on from them with the same bits.  Not
+ * where steps vary. */
+DIRACSTEP_API int diracstep_save(const diracstep_integrator *integrator, char *bytes, size_t room,
+                                 size_t *size);
+DIRACSTEP_API int diracstep_restore(diracstep_integrator *integrator, const char *bytes, size_t size);
 
-/* "", or why what was read so far is not to be believed: derivatives taken by differences that two step sizes
- * do not agree on.  Valid until the next call. */
-DIRACSTEP_API const char *diracstep_doubt(diracstep_integrator *integrator);
+/* "", or why what was read so far is not to be believed: what the last run's checks found, and derivatives
+ * taken by differences that two step sizes do not agree on.  Valid until the next call of this thread. */
+DIRACSTEP_API const char *diracstep_doubt(const diracstep_integrator *integrator);
+
+/* What was done since the start. */
+typedef struct diracstep_statistics {
+  long steps, solves, iterations, residuals, jacobians;
+  long retries;             /* steps that needed more than Newton's method from its first guess */
+  double step;              /* its size; 0 where steps vary */
+  double smallest, largest; /* size of a step that varies, without sign; else 0 */
+  long resets; /* of the controller of steps that vary: more than one in 1000 ask for a smaller eps */
+  int order;
+  const char *method; /* valid as long as the integrator */
+} diracstep_statistics;
+DIRACSTEP_API int diracstep_read_statistics(const diracstep_integrator *integrator,
+                                            diracstep_statistics *statistics);
+
+/* ---- Runs ---- */
+
+/* The caller's arrays: point k has row k.  Those that are NULL are not written. */
+typedef struct diracstep_points {
+  long room;                               /* points for which there is room */
+  long count;                              /* points written */
+  double *t;                               /* room numbers */
+  double *q, *v, *p, *lambda, *invariants; /* room × n, n, n, m, i */
+  double *energy;
+  /* Called when there is no room for the next point: enlarges the arrays and `room`, and returns 0.  Where it
+   * is NULL or returns anything else the run fails there. */
+  int (*enlarge)(void *data, struct diracstep_points *points);
+  void *data;
+} diracstep_points;
+
+/* How far a run goes, and what it keeps: the start, each `every`-th point, and the end. */
+typedef struct diracstep_course {
+  long steps;         /* above 0: so many steps */
+  int times;          /* above 0: at so many times instead, reached by shorter steps … */
+  const double *time; /* … which run from the current point on */
+  int ends;           /* 1: to the time `end`; 0: to that of the options or else of the scene */
+  double end;
+  long every;      /* 0: 1 */
+  int momentum;    /* DIRACSTEP_PROJECTED, … */
+  const int *stop; /* or NULL.  Looked at before each step: where it is not 0 the run ends, and the point it
+                    * has reached is kept */
+} diracstep_course;
+
+/* Runs from the current point.  What was kept before a failure is valid. */
+DIRACSTEP_API int diracstep_run(diracstep_integrator *integrator, const diracstep_course *course,
+                                diracstep_points *points);
+
+/* How many points a run with a fixed step will keep at most, or 0 where that is not known. */
+DIRACSTEP_API long diracstep_expect(const diracstep_integrator *integrator, const diracstep_course *course);
+
+/* An error asked for, and how far its search may go. */
+typedef struct diracstep_error {
+  double error;    /* relative, at the end */
+  int steps;       /* 0: the library chooses, 1: fixed, 2: they vary */
+  long max_solves; /* 0: a million */
+  double max_time; /* seconds; 0: 30 */
+} diracstep_error;
+
+/* What the search found.  Texts and the table are valid until the next call of this thread. */
+typedef struct diracstep_found {
+  double estimate;       /* of the error at the end */
+  double observed_order; /* NaN where it is not known */
+  double step;           /* eps where steps vary */
+  int order, varies;
+  long solves; /* of all runs */
+  const char *method, *reason;
+  const char *warning;  /* "", or why the estimate deserves less trust */
+  diracstep_table runs; /* step, steps, solves, difference, estimate, observed order, why it does not count */
+} diracstep_found;
+
+/* A run with method and steps that the library finds, repeated until the estimated error at the end is below
+ * the one asked for.  Of the course, `ends`, `end`, `every`, `momentum` and `stop` count.  DIRACSTEP_FAILED
+ * where the search is refused: `found` and one point are then the best answer so far. */
+DIRACSTEP_API int diracstep_solve(const diracstep_model *model, const diracstep_options *options,
+                                  const diracstep_course *course, const diracstep_error *error,
+                                  diracstep_points *points, diracstep_found *found);
+
+/* ---- Ensembles ---- */
+
+/* Many starts of one scene, each of them consistent. */
+typedef struct diracstep_ensemble {
+  int members;
+  const double *time;  /* or NULL: all at the scene's */
+  const double *q, *v; /* members × n; v may be NULL: the scene's */
+  long steps;          /* 0: to the end that the options give */
+  int momentum;
+  int threads;     /* 0: one for each processor.  Results are the same bits for every number */
+  const int *stop; /* or NULL, looked at before each member */
+} diracstep_ensemble;
+
+/* Steps each member and writes its end, in the order of the starts: the last point that could be read where
+ * it failed.  `failures`, or NULL, becomes the number and the failure of those that did.  Steps of fixed size
+ * only. */
+DIRACSTEP_API int diracstep_run_ensemble(const diracstep_model *model, const diracstep_options *options,
+                                         const diracstep_ensemble *ensemble, diracstep_points *ends,
+                                         diracstep_table *failures);
 
 #ifdef __cplusplus
 }

@@ -2,6 +2,7 @@
 #include <diracstep/plugins/callback_error.hpp>
 #include <diracstep/plugins/callback_function.hpp>
 #include <diracstep/plugins/differences.hpp>
+#include <functional>
 
 namespace diracstep {
 
@@ -111,7 +112,7 @@ class CallbackFunction final : public GeneratingFunction {
         system_(method, scene),
         differences_(pattern()) {
     y_.setZero(dimension(), columns());
-    gradient_ = y_;
+    gradient_ = shifted_values_ = shifted_gradients_ = shifted_gradient_ = y_;
     blocks_.setZero(pattern().nonzeros(), pairs());
     inner_.setZero(dimension(), inner_columns());
     if (method_.create == nullptr) return;
@@ -182,19 +183,20 @@ class CallbackFunction final : public GeneratingFunction {
   }
 
   void gradient_from_values(Interval step, ConstColumnsRef y, ColumnsRef g) {
-    Columns shifted = y;
+    Columns& shifted = shifted_values_ = y;
     for (int j = 0; j < columns(); ++j) {
       const auto along = [&](ConstVectorRef column) {
         shifted.col(j) = column;
         return value(step, shifted);
       };
-      gradient_by_differences(along, y.col(j), g.col(j));
+      gradient_by_differences(std::ref(along), y.col(j),
+                              g.col(j));  // not copied, so that nothing is allocated
       shifted.col(j) = y.col(j);
     }
   }
 
   void hessian_from_gradients(Interval step, ConstColumnsRef y, ColumnsRef blocks) {
-    Columns shifted = y, g(dimension(), columns());
+    Columns &shifted = shifted_gradients_ = y, &g = shifted_gradient_;
     for (int j = 0; j < columns(); ++j)
       for (int i = 0; i <= j; ++i) {
         const auto along = [&](ConstVectorRef column, VectorRef out) {
@@ -202,7 +204,7 @@ class CallbackFunction final : public GeneratingFunction {
           gradient(step, shifted, g);
           out = g.col(i);
         };
-        differences_.evaluate(along, y.col(j), blocks.col(pair(i, j)));
+        differences_.evaluate(std::ref(along), y.col(j), blocks.col(pair(i, j)));
         shifted.col(j) = y.col(j);
       }
   }
@@ -214,6 +216,7 @@ class CallbackFunction final : public GeneratingFunction {
   JacobianByDifferences differences_;
   void* self_ = nullptr;
   Columns y_, gradient_, blocks_, inner_;
+  Columns shifted_values_, shifted_gradients_, shifted_gradient_;  ///< of differences
 };
 
 }  // namespace

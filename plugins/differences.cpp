@@ -1,7 +1,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <deque>
 #include <diracstep/plugins/differences.hpp>
+#include <functional>
 #include <limits>
 #include <sstream>
 
@@ -15,8 +17,9 @@ constexpr double round_off = 4.0 * std::numeric_limits<double>::epsilon();
 constexpr double divisor = 16.0;  // of the increment where they do not agree
 constexpr int most_divisions = 8;
 constexpr double scale_over_increment = 512.0;
-constexpr double known_to = 1e-5;  // relative error of derivatives from which they are doubted
-constexpr int most_rungs = 12;     // from a guess of a scale
+constexpr double known_to = 1e-5;         // relative error of derivatives from which they are doubted
+constexpr int most_rungs = 12;            // from a guess of a scale
+constexpr double slope_known_to = 1e-10;  // relative, from where a straight line asks for no larger scale
 
 /// The increment for a variable of this scale: a power of two, so that x + kδ is exact for most x.
 double increment(double scale) { return std::exp2(std::ceil(std::log2(scale))) / scale_over_increment; }
@@ -57,7 +60,59 @@ struct Sums {
     const double apart = disagreement(r) + std::abs(bend[r] - bend_near[r]);
     return apart <= resolution * (std::abs(sixth[r]) + std::abs(bend[r])) + 8.0 * round_off * largest[r];
   }
+  /// Whether f shows no curvature over some δ, so that it says nothing of how far it goes on like this.
+  bool straight(Eigen::Index r) const { return std::abs(bend[r]) <= 8.0 * round_off * largest[r]; }
+  /// Whether a larger δ is worth while: not for a constant, and for a straight line only to know its slope.
+  bool asks_for_more(Eigen::Index r) const {
+    return !straight(r) || round_off * largest[r] > slope_known_to * std::abs(sixth[r]);
+  }
+  /// Whether a smaller δ is worth while: not where round-off is all that both formulas differ by.  A smaller
+  /// one has less only where f is near zero at x by chance.
+  bool asks_for_less(Eigen::Index r) const { return disagreement(r) > 8.0 * round_off * largest[r]; }
+  bool constant(Eigen::Index r) const {
+    return straight(r) && std::abs(sixth[r]) <= 8.0 * round_off * largest[r];
+  }
   bool agree(double factor) const { return misfit(factor) <= agreement; }
+};
+
+/// What differences of `rows` functions of n variables are computed in.
+struct Workspace {
+  Workspace(Eigen::Index n, Eigen::Index rows)
+      : shifted(n), deltas(n), ahead(rows), behind(rows), sums(rows), next(rows) {}
+  bool fits(Eigen::Index n, Eigen::Index rows) const {
+    return !taken && shifted.size() == n && ahead.size() == rows;
+  }
+
+  Vector shifted, deltas, ahead, behind;
+  Sums sums, next;
+  bool taken = false;
+};
+
+/// A workspace of the thread, lent as long as this lives: differences of differences take two, and after the
+/// first ones of a size none allocates any more.
+class Lent {
+ public:
+  Lent(Eigen::Index n, Eigen::Index rows) : work_(free_one(n, rows)) { work_.taken = true; }
+  Lent(const Lent&) = delete;
+  Lent& operator=(const Lent&) = delete;
+  ~Lent() { work_.taken = false; }
+
+  Workspace* operator->() { return &work_; }
+  Workspace& operator*() { return work_; }
+
+ private:
+  static Workspace& free_one(Eigen::Index n, Eigen::Index rows) {
+    thread_local std::deque<Workspace> all;  // none moves when one is added
+    const auto found =
+        std::find_if(all.begin(), all.end(), [&](const Workspace& work) { return work.fits(n, rows); });
+    if (found != all.end()) return *found;
+    if (all.size() >= most_lent && std::none_of(all.begin(), all.end(), std::mem_fn(&Workspace::taken)))
+      all.clear();
+    return all.emplace_back(n, rows);
+  }
+
+  static constexpr std::size_t most_lent = 64;
+  Workspace& work_;
 };
 
 /// The sums of f(k · factor, out), which evaluates at k increments.
@@ -84,12 +139,13 @@ void take(const F& f, double factor, Vector& ahead, Vector& behind, Sums& sums) 
 /// The same with increments that both formulas agree at; returns the factor of the increments, or of those
 /// with the smallest misfit where none do: what is not smooth, or lost in round-off, only becomes worse.
 template <class F>
-double take_checked(const F& f, Vector& ahead, Vector& behind, Sums& sums) {
+double take_checked(const F& f, Workspace& work) {
+  Vector &ahead = work.ahead, &behind = work.behind;
+  Sums &sums = work.sums, &next = work.next;
   double factor = 1.0;
   take(f, factor, ahead, behind, sums);
   double misfit = sums.misfit(factor);
   if (misfit <= agreement) return factor;
-  Sums next(sums.sixth.size());
   double smaller = factor;
   for (int k = 0; k < most_divisions && misfit > agreement; ++k) {
     smaller /= divisor;
@@ -149,8 +205,9 @@ std::string DifferenceQuality::doubt() const {
 DifferenceScales find_scales(const std::function<double(ConstVectorRef)>& f, ConstVectorRef x,
                              const Vector& guesses) {
   DifferenceScales scales = guesses;
-  Vector shifted = x, ahead(1), behind(1);
-  Sums sums(1);
+  Lent work(x.size(), 1);
+  Vector& shifted = work->shifted = x;
+  Sums& sums = work->sums;
   for (Eigen::Index i = 0; i < x.size(); ++i) {
     const auto error = [&](double scale) {
       const double delta = increment(scale);
@@ -158,7 +215,7 @@ DifferenceScales find_scales(const std::function<double(ConstVectorRef)>& f, Con
         shifted[i] = x[i] + k * delta;
         out[0] = f(shifted);
       };
-      take(at, 1.0, ahead, behind, sums);
+      take(at, 1.0, work->ahead, work->behind, sums);
       shifted[i] = x[i];
       if (!sums.resolved(0)) return HUGE_VAL;
       const double sum = (sums.disagreement(0) + round_off * sums.largest[0]) / delta;
@@ -171,28 +228,37 @@ DifferenceScales find_scales(const std::function<double(ConstVectorRef)>& f, Con
       if (best < HUGE_VAL) scales[i] = smaller;
     }
     if (best == HUGE_VAL) continue;
-    for (const double factor : {divisor, 1.0 / divisor})
+    (void)error(scales[i]);  // for the sums, which tell what f looks like there; so below
+    double further = scales[i];
+    for (int rung = 0; rung < most_rungs && sums.constant(0); ++rung) best = error(further *= divisor);
+    if (sums.constant(0) || best == HUGE_VAL) continue;
+    scales[i] = further;
+    for (const double factor : {divisor, 1.0 / divisor}) {
+      (void)error(scales[i]);
       for (int rung = 0; rung < most_rungs; ++rung) {
+        if (factor > 1.0 ? !sums.asks_for_more(0) : !sums.asks_for_less(0)) break;
         const double next = error(scales[i] * factor);
         if (!(next < 0.5 * best)) break;
         best = next;
         scales[i] *= factor;
       }
+    }
   }
   return scales;
 }
 
 void gradient_by_differences(const std::function<double(ConstVectorRef)>& f, ConstVectorRef x, VectorRef g,
                              const DifferenceScales& scales, DifferenceQuality* quality) {
-  Vector shifted = x, ahead(1), behind(1);
-  Sums sums(1);
+  Lent work(x.size(), 1);
+  Vector& shifted = work->shifted = x;
+  const Sums& sums = work->sums;
   for (Eigen::Index i = 0; i < x.size(); ++i) {
     const double scale = scale_at(scales, i, x[i]), delta = increment(scale);
     const auto at = [&](double k, VectorRef out) {
       shifted[i] = x[i] + k * delta;
       out[0] = f(shifted);
     };
-    const double factor = take_checked(at, ahead, behind, sums);
+    const double factor = take_checked(at, *work);
     shifted[i] = x[i];
     g[i] = sums.sixth[0] / (factor * delta);
     if (quality == nullptr) continue;
@@ -205,12 +271,11 @@ void gradient_by_differences(const std::function<double(ConstVectorRef)>& f, Con
 
 void rate_by_differences(const std::function<void(double, VectorRef)>& f, double t, VectorRef rate,
                          double scale) {
-  Vector ahead(rate.size()), behind(rate.size());
-  Sums sums(rate.size());
+  Lent work(1, rate.size());
   const double delta = increment(std::max(scale, std::ldexp(std::abs(t), -20)));
   const auto at = [&](double k, VectorRef out) { f(t + k * delta, out); };
-  const double factor = take_checked(at, ahead, behind, sums);
-  rate = sums.sixth / (factor * delta);
+  const double factor = take_checked(at, *work);
+  rate = work->sums.sixth / (factor * delta);
 }
 
 JacobianByDifferences::JacobianByDifferences(SparsityPattern pattern) : pattern_(std::move(pattern)) {
@@ -231,15 +296,16 @@ JacobianByDifferences::JacobianByDifferences(SparsityPattern pattern) : pattern_
 void JacobianByDifferences::evaluate(const std::function<void(ConstVectorRef, VectorRef)>& f,
                                      ConstVectorRef x, VectorRef values, const DifferenceScales& scales,
                                      DifferenceQuality* quality) const {
-  Vector shifted = x, deltas(x.size()), ahead(pattern_.rows()), behind(pattern_.rows());
-  Sums sums(pattern_.rows());
+  Lent work(x.size(), pattern_.rows());
+  Vector &shifted = work->shifted = x, &deltas = work->deltas;
+  const Sums& sums = work->sums;
   for (Eigen::Index i = 0; i < x.size(); ++i) deltas[i] = increment(scale_at(scales, i, x[i]));
   for (const std::vector<int>& group : groups_) {
     const auto at = [&](double k, VectorRef out) {
       for (const int column : group) shifted[column] = x[column] + k * deltas[column];
       f(shifted, out);
     };
-    const double factor = take_checked(at, ahead, behind, sums);
+    const double factor = take_checked(at, *work);
     for (const int column : group) {
       shifted[column] = x[column];
       const int begin = pattern_.column_starts()[static_cast<std::size_t>(column)];

@@ -39,7 +39,9 @@ using DifferenceScales = Vector;
 
 /// Scales at a point, from guesses that may be off by far: of those at which f is resolved, so that both
 /// formulas agree for its odd part and two formulas for its even part, the one with the smallest error of
-/// ∂f/∂x_i.  Where f is resolved by none the guess stays.
+/// ∂f/∂x_i.  Where f is resolved by none, or does not change with x_i, the guess stays; where f is a straight
+/// line, scales grow only until its slope is known: how far it stays one is not; where it is a polynomial, they
+/// do not become smaller.
 DifferenceScales find_scales(const std::function<double(ConstVectorRef)>& f, ConstVectorRef x,
                              const Vector& guesses);
 

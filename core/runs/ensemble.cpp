@@ -51,7 +51,7 @@ std::size_t thread_count(int asked, std::size_t members) {
 std::vector<EnsembleMember> run_ensemble(const std::shared_ptr<const Scene>& scene, const Registry& registry,
                                          const SolverFactory& solvers, const IntegratorOptions& options,
                                          std::span<const Start> starts, long steps, Momentum momentum,
-                                         int threads) {
+                                         int threads, const std::function<bool()>& goes_on) {
   std::vector<EnsembleMember> members(starts.size());
   std::vector<std::unique_ptr<Integrator>> integrators;
   for (std::size_t k = 0; k < thread_count(threads, starts.size()); ++k)
@@ -60,7 +60,7 @@ std::vector<EnsembleMember> run_ensemble(const std::shared_ptr<const Scene>& sce
   FirstException exception;
   const auto work = [&](Integrator& integrator) {
     try {
-      for (std::size_t k = next++; k < members.size(); k = next++)
+      for (std::size_t k = next++; k < members.size() && (!goes_on || goes_on()); k = next++)
         members[k] = run_member(integrator, starts[k], steps, momentum);
     } catch (...) {
       exception.keep();

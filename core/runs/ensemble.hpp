@@ -1,6 +1,7 @@
 #pragma once
 
 #include <diracstep/core/integrator/integrator.hpp>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -19,10 +20,12 @@ struct EnsembleMember {
 /// Each of `threads` threads (0: one for each processor) has an integrator of its own, made once and reset
 /// for each start, so the results are the same bits for every number of threads.  Throws Misuse as the
 /// integrator does, for an inconsistent start as well; an exception of the scene's own functions ends the
-/// ensemble and passes through.
+/// ensemble and passes through.  `goes_on`, where given, is asked before each member by the thread that takes
+/// it; after false no further member is begun, and those left have an empty end.
 std::vector<EnsembleMember> run_ensemble(const std::shared_ptr<const Scene>& scene, const Registry& registry,
                                          const SolverFactory& solvers, const IntegratorOptions& options,
                                          std::span<const Start> starts, long steps,
-                                         Momentum momentum = Momentum::projected, int threads = 0);
+                                         Momentum momentum = Momentum::projected, int threads = 0,
+                                         const std::function<bool()>& goes_on = {});
 
 }  // namespace diracstep

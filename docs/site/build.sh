@@ -29,6 +29,7 @@ doxygen "$site/Doxyfile"
 python3 "$site/public_members.py" "$work/xml"
 mkdir "$work/source/api"
 python3 "$site/reference_pages.py" "$work/xml" "$work/source/api"
+python3 "$site/python_pages.py" "$SOURCES/python/diracstep" "$work/source/api/python.rst"
 
 DIRACSTEP_XML="$work/xml" DIRACSTEP_STATIC="$work/static" \
   sphinx-build -q -W -n --keep-going -c "$site" -d "$work/doctrees" "$work/source" "$out"

@@ -1,5 +1,5 @@
 # Debian packages by CPack: libdiracstep0.1 (the C interface, shared), libdiracstep-dev (headers, the C++ libraries,
-# static, CMake and pkg-config files, examples) and diracstep (the command). `./dev package` builds them.
+# static, CMake and pkg-config files, examples), diracstep (the command) and python3-diracstep. `./dev package` builds them.
 # The environment variables DEBFULLNAME and DEBEMAIL name the maintainer, as they do for Debian's own tools.
 set(maintainer "The DiracStep authors <diracstep@localhost>")
 if(DEFINED ENV{DEBFULLNAME} AND DEFINED ENV{DEBEMAIL})
@@ -14,7 +14,7 @@ set(CPACK_PACKAGE_VERSION ${PROJECT_VERSION})
 set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "")  # every package has its own
 set(CPACK_STRIP_FILES ON)
 set(CPACK_DEB_COMPONENT_INSTALL ON)
-set(CPACK_COMPONENTS_ALL library development command)
+set(CPACK_COMPONENTS_ALL library development command python)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEBIAN_PACKAGE_RELEASE 1)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
@@ -61,8 +61,23 @@ debian_package(command diracstep math "discrete Dirac mechanics, the command"
 set(CPACK_DEBIAN_COMMAND_PACKAGE_RECOMMENDS "gcc, libc6-dev, gnuplot-nox")  # scene files are compiled, studies plotted
 set(CPACK_DEBIAN_COMMAND_PACKAGE_SUGGESTS "libdiracstep-dev")
 
+debian_package(python python3-diracstep python "discrete Dirac mechanics, Python 3"
+  "This is the Python package: scenes from functions that are traced, runs as\nNumPy arrays, studies.")
+set(CPACK_DEBIAN_PYTHON_PACKAGE_ARCHITECTURE all)
+set(CPACK_DEBIAN_PYTHON_PACKAGE_SHLIBDEPS OFF)
+set(CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS "python3:any (>= 3.9), python3-numpy (>= 1:1.22), ${library} (>= ${version})")
+set(CPACK_DEBIAN_PYTHON_PACKAGE_RECOMMENDS "gcc, libc6-dev, python3-matplotlib")  # scenes are compiled, runs drawn
+set(CPACK_DEBIAN_PYTHON_PACKAGE_SUGGESTS "diracstep, python3-pandas, python3-tqdm")  # the command makes studies
+foreach(script postinst prerm)  # byte code, as Debian's packages of Python have it
+  configure_file(${CMAKE_CURRENT_LIST_DIR}/python.${script} ${PROJECT_BINARY_DIR}/python/${script} COPYONLY)
+  list(APPEND CPACK_DEBIAN_PYTHON_PACKAGE_CONTROL_EXTRA ${PROJECT_BINARY_DIR}/python/${script})
+endforeach()
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/python/diracstep DESTINATION lib/python3/dist-packages COMPONENT python
+        FILES_MATCHING PATTERN "*.py" PATTERN "py.typed" PATTERN "__pycache__" EXCLUDE)
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/examples/notebooks DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/python3-diracstep
+        COMPONENT python)
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/examples DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/libdiracstep-dev
-        COMPONENT development)
+        COMPONENT development PATTERN notebooks EXCLUDE)
 set(documents ${CMAKE_INSTALL_DATADIR}/doc/diracstep)
 install(FILES ${PROJECT_SOURCE_DIR}/README.md ${PROJECT_BINARY_DIR}/changelog.gz DESTINATION ${documents}
         COMPONENT command)

@@ -4,6 +4,7 @@
 #   cpp, c compile without warnings; a program is linked and run
 #   sh     runs; a command that fails ends the test
 #   toml   passes `diracstep check` as the scene it names
+#   python runs after the other blocks, all of the page as one program
 # Any other block must be a file that a later block uses, or say why it is not run (blocks.awk has the marks).
 set -eu
 page="$1" prefix="$2" work="$3" slow="${4:-}"
@@ -27,6 +28,18 @@ build_programs() {
   cmake -S "$tests/programs" -B programs -D CMAKE_PREFIX_PATH="$prefix" -D SOURCES="$programs" \
         -D BLOCKS="$work/blocks" >programs.log || { cat programs.log; exit 1; }
   cmake --build programs --parallel 2
+}
+
+run_python() {  # with the package of the sources and the library of PREFIX
+  set -- $(awk '$2 == "python" && $3 == "run" { printf "blocks/%02d.python\n", $1 }' blocks/list)
+  [ $# -gt 0 ] || return 0
+  python="$(PATH="/usr/bin:$PATH" command -v python3 || true)"
+  for module in numpy matplotlib; do
+    "${python:-false}" -c "import $module" 2>/dev/null || { echo "not checked: blocks in Python: python3-$module is missing"; return 0; }
+  done
+  for block in "$@"; do printf '# %s\n' "$block"; cat "$block"; done >page.py
+  DIRACSTEP_LIBRARY="$(find "$prefix" -name libdiracstep.so | head -n 1)" PYTHONPATH="$sources/python" PYTHONDONTWRITEBYTECODE=1 \
+    MPLBACKEND=Agg MPLCONFIGDIR="$work" "$python" -W error page.py || { echo "$page: a block in Python fails" >&2; exit 1; }
 }
 
 examine_scene() {  # FILE; interpreted, which gives the same bits as compiled
@@ -59,6 +72,8 @@ while read -r number language mark argument <&3; do
       program="programs/$(printf %02d "$number")"
       [ ! -x "$program" ] || "$program" || refuse "the program fails" ;;
     toml) examine_scene "$block" ;;
+    python) ;;
     *) refuse "no test runs this; mark it '<!-- file: NAME -->' or '<!-- not run: WHY -->'" ;;
   esac
 done 3<blocks/list
+run_python

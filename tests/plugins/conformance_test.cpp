@@ -195,6 +195,17 @@ TEST(PlantedFault, AllocationDespiteTheClaim) {
   EXPECT_FALSE(failing(Fault::allocates, "allocation").contains("allocation"));  // not claimed
 }
 
+TEST(Fallback, DifferencesAllocateNothingWhereThePluginStatesSo) {
+  if (!counts_allocations) GTEST_SKIP() << "allocations are not counted in this build";
+  const auto claimed = [](diracstep_method& method) { method.flags |= DIRACSTEP_ALLOCATION_FREE; };
+  EXPECT_FALSE(failing(Fault::none, claimed, "allocation").contains("allocation"));  // ∂²S by differences
+  const auto value_alone = [](diracstep_method& method) {
+    method.flags |= DIRACSTEP_ALLOCATION_FREE;
+    method.gradient = nullptr;
+  };
+  EXPECT_FALSE(failing(Fault::none, value_alone, "allocation").contains("allocation"));
+}
+
 TEST(PlantedFault, InstancesThatShareAWorkspace) {
   EXPECT_EQ(failing(Fault::shares_a_workspace), Names{"two instances"});
 }

@@ -41,6 +41,18 @@ TEST(Differences, ScalesAreFoundFromGuessesThatAreFarOff) {
   }
 }
 
+TEST(Differences, AConstantAndAStraightLineAskForNoLargerScale) {
+  const auto f = [](ConstVectorRef x) { return 0.7 * x[0] + 2.5 + 0.0 * x[1]; };
+  const DifferenceScales scales = find_scales(f, Vector{{0.3, 0.2}}, Vector{{1.0, 0.4}});
+  EXPECT_EQ(scales[0], 1.0);
+  EXPECT_EQ(scales[1], 0.4);
+}
+
+TEST(Differences, AParabolaThatIsZeroAtThePointAsksForNoSmallerScale) {
+  const auto f = [](ConstVectorRef v) { return 0.5 * v[0] * v[0]; };
+  EXPECT_GE(find_scales(f, Vector{{0.0}}, Vector{{1.5}})[0], 1.5);
+}
+
 TEST(Differences, AngleOfManyTurnsIsNoScale) {
   const auto f = [](ConstVectorRef x) { return std::cos(x[0]); };
   Vector g(1);

@@ -1,0 +1,72 @@
+#include <diracstep/c_interface/point_writer.hpp>
+#include <diracstep/core/runs/ensemble.hpp>
+#include <diracstep/core/runs/run.hpp>
+
+using namespace diracstep;
+using namespace diracstep::c_interface;
+
+namespace {
+
+std::vector<Start> starts_of(const diracstep_model& model, const diracstep_ensemble& ensemble) {
+  const int n = model.scene->dimension();
+  const double* const q = &given(ensemble.q, "the list of starts q");
+  std::vector<Start> starts(static_cast<std::size_t>(ensemble.members), model.scene->start);
+  for (std::size_t k = 0; k < starts.size(); ++k) {
+    const std::size_t row = k * static_cast<std::size_t>(n);
+    if (ensemble.time != nullptr) starts[k].time = ensemble.time[k];
+    starts[k].q = Eigen::Map<const Vector>(q + row, n);
+    if (ensemble.v != nullptr) starts[k].v = Eigen::Map<const Vector>(ensemble.v + row, n);
+  }
+  return starts;
+}
+
+void require_sense(const diracstep_ensemble& ensemble, const diracstep_points& ends) {
+  if (ensemble.members < 0 || ensemble.steps < 0)
+    throw Misuse("members = " + std::to_string(ensemble.members) +
+                 ", steps = " + std::to_string(ensemble.steps) + "; 0 or more are needed");
+  if (ends.room < ensemble.members)
+    throw Misuse("there is room for " + std::to_string(ends.room) + " ends of " +
+                 std::to_string(ensemble.members) + " members");
+}
+
+void run(const diracstep_model& model, const diracstep_options& options, const diracstep_ensemble& ensemble,
+         diracstep_points& ends, diracstep_table* failures) {
+  const CatalogueScene& entry = entry_of(model);
+  require_sense(ensemble, ends);
+  if (options.eps > 0.0 || options.pushed != 0)
+    throw Misuse("ensembles need steps of fixed size, and no push");
+  IntegratorOptions stepping = stepping_from(model, options);
+  stepping.step = step_from(model, options);
+  const double start = model.scene->start.time;
+  const long steps =
+      ensemble.steps > 0 ? ensemble.steps : fit_steps(start, end_from(model, options), stepping.step).steps;
+  const auto members = run_ensemble(entry.scene, model.registry, solvers_from(options), stepping,
+                                    starts_of(model, ensemble), steps, momentum_from(ensemble.momentum),
+                                    ensemble.threads, [&] { return !stopped(ensemble.stop); });
+  PointWriter writer(ends, entry.invariants, !entry.scene->lagrangian);
+  std::vector<std::string> cells;
+  long unread = 0;
+  for (std::size_t k = 0; k < members.size(); ++k) {
+    if (members[k].end.q.size() > 0)
+      writer.write(members[k].end, static_cast<long>(k));
+    else
+      ++unread;
+    if (!members[k].last.ok()) cells.insert(cells.end(), {std::to_string(k), members[k].last.failure});
+  }
+  ends.count = ensemble.members;
+  if (failures != nullptr) *failures = keep(2, std::move(cells));
+  if (stopped(ensemble.stop) && unread > 0)
+    throw Interruption("interrupted; " + std::to_string(unread) + " members were not stepped");
+}
+
+}  // namespace
+
+int diracstep_run_ensemble(const diracstep_model* model, const diracstep_options* options,
+                           const diracstep_ensemble* ensemble, diracstep_points* ends,
+                           diracstep_table* failures) {
+  return guarded([&] {
+    if (failures != nullptr) *failures = {};
+    run(given(model, "the model"), options != nullptr ? *options : diracstep_options{},
+        given(ensemble, "the ensemble"), given(ends, "where the ends go"), failures);
+  });
+}

@@ -1,0 +1,105 @@
+#include <cmath>
+#include <diracstep/c_interface/point_writer.hpp>
+#include <diracstep/core/adaptive/error_control.hpp>
+#include <diracstep/core/adaptive/rate_monitor.hpp>
+
+using namespace diracstep;
+using namespace diracstep::c_interface;
+
+namespace {
+
+std::optional<bool> varies(int steps) {
+  if (steps < 0 || steps > 2)
+    throw Misuse("steps of the search is " + std::to_string(steps) +
+                 "; 0 (chosen), 1 (fixed), 2 (they vary)");
+  return steps == 0 ? std::nullopt : std::optional<bool>(steps == 2);
+}
+
+ErrorControlOptions wanted(const diracstep_model& model, const diracstep_options& options,
+                           const diracstep_course& course, const diracstep_error& error) {
+  ErrorControlOptions search;
+  search.error = error.error;
+  if (options.method != nullptr) search.method = options.method;
+  search.order = options.order;
+  search.adaptive = varies(error.steps);
+  search.control = control_from(options);
+  if (options.step != 0.0)
+    search.first_step = std::abs(options.step);
+  else if (!has_accelerations(*model.scene))
+    search.first_step = std::abs(model.entry.natural_step);
+  search.integrator = stepping_from(model, options);
+  if (error.max_solves != 0) search.max_solves = error.max_solves;
+  if (error.max_time != 0.0) search.max_time = error.max_time;
+  search.go_on = [stop = course.stop] { return !stopped(stop); };
+  return search;
+}
+
+std::vector<std::string> cells_of(const std::vector<ErrorControlRun>& runs) {
+  std::vector<std::string> cells;
+  for (const ErrorControlRun& run : runs)
+    cells.insert(cells.end(),
+                 {to_text(run.step, 17), std::to_string(run.steps), std::to_string(run.solves),
+                  to_text(run.difference), to_text(run.estimate), to_text(run.observed_order), run.failure});
+  return cells;
+}
+
+std::string joined(const std::string& first, const std::string& second, const std::string& third) {
+  std::string all;
+  for (const std::string& text : {first, second, third})
+    if (!text.empty()) all += (all.empty() ? "" : "; ") + text;
+  return all;
+}
+
+diracstep_found found_from(const ErrorControlReport& report) {
+  return {report.estimate,
+          report.observed_order,
+          report.step,
+          report.order,
+          report.adaptive ? 1 : 0,
+          report.work.solves,
+          keep(report.method),
+          keep(joined(report.method_reason, report.reason, report.division)),
+          keep(report.warning),
+          keep(7, cells_of(report.runs))};
+}
+
+void solve(const diracstep_model& model, const diracstep_options& options, const diracstep_course& course,
+           const diracstep_error& error, diracstep_points& points, diracstep_found& found) {
+  require_sense(course);
+  const CatalogueScene& entry = entry_of(model);
+  const double end = course.ends != 0 ? course.end : end_from(model, options);
+  const SolverFactory solvers = solvers_from(options);
+  const ErrorControlReport report =
+      solve_to_error(entry.scene, model.registry, solvers, end, wanted(model, options, course, error));
+  PointWriter writer(points, entry.invariants, !entry.scene->lagrangian);
+  found = found_from(report);
+  if (!report.ok()) {
+    if (report.end.q.size() > 0) writer.write(report.end);
+    if (stopped(course.stop)) throw Interruption(report.refusal);
+    throw Failure(report.refusal);
+  }
+  const RunReport again =
+      run_again(entry.scene, model.registry, solvers, report, momentum_from(course.momentum),
+                course.every > 0 ? course.every : 1, [&](const Sample& point) {
+                  writer.write(point);
+                  return !stopped(course.stop);
+                });
+  if (!again.ok()) throw Failure(again.last.failure);
+  if (stopped(course.stop) && !writer.has(report.end.time))
+    throw Interruption("interrupted on the way to t = " + to_text(end, 17));
+}
+
+}  // namespace
+
+int diracstep_solve(const diracstep_model* model, const diracstep_options* options,
+                    const diracstep_course* course, const diracstep_error* error, diracstep_points* points,
+                    diracstep_found* found) {
+  return guarded([&] {
+    diracstep_found& told = given(found, "where the findings go");
+    told = {};
+    told.method = told.reason = told.warning = "";
+    solve(given(model, "the model"), options != nullptr ? *options : diracstep_options{},
+          course != nullptr ? *course : diracstep_course{}, given(error, "the error"),
+          given(points, "where the points go"), told);
+  });
+}

@@ -1,0 +1,30 @@
+"""DiracStep: structure-preserving time stepping of mechanical and electrical systems with constraints::
+
+    import diracstep as ds
+
+    skate = ds.load("knife_edge")
+    run = skate.run(step=0.1, until=10)
+    run["x"], run.energy, run.plot("x", "y")
+
+Scenes come from files (``load``), from text (``parse``), from the ``catalogue``, or from Python functions that are traced once
+(``Scene``).  Columns are NumPy arrays in the order of ``scene.coordinates``; units are those of the scene.
+"""
+
+from __future__ import annotations
+
+from ._library import version
+from .callbacks import GeneratingFunction
+from .errors import CallbackCost, Doubt, Error, Failure, Interrupted, Misuse
+from .integrator import Integrator, State
+from .run import Ensemble, Run, Search, Statistics
+from .scene import Scene, catalogue, load, methods, parse
+from .study import Study
+from .symbols import (acos, acosh, asin, asinh, atan, atan2, atanh, cos, cosh, exp, log, maximum, minimum, pi, sin, sinh, sqrt, tan,
+                      tanh)
+
+__version__ = version()
+
+__all__ = ["CallbackCost", "Doubt", "Ensemble", "Error", "Failure", "GeneratingFunction", "Integrator", "Interrupted", "Misuse",
+           "Run", "Scene", "Search", "State", "Statistics", "Study", "acos", "acosh", "asin", "asinh", "atan", "atan2", "atanh",
+           "catalogue", "cos", "cosh", "exp", "load", "log", "maximum", "methods", "minimum", "parse", "pi", "sin", "sinh",
+           "sqrt", "tan", "tanh", "version"]

@@ -1,0 +1,42 @@
+"""What is raised and what is warned of."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from .run import Run
+
+
+class Error(Exception):
+    """Base of the exceptions of this package; the text is the library's."""
+
+
+class Misuse(Error, ValueError):
+    """A wrong name, size, value or start, found before anything is computed."""
+
+
+class Failure(Error, RuntimeError):
+    """A step that cannot be solved, a search for an error that was refused, a function that failed.
+
+    ``run`` holds what was computed before, or is None.
+    """
+
+    run: Run | None = None
+
+
+class Doubt(UserWarning):
+    """A run came to its end, and its checks found why the result is not to be believed."""
+
+
+class Interrupted(UserWarning):
+    """A run was ended by Ctrl-C; it holds what was computed until then."""
+
+
+class CallbackCost(UserWarning):
+    """A scene calls Python functions at every evaluation: what that costs."""
+
+
+def raised(code: int, message: str) -> Any:
+    """The exception for a code of the library."""
+    return (Misuse if code == 2 else Failure)(message)

@@ -1,0 +1,149 @@
+"""Stepping by hand: for control loops, learning, and runs that end at an event of one's own."""
+
+from __future__ import annotations
+
+import ctypes
+import threading
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from . import _library as c
+from .arrays import column, real
+from .errors import Misuse
+from .options import momentum_from, options_from
+from .plan import TextTable
+from .run import Statistics
+
+if TYPE_CHECKING:
+    from .scene import Scene
+
+_OK = c.OK
+
+
+@dataclass(frozen=True)
+class State:
+    """A point of a motion.  The arrays are copies and own their memory."""
+
+    t: float
+    q: np.ndarray  #: n numbers
+    v: np.ndarray  #: n numbers, in the distribution
+    p: np.ndarray  #: n numbers, the representative asked for
+    lambda_: np.ndarray  #: m numbers: forces of the rows
+    energy: float
+
+
+class Integrator:
+    """Steps a scene with one method; made by ``Scene.integrator``.  Threads take turns."""
+
+    def __init__(self, scene: Scene, until: float | None, pushed: bool, given: dict[str, Any]) -> None:
+        self.scene = scene
+        self._lock = threading.Lock()
+        self._options = options_from(given, until, pushed)
+        handle = ctypes.c_void_p()
+        scene._check(c.lib.create(scene._handle, ctypes.byref(self._options), ctypes.byref(handle)))
+        self._handle: int = handle.value or 0
+        self._destroy = c.lib.destroy  # there until the end of the interpreter
+        self._step = c.lib.step
+
+    def __del__(self) -> None:
+        if getattr(self, "_handle", 0):
+            self._destroy(self._handle)
+
+    def step(self, count: int = 1, *, size: float | None = None) -> None:
+        """Takes so many steps, or one of another size.  After a Failure the state is that before the failed step."""
+        if size is None:
+            try:
+                with self._lock:
+                    code = self._step(self._handle, count)
+                    if code == _OK:
+                        return
+                    message = c.lib.message().decode()
+            except ctypes.ArgumentError:
+                raise Misuse(f"steps is {count!r}; a whole number is needed") from None
+            self.scene._raise(code, message)
+        with self._lock:
+            self._check(c.lib.step_by(self._handle, real(size, "size")))
+
+    def push(self, force: Any) -> None:
+        """A further generalised force, by coordinate or in their order, that acts until the next push.
+
+        The integrator must be made with ``pushed=True``.
+        """
+        numbers = column(force, self.scene.coordinates, "force")
+        with self._lock:
+            self._check(c.lib.push(self._handle, numbers.ctypes.data))
+
+    @property
+    def time(self) -> float:
+        """The time of the current point."""
+        return c.lib.time(self._handle)
+
+    def state(self, momentum: str = "projected") -> State:
+        """The current point."""
+        n, m = len(self.scene.coordinates), len(self.scene.rows)
+        q, v, p, force = np.empty(n), np.empty(n), np.empty(n), np.empty(m)
+        read = c.State(q=q.ctypes.data, v=v.ctypes.data, p=p.ctypes.data, lambda_=force.ctypes.data)
+        with self._lock:
+            self._check(c.lib.read(self._handle, momentum_from(momentum), ctypes.byref(read)))
+        return State(read.time, q, v, p, force, read.energy)
+
+    def reset(self, q: Any = None, v: Any = None, t: float | None = None) -> None:
+        """Starts anew: at the scene's start, or at a consistent point of one's own.  What is not given is the scene's."""
+        scene = self.scene
+        if q is None and v is None and t is None:
+            with self._lock:
+                self._check(c.lib.reset(self._handle, 0.0, None, None))
+            return
+        start_q = column(scene.start_q if q is None else q, scene.coordinates, "q")
+        start_v = column(scene.start_v if v is None else v, scene.coordinates, "v")
+        start_t = scene.start_time if t is None else real(t, "t")
+        with self._lock:
+            self._check(c.lib.reset(self._handle, start_t, start_q.ctypes.data, start_v.ctypes.data))
+
+    def save(self) -> bytes:
+        """All that the next steps depend on.  An integrator of the same scene and options goes on from it with the same bits."""
+        size = ctypes.c_size_t()
+        with self._lock:
+            self._check(c.lib.save(self._handle, None, 0, ctypes.byref(size)))
+            room = ctypes.create_string_buffer(size.value)
+            self._check(c.lib.save(self._handle, ctypes.cast(room, ctypes.c_void_p), size.value, ctypes.byref(size)))
+        return room.raw
+
+    def restore(self, snapshot: bytes) -> None:
+        """Goes on from ``save()``; raises Misuse for a snapshot that does not fit."""
+        if not isinstance(snapshot, bytes):
+            raise Misuse(f"the snapshot is {type(snapshot).__name__}; bytes from save() are needed")
+        with self._lock:
+            self._check(c.lib.restore(self._handle, snapshot, len(snapshot)))
+
+    @property
+    def plan(self) -> TextTable:
+        """What is assembled, and what is left out and why."""
+        table = c.Table()
+        with self._lock:
+            self._check(c.lib.plan(self._handle, ctypes.byref(table)))
+            rows = table.lines()
+        how = self.statistics
+        return TextTable(f"{self.scene.name} with {how.method}, order {how.order}", ("item", "decision", "reason"), rows)
+
+    @property
+    def doubt(self) -> str:
+        """Empty, or why what was read is not to be believed."""
+        with self._lock:
+            return c.lib.doubt(self._handle).decode()
+
+    @property
+    def statistics(self) -> Statistics:
+        """Work since the start."""
+        read = c.Statistics()
+        self._check(c.lib.read_statistics(self._handle, ctypes.byref(read)))
+        return Statistics(read.method.decode(), read.order, read.step, read.steps, read.solves, read.iterations,
+                          read.residuals, read.jacobians, read.retries, read.smallest, read.largest, read.resets)
+
+    def __repr__(self) -> str:
+        return f"<integrator of {self.scene.name} at t = {self.time:g}>"
+
+    def _check(self, code: int) -> None:
+        self.scene._check(code)

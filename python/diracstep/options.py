@@ -1,0 +1,55 @@
+"""How a scene is stepped: keyword arguments as the structs of the library."""
+
+from __future__ import annotations
+
+import ctypes
+from typing import Any
+
+from . import _library as c
+from .arrays import real, whole
+from .errors import Misuse
+
+DEFAULT_EPS = 0.2
+KNOWN = ("method", "order", "step", "rule", "solver", "jacobian", "project_start", "substeps", "compensated_sums", "adaptive",
+         "eps", "control", "smallest_step", "max_steps")
+
+
+def options_from(given: dict[str, Any], until: float | None, pushed: bool = False) -> c.Options:
+    """The options of the library; raises Misuse for a keyword that is not known."""
+    unknown = [name for name in given if name not in KNOWN]
+    if unknown:
+        raise Misuse(f"no option {unknown[0]!r}; there are " + ", ".join(KNOWN))
+    options = c.Options()
+    for name in ("method", "rule", "solver", "jacobian", "control"):
+        value = given.get(name)
+        if value is not None and not isinstance(value, str):
+            raise Misuse(f"{name} is {value!r}; a text is needed")
+        setattr(options, name, c.encoded(value))
+    for name in ("order", "substeps", "max_steps"):
+        setattr(options, name, whole(given.get(name) or 0, name))
+    for name in ("project_start", "compensated_sums"):
+        setattr(options, name, int(bool(given.get(name))))
+    if given.get("step") is not None:
+        options.step = real(given["step"], "step")
+        if options.step == 0.0:
+            raise Misuse("step is 0; a number other than zero is needed")
+    options.smallest_step = real(given.get("smallest_step") or 0.0, "smallest_step")
+    eps = given.get("eps")
+    if given.get("adaptive") or eps is not None:
+        options.eps = real(DEFAULT_EPS if eps is None else eps, "eps")
+        if options.eps <= 0.0:
+            raise Misuse(f"eps is {options.eps}; a number of radians above 0 is needed")
+    options.pushed = int(pushed)
+    if until is not None:
+        options.ends, options.end = 1, real(until, "until")
+    return options
+
+
+def momentum_from(name: str) -> int:
+    if name not in c.MOMENTA:
+        raise Misuse(f"momentum: {name!r} is not one of " + ", ".join(c.MOMENTA))
+    return c.MOMENTA[name]
+
+
+def stop_flag() -> ctypes.c_int:
+    return ctypes.c_int(0)

@@ -1,0 +1,198 @@
+"""What a run came to: the points of a motion as arrays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .errors import Misuse
+from .plan import TextTable
+
+if TYPE_CHECKING:
+    from .scene import Scene
+
+
+@dataclass(frozen=True)
+class Statistics:
+    """Work of a run or of an integrator since its start."""
+
+    method: str
+    order: int
+    step: float  #: its size; 0 where steps vary
+    steps: int
+    solves: int
+    iterations: int
+    residuals: int
+    jacobians: int
+    retries: int  #: steps that needed more than Newton's method from its first guess
+    smallest: float = 0.0  #: size of a step that varies
+    largest: float = 0.0
+    resets: int = 0  #: of the controller of steps that vary
+
+
+@dataclass(frozen=True)
+class Search:
+    """How an error asked for was reached."""
+
+    estimate: float  #: of the relative error at the end
+    observed_order: float
+    method: str
+    order: int
+    step: float  #: eps where steps vary
+    varies: bool
+    solves: int  #: of all runs
+    reason: str
+    warning: str
+    runs: TextTable
+
+
+@dataclass(frozen=True, repr=False)
+class Run:
+    """Points of a motion: row k of each array is point k.  Units are those of the scene.
+
+    ``t``, ``energy``: N numbers.  ``q``, ``v``, ``p``: N × n, a column for each coordinate; v lies in the distribution, p is the
+    representative asked for.  ``lambda_``: N × m, the forces of the rows.  ``invariants``: N × i, what the scene declares as
+    kept.  The arrays own their memory.
+    """
+
+    scene: Scene
+    t: np.ndarray
+    q: np.ndarray
+    v: np.ndarray
+    p: np.ndarray
+    lambda_: np.ndarray
+    energy: np.ndarray
+    invariants: np.ndarray
+    statistics: Statistics | None = None
+    search: Search | None = None  #: where an error was asked for
+    doubt: str = ""  #: empty, or why the points are not to be believed
+    interrupted: bool = False  #: whether Ctrl-C ended it
+    _places: dict[str, tuple[np.ndarray, int]] = field(default_factory=dict, compare=False)
+
+    def __post_init__(self) -> None:
+        scene, places = self.scene, self._places
+        for index, name in enumerate(scene.rows):
+            places[name] = (self.lambda_, index)
+        for index, name in enumerate(scene.invariants):
+            places[name] = (self.invariants, index)
+        for index, name in enumerate(scene.coordinates):
+            places["v_" + name] = (self.v, index)
+            places["p_" + name] = (self.p, index)
+            places[name] = (self.q, index)
+
+    def __len__(self) -> int:
+        """The number of points."""
+        return len(self.t)
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        """One quantity along the run: ``"x"``, ``"v_x"``, ``"p_x"``, the name of a row for its force, of an invariant, or
+        ``"t"`` and ``"energy"``."""
+        if name in self._places:
+            array, index = self._places[name]
+            return array[:, index]
+        if name in ("t", "energy"):
+            return getattr(self, name)
+        raise KeyError(f"no quantity {name!r}; there are t, energy, " + ", ".join(self._places))
+
+    @property
+    def names(self) -> list[str]:
+        """The quantities that ``run[name]`` knows."""
+        return ["t", *self._places, "energy"]
+
+    def table(self) -> Any:
+        """All quantities as a pandas.DataFrame, or as a structured array where pandas is not installed."""
+        columns = {name: self[name] for name in self.names}
+        try:
+            import pandas
+        except ImportError:
+            table = np.empty(len(self), dtype=[(name, float) for name in columns])
+            for name, values in columns.items():
+                table[name] = values
+            return table
+        return pandas.DataFrame(columns)
+
+    def plot(self, *names: str, x: str = "t", ax: Any = None, **style: Any) -> Any:
+        """Draws quantities (all coordinates without names) over the time or another quantity; the axes of matplotlib."""
+        if ax is None:
+            ax = _pyplot().subplots()[1]
+        for name in names or self.scene.coordinates:
+            ax.plot(self[x], self[name], **{"label": name, **style})
+        ax.set_xlabel(_labelled(x, self.scene))
+        if len(names) == 1:
+            ax.set_ylabel(_labelled(names[0], self.scene))
+        else:
+            ax.legend()
+        return ax
+
+    def animate(self, x: str, y: str, *, frames: int = 200, interval: int = 40, ax: Any = None) -> Any:
+        """A point that moves in the plane of two quantities, with its path: a matplotlib.animation.FuncAnimation.
+
+        Frames are evenly spaced in time.  Keep what is returned as long as it is to move.
+        """
+        pyplot = _pyplot()
+        from matplotlib.animation import FuncAnimation
+
+        if len(self) < 2:
+            raise Misuse(f"a run of {len(self)} points does not move")
+        if ax is None:
+            ax = pyplot.subplots()[1]
+        forward = np.argsort(self.t, kind="stable")
+        times = np.linspace(self.t[forward[0]], self.t[forward[-1]], frames)
+        across, up = (np.interp(times, self.t[forward], self[name][forward]) for name in (x, y))
+        ax.plot(self[x], self[y], color="0.85", zorder=0)
+        ax.set(xlabel=_labelled(x, self.scene), ylabel=_labelled(y, self.scene))
+        ax.set_aspect("equal", adjustable="datalim")
+        (path,), (point,) = ax.plot([], []), ax.plot([], [], "o")
+        title = ax.set_title("")
+
+        def show(k: int) -> tuple[Any, ...]:
+            path.set_data(across[:k + 1], up[:k + 1])
+            point.set_data(across[k:k + 1], up[k:k + 1])
+            title.set_text(f"t = {times[k]:.3g}")
+            return path, point, title
+
+        return FuncAnimation(ax.figure, show, frames=frames, interval=interval, blit=False)
+
+    def __repr__(self) -> str:
+        span = f", t = {self.t[0]:g} … {self.t[-1]:g}" if len(self) else ""
+        how = f", {self.statistics.method}" if self.statistics else f", {self.search.method}" if self.search else ""
+        state = ", interrupted" if self.interrupted else ", doubted" if self.doubt else ""
+        return f"<run of {self.scene.name}: {len(self)} points{span}{how}{state}>"
+
+
+@dataclass(frozen=True, repr=False)
+class Ensemble:
+    """Ends of many motions of one scene: row k is that of start k.  Arrays as those of a Run.
+
+    ``failures`` says why some stopped early; their rows are the last points that could be read.
+    """
+
+    scene: Scene
+    t: np.ndarray
+    q: np.ndarray
+    v: np.ndarray
+    p: np.ndarray
+    lambda_: np.ndarray
+    energy: np.ndarray
+    invariants: np.ndarray
+    failures: dict[int, str]
+
+    __len__ = Run.__len__
+
+    def __repr__(self) -> str:
+        return f"<ensemble of {self.scene.name}: {len(self)} ends, {len(self.failures)} failed>"
+
+
+def _pyplot() -> Any:
+    try:
+        from matplotlib import pyplot
+    except ImportError as error:
+        raise ImportError("drawing needs matplotlib (Debian package python3-matplotlib)") from error
+    return pyplot
+
+
+def _labelled(name: str, scene: Scene) -> str:
+    unit = scene.units.get(name, "")
+    return f"{name} [{unit}]" if unit else name

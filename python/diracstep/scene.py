@@ -1,0 +1,408 @@
+"""Scenes: what moves, from where, and all that can be done with it."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import time
+import warnings
+from pathlib import Path
+from typing import Any, Callable, Iterator, Mapping, NoReturn, Sequence
+
+import numpy as np
+
+from . import _library as c
+from .arrays import column, real, table, whole
+from .callbacks import CallbackScene, GeneratingFunction
+from .errors import CallbackCost, Doubt, Failure, Interrupted, Misuse, raised
+from .integrator import Integrator
+from .options import momentum_from, options_from, stop_flag
+from .plan import TextTable
+from .points import Points
+from .progress import Progress
+from .run import Ensemble, Run, Search, Statistics
+from .scene_text import SceneText, start_values
+from .study import Study, run_study
+
+_ROOM = 1024  # points of a run whose number is not known
+
+
+class Scene:
+    """A mechanical system with constraints: L(q, v, t), rows A(q, t) v + b(q, t) = 0 or φ(q, t) = 0, a force, and a start.
+
+    The functions are called **once**, with symbols, and become a compiled scene; nothing of Python runs in a step::
+
+        ds.Scene(coordinates=["x", "y", "a"], parameters={"g": 9.81},
+                 lagrangian=lambda q, v, g: (v.x**2 + v.y**2 + v.a**2)/2 + g*q.x,
+                 rows=lambda q, v: v.x*ds.sin(q.a) - v.y*ds.cos(q.a),
+                 v=[0, 0, 1], until=10, step=0.1)
+
+    Arguments of the functions go by their names: ``q``, ``v`` (``p`` in a Hamiltonian), ``t``, and the parameters, which can be
+    changed afterwards with ``with_parameters``.
+
+    coordinates: names, in the order of all columns.
+    lagrangian, hamiltonian, dissipation: one formula each, an energy (Rayleigh's function: a power).
+    rows: one expression, a list, or {name: expression}, each zero along the motion; or a list of such functions.
+    force: generalised forces, a column or {coordinate: force}.
+    q, v, p, t: where the motion starts; a column or {coordinate: value}, 0 where nothing is said.
+    until, step: where runs end that are given no other end, and a coarse but sensible step.
+    invariants: {name: function}, quantities that the motion keeps.
+    callback: True calls the Python functions at every evaluation instead; its cost is measured and warned of.
+    """
+
+    def __init__(self, coordinates: Sequence[str], lagrangian: Callable[..., Any] | None = None, *,
+                 hamiltonian: Callable[..., Any] | None = None, dissipation: Callable[..., Any] | None = None, rows: Any = None,
+                 force: Callable[..., Any] | None = None, parameters: Mapping[str, float] | None = None, q: Any = None,
+                 v: Any = None, p: Any = None, t: float = 0.0, until: float = 1.0, step: float = 0.1,
+                 invariants: Mapping[str, Callable[..., Any]] | None = None, name: str = "scene", description: str = "",
+                 callback: bool = False, plugins: Sequence[str] = (), methods: Sequence[GeneratingFunction] = (),
+                 drop_redundant: bool = False) -> None:
+        coordinates, parameters = list(coordinates), dict(parameters or {})
+        if not coordinates:
+            raise Misuse("a scene needs coordinates")
+        if callback:
+            if lagrangian is None or hamiltonian or dissipation or invariants or p is not None:
+                raise Misuse("callback=True needs a lagrangian, and knows no hamiltonian, dissipation, invariants or start p")
+            zeros = np.zeros(len(coordinates))
+            source = CallbackScene(name, coordinates, parameters, lagrangian, rows, force,
+                                   zeros if q is None else column(q, coordinates, "q"),
+                                   zeros if v is None else column(v, coordinates, "v"), real(t, "t"), real(until, "until"),
+                                   real(step, "step"))
+            self._open(callbacks=source, coordinates=coordinates, plugins=plugins, methods=methods, drop_redundant=drop_redundant)
+            _say_cost(self, source)
+            return
+        writer = SceneText(name, coordinates, parameters)
+        writer.add("lagrangian", lagrangian)
+        writer.add("hamiltonian", hamiltonian)
+        writer.add("dissipation", dissipation)
+        writer.add_rows(rows)
+        writer.add_force(force)
+        writer.add_invariants(invariants or {})
+        text = writer.text(start_values(coordinates, q, v, p, t), until, step, {"description": description})
+        self._open(text=text, name=name, coordinates=coordinates, plugins=plugins, methods=methods, drop_redundant=drop_redundant)
+
+    # ---- opening ----
+    def _open(self, *, name: str | None = None, text: str | None = None, callbacks: CallbackScene | None = None,
+              coordinates: Sequence[str] | None = None, parameters: Mapping[str, float] | None = None,
+              plugins: Sequence[str] = (), methods: Sequence[GeneratingFunction] = (), drop_redundant: bool = False) -> None:
+        self._handle = 0
+        self._callbacks = callbacks
+        self._methods = list(methods)
+        self._again: dict[str, Any] = {"name": name, "text": text, "coordinates": coordinates, "plugins": list(plugins),
+                                       "methods": list(methods), "drop_redundant": drop_redundant}
+        self._changes = {key: float(value) for key, value in (parameters or {}).items()}
+        source, kept = _source(name, text, callbacks, self._changes, plugins, self._methods, drop_redundant)
+        handle = ctypes.c_void_p()
+        self._check(c.lib.open(c.VERSION, ctypes.byref(source), ctypes.byref(handle)))
+        del kept
+        self._handle = handle.value or 0
+        self._close = c.lib.close  # there until the end of the interpreter
+        if name is not None and name.endswith(".toml") and text is None:
+            text = Path(name).read_text(encoding="utf-8")
+        self.text = text  #: of the scene file; None for scenes of the catalogue, of plugins, and of callbacks
+        self._read_facts(coordinates)
+
+    def _read_facts(self, coordinates: Sequence[str] | None) -> None:
+        facts = c.Facts()
+        self._check(c.lib.read_facts(self._handle, ctypes.byref(facts)))
+        listed = self._lines(c.COORDINATES)
+        self.coordinates: list[str] = list(coordinates or (name for name, _, _ in listed))  #: names, in the order of columns
+        self.units: dict[str, str] = {name: unit for name, (_, unit, _) in zip(self.coordinates, listed)}
+        self.rows: list[str] = [name for name, in self._lines(c.ROWS)]  #: names of the constraints
+        self.invariants: list[str] = [name for name, _ in self._lines(c.INVARIANTS)]  #: names of what the motion keeps
+        self.parameters: dict[str, float] = {name: float(value) for name, value, _, _ in self._lines(c.PARAMETERS)}
+        self.about: list[tuple[str, str]] = [(what, text) for what, text in self._lines(c.ABOUT)]  #: what the scene says of itself
+        self.name: str = self.about[0][1]
+        n = facts.dimension
+        self.start_time: float = facts.start_time
+        self.start_q = np.ctypeslib.as_array(facts.start_q, (n,)).copy()
+        self.start_v = np.ctypeslib.as_array(facts.start_v, (n,)).copy()
+        self.until: float = facts.end_time  #: where a run ends that is given no other end
+        self.step: float = facts.step  #: a coarse but sensible step
+
+    def with_parameters(self, **parameters: float) -> Scene:
+        """The same scene with other values of parameters and sizes; nothing is compiled again."""
+        if self._callbacks is not None:
+            raise Misuse("the parameters of a scene of callbacks are fixed; make it anew")
+        made = Scene.__new__(Scene)
+        made._open(**self._again, parameters={**self._changes, **parameters})
+        return made
+
+    def __del__(self) -> None:
+        if getattr(self, "_handle", 0):
+            self._close(self._handle)
+
+    # ---- runs ----
+    def run(self, *, until: float | None = None, steps: int | None = None, at: Any = None, error: float | None = None,
+            every: int = 1, momentum: str = "projected", progress: bool | None = None, max_solves: int = 0, max_time: float = 0.0,
+            **options: Any) -> Run:
+        """One motion from the scene's start, as a Run.
+
+        until: time of the end, the scene's own without it; a fixed ``step`` is made so much smaller that whole steps lead there.
+        steps: so many steps instead.  at: ascending times to show instead of the steps.
+        error: a relative error at the end; the library finds method and steps, repeating the run until its estimate is below
+        (``max_solves`` and ``max_time`` in seconds limit that; ``adaptive=True`` or ``False`` decides whether steps vary).
+        every: keeps each so-many-th point.  momentum: the representative kept as p: projected, plus or minus.
+        progress: shows a bar (tqdm where installed); without it on long runs only.
+        Further options: method, order, step, rule, solver ("newton", "fixed-point"), jacobian, project_start, substeps,
+        compensated_sums; adaptive, eps (radians of a step), control, smallest_step, max_steps for steps that vary.
+
+        Warns with Doubt where the library's checks find the result not to be believed.  Raises Misuse, or Failure, which holds
+        what was computed in ``run``.  Ctrl-C ends the run and keeps what is computed.
+        """
+        if sum(choice is not None for choice in (steps, at, error)) > 1 or (steps is not None or at is not None) and until is not None:
+            raise Misuse("until, steps and at exclude each other, and steps and at go with no error")
+        course, kept = _course(every, momentum, steps, at)
+        if error is not None:
+            return self._search(course, error, until, options, max_solves, max_time, progress)
+        end = None if steps is not None else kept[-1] if at is not None else self.until if until is None else until
+        integrator = Integrator(self, end if at is None else None, False, options)
+        room = c.lib.expect(integrator._handle, ctypes.byref(course))
+        if room > 2**40:
+            raise Misuse(f"{room} points would be kept; take a larger every")
+        points = self._points(room or _ROOM)
+        with Progress(progress, points.struct, room, self.start_time, end) as bar:
+            code, message = c.call_interruptibly(
+                lambda: c.lib.run(integrator._handle, ctypes.byref(course), points.reference()), course.flag,
+                bar.show)
+        return self._finished(points, code, message, statistics=integrator.statistics, doubt=integrator.doubt)
+
+    def _search(self, course: Any, error: float, until: float | None, options: dict[str, Any], max_solves: int, max_time: float,
+                progress: bool | None) -> Run:
+        kind = options.pop("adaptive", None)
+        request = c.ErrorRequest(error=real(error, "error"), steps=0 if kind is None else 2 if kind else 1,
+                                 max_solves=whole(max_solves, "max_solves"), max_time=real(max_time, "max_time"))
+        chosen, found = options_from(options, until), c.Found()
+        points = self._points(_ROOM)
+        told: list[Search] = []
+
+        def call() -> int:
+            code = c.lib.solve(self._handle, ctypes.byref(chosen), ctypes.byref(course), ctypes.byref(request), points.reference(),
+                               ctypes.byref(found))
+            if found.runs.columns:  # texts belong to this thread, and to its last call
+                told.append(_search_from(found))
+            return code
+
+        with Progress(progress, points.struct, 0, self.start_time, None) as bar:
+            code, message = c.call_interruptibly(call, course.flag, bar.show)
+        search = told[0] if told else None
+        return self._finished(points, code, message, search=search, doubt=search.warning if search else "")
+
+    def _points(self, room: int) -> Points:
+        return Points(len(self.coordinates), len(self.rows), len(self.invariants), room)
+
+    def _finished(self, points: Points, code: int, message: str, *, statistics: Statistics | None = None,
+                  search: Search | None = None, doubt: str = "") -> Run:
+        run = Run(self, **points.finish(), statistics=statistics, search=search, doubt=doubt, interrupted=code == c.INTERRUPTED)
+        if points.failure is not None:
+            raise points.failure
+        if code == c.INTERRUPTED:
+            warnings.warn(message, Interrupted, stacklevel=4)
+        elif code != c.OK:
+            self._raise(code, message, run)
+        if doubt:
+            warnings.warn(f"{self.name}: {doubt}", Doubt, stacklevel=4)
+        return run
+
+    def ensemble(self, q: Any, v: Any = None, *, t: Any = None, until: float | None = None, steps: int | None = None,
+                 threads: int = 0, momentum: str = "projected", **options: Any) -> Ensemble:
+        """The ends of many motions, stepped by threads in C++ (0: one for each processor); the same bits for any number.
+
+        q, v: N × n, consistent starts; v is the scene's where it is left out.  t: N starting times, the scene's without.
+        Ctrl-C ends it with KeyboardInterrupt.
+        """
+        starts_q = np.asarray(q)
+        members = len(starts_q) if starts_q.ndim else 0
+        shape = (members, len(self.coordinates))
+        starts_q = table(starts_q, shape, "q")
+        starts_v = None if v is None else table(v, shape, "v")
+        times = None if t is None else table(t, (members,), "t")
+        flag, points = stop_flag(), Points(len(self.coordinates), len(self.rows), len(self.invariants), members, grows=False)
+        request = c.Ensemble(members=members, q=starts_q.ctypes.data, v=_address(starts_v), time=_address(times),
+                             steps=0 if steps is None else whole(steps, "steps", 1), momentum=momentum_from(momentum),
+                             threads=whole(threads, "threads"), stop=ctypes.pointer(flag))
+        chosen = options_from(options, None if steps is not None else self.until if until is None else until)
+        failures, table_of = {}, c.Table()
+
+        def call() -> int:
+            code = c.lib.run_ensemble(self._handle, ctypes.byref(chosen), ctypes.byref(request), points.reference(),
+                                      ctypes.byref(table_of))
+            failures.update((int(member), text) for member, text in table_of.lines())
+            return code
+
+        for array in points.arrays.values():
+            array[:] = np.nan  # what cannot be read stays so
+        if members:
+            code, message = c.call_interruptibly(call, flag)
+            if code == c.INTERRUPTED:
+                raise KeyboardInterrupt(message)
+            if code != c.OK:
+                self._raise(code, message)
+        return Ensemble(self, **points.arrays, failures=failures)
+
+    def integrator(self, *, until: float | None = None, pushed: bool = False, **options: Any) -> Integrator:
+        """An integrator at the scene's start, to be stepped by hand; options as for ``run``.
+
+        until: where the motion will end: a fixed step is then fitted to it.  pushed: ``push`` will be used.
+        """
+        return Integrator(self, until, pushed, options)
+
+    @property
+    def plan(self) -> TextTable:
+        """What is assembled for this scene, and what is left out and why."""
+        return self.integrator().plan
+
+    def study(self, *, methods: Sequence[str] = (), orders: Sequence[int] = (), steps: Sequence[float] = (),
+              rtols: Sequence[float] = (), until: float | None = None, ida: bool = True, erk: bool = True, repeat: int = 1,
+              budget: float = 0.2) -> Study:
+        """Error against run time of methods, beside SUNDIALS IDA and an explicit Runge–Kutta method.
+
+        Made by the command ``diracstep study``, which must be installed; the scene goes there as its file's text.
+        """
+        return run_study(self, methods=methods, orders=orders, steps=steps, rtols=rtols, until=until, ida=ida, erk=erk,
+                         repeat=repeat, budget=budget)
+
+    # ---- inside ----
+    def _lines(self, what: int) -> list[tuple[str, ...]]:
+        return c.lines_of(self._handle, what)
+
+    def _check(self, code: int) -> None:
+        if code != c.OK:
+            self._raise(code, c.lib.message().decode())
+
+    def _raise(self, code: int, message: str, run: Run | None = None) -> NoReturn:
+        """The exception for a code, with what a callback raised as its cause."""
+        exception = raised(code, message)
+        if isinstance(exception, Failure):
+            exception.run = run
+        for owner in [self._callbacks, *self._methods]:
+            if owner is not None and owner.exceptions.kept is not None:
+                raise exception from owner.exceptions.take()
+        raise exception
+
+    def __repr__(self) -> str:
+        return f"<scene {self.name}: {', '.join(self.coordinates)}; {len(self.rows)} rows>"
+
+    def _repr_html_(self) -> str:
+        return TextTable(self.name, ("", ""), self.about)._repr_html_() + self.plan._repr_html_()
+
+
+def _source(name: str | None, text: str | None, callbacks: CallbackScene | None, changes: Mapping[str, float],
+            plugins: Sequence[str], methods: Sequence[GeneratingFunction], drop_redundant: bool) -> tuple[c.Source, Any]:
+    source = c.Source(name=c.encoded(name), text=c.encoded(text), drop_redundant=int(drop_redundant))
+    if callbacks is not None:
+        source.callbacks = ctypes.pointer(callbacks.struct)
+    parameters = (c.Parameter * max(1, len(changes)))(*(c.Parameter(key.encode(), value) for key, value in changes.items()))
+    source.parameters, source.parameter = len(changes), parameters
+    files = (ctypes.c_char_p * max(1, len(plugins)))(*(os.fspath(file).encode() for file in plugins))
+    source.plugins, source.plugin = len(plugins), files
+    linked = (ctypes.POINTER(c.Plugin) * max(1, len(methods)))(*(ctypes.pointer(method.struct) for method in methods))
+    source.linked, source.linked_plugin = len(methods), linked
+    return source, (parameters, files, linked)
+
+
+def _course(every: int, momentum: str, steps: int | None, at: Any) -> tuple[Any, np.ndarray]:
+    course = c.Course(every=whole(every, "every", 1), momentum=momentum_from(momentum))
+    course.flag = stop_flag()
+    course.stop = ctypes.pointer(course.flag)
+    times = np.empty(0)
+    if steps is not None:
+        course.steps = whole(steps, "steps", 1)
+    if at is not None:
+        times = table(np.asarray(at), (np.size(at),), "at")
+        if not times.size:
+            raise Misuse("at holds no times")
+        course.kept = times
+        course.times, course.time = times.size, times.ctypes.data
+    return course, times
+
+
+def _address(array: np.ndarray | None) -> int | None:
+    return None if array is None else array.ctypes.data
+
+
+def _search_from(found: c.Found) -> Search:
+    heading = ("step", "steps", "solves", "difference", "estimate", "order", "")
+    return Search(found.estimate, found.observed_order, found.method.decode(), found.order, found.step, bool(found.varies),
+                  found.solves, found.reason.decode(), found.warning.decode(), TextTable("", heading, found.runs.lines()))
+
+
+def _say_cost(scene: Scene, source: CallbackScene) -> None:
+    """Measures one step of a scene of callbacks, and warns of what it takes."""
+    try:
+        integrator = scene.integrator()
+        before, start = source.calls, time.perf_counter()
+        integrator.step()
+    except (Misuse, Failure):
+        source.exceptions.take()
+        return  # a run will tell
+    taken, calls = time.perf_counter() - start, source.calls - before
+    warnings.warn(f"{scene.name}: a step takes {taken:.2g} s, in which the Python functions are called {calls} times; traced "
+                  "functions (without callback=True) take microseconds", CallbackCost, stacklevel=3)
+
+
+def load(name: str | os.PathLike[str], *, plugins: Sequence[str] = (), methods: Sequence[GeneratingFunction] = (),
+         drop_redundant: bool = False, **parameters: float) -> Scene:
+    """A scene from a file NAME.toml, or one of the catalogue or of a plugin by its name; parameters and sizes changed."""
+    scene = Scene.__new__(Scene)
+    scene._open(name=os.fspath(name), parameters=parameters, plugins=plugins, methods=methods, drop_redundant=drop_redundant)
+    return scene
+
+
+def parse(text: str, *, name: str = "text", plugins: Sequence[str] = (), methods: Sequence[GeneratingFunction] = (),
+          drop_redundant: bool = False, **parameters: float) -> Scene:
+    """A scene from the text of a scene file; ``name`` stands in messages."""
+    scene = Scene.__new__(Scene)
+    scene._open(name=name, text=text, parameters=parameters, plugins=plugins, methods=methods, drop_redundant=drop_redundant)
+    return scene
+
+
+class _Lists:
+    """A model without a scene, for the lists of the library."""
+
+    def __init__(self, plugins: Sequence[str] = ()) -> None:
+        source, kept = _source(None, None, None, {}, plugins, (), False)
+        self._handle = ctypes.c_void_p()
+        c.check(c.lib.open(c.VERSION, ctypes.byref(source), ctypes.byref(self._handle)))
+        del kept
+        self._close = c.lib.close
+
+    def lines(self, what: int) -> list[tuple[str, ...]]:
+        return c.lines_of(self._handle.value or 0, what)
+
+    def __del__(self) -> None:
+        if getattr(self, "_handle", None):
+            self._close(self._handle)
+
+
+class Catalogue(Mapping[str, Scene]):
+    """The scenes that come with the library, by name; each is made when it is asked for."""
+
+    def __getitem__(self, name: str) -> Scene:
+        if name not in self:
+            raise KeyError(f"no scene {name!r}; there are " + ", ".join(self))
+        return load(name)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter([name for name, in _Lists().lines(c.SCENES)])
+
+    def __len__(self) -> int:
+        return sum(1 for _ in self)
+
+    def __contains__(self, name: object) -> bool:
+        return any(name == known for known in self)
+
+    def __repr__(self) -> str:
+        return "<catalogue: " + ", ".join(self) + ">"
+
+    def _repr_html_(self) -> str:
+        described = [(name, dict(self[name].about).get("kind", ""), dict(self[name].about).get("description", "")) for name in self]
+        return TextTable("", ("scene", "kind", "description"), described)._repr_html_()
+
+
+catalogue = Catalogue()
+
+
+def methods(plugins: Sequence[str] = ()) -> TextTable:
+    """The methods, with those of plugins: name, order, whether self-adjoint, formula."""
+    return TextTable("", ("method", "order", "", "formula"), _Lists(plugins).lines(c.METHODS))

@@ -1,0 +1,102 @@
+"""Studies by the command: error against run time, beside SUNDIALS IDA and an explicit Runge–Kutta method.
+
+References and baselines are parts of the command and not of libdiracstep, so it is the command that measures.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Sequence
+
+import numpy as np
+
+from .errors import Failure, Misuse
+from .run import _pyplot
+
+if TYPE_CHECKING:
+    from .scene import Scene
+
+
+class Study:
+    """Rows of a study: one for each method, order and step, and for each tolerance of a baseline."""
+
+    def __init__(self, scene: str, document: dict[str, Any]) -> None:
+        self.scene = scene
+        self.document = document["studies"][0]  #: as the command gives it, with the reference and the orders measured
+        self.rows: list[dict[str, Any]] = self.document["rows"]
+
+    def curves(self) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+        """CPU seconds and relative error at the end, by method."""
+        curves: dict[str, list[tuple[float, float]]] = {}
+        for row in self.rows:
+            seconds, error = (row.get("cpu_seconds") or {}).get("median"), row.get("error_q")
+            if seconds and error:
+                curves.setdefault(_label(row), []).append((seconds, error))
+        return {label: tuple(np.array(sorted(points)).T) for label, points in curves.items()}  # type: ignore[misc]
+
+    def plot(self, ax: Any = None) -> Any:
+        """Error against run time, both logarithmic; the axes of matplotlib."""
+        if ax is None:
+            ax = _pyplot().subplots()[1]
+        for label, (seconds, error) in sorted(self.curves().items()):
+            ax.loglog(seconds, error, "o-", label=label)
+        ax.set(xlabel="CPU time [s]", ylabel="relative error at the end", title=self.scene)
+        ax.legend()
+        return ax
+
+    def table(self) -> Any:
+        """The rows as a pandas.DataFrame, or as they are where pandas is not installed."""
+        try:
+            import pandas
+        except ImportError:
+            return self.rows
+        return pandas.DataFrame(self.rows)
+
+    def __repr__(self) -> str:
+        return f"<study of {self.scene}: {len(self.rows)} rows>"
+
+
+def _label(row: dict[str, Any]) -> str:
+    order = row.get("order")
+    return f"{row['method']}, order {order}" if order else str(row["method"])
+
+
+def _command() -> str:
+    given = os.environ.get("DIRACSTEP_COMMAND") or shutil.which("diracstep")
+    if not given:
+        raise ImportError("studies are made by the command diracstep (Debian package diracstep), which was not found; "
+                          "DIRACSTEP_COMMAND may give its path")
+    return given
+
+
+def run_study(scene: Scene, *, methods: Sequence[str], orders: Sequence[int], steps: Sequence[float], rtols: Sequence[float],
+              until: float | None, ida: bool, erk: bool, repeat: int, budget: float) -> Study:
+    if scene._callbacks is not None:
+        raise Misuse("a study needs a scene of formulas, not of callbacks")
+    with tempfile.TemporaryDirectory() as folder:
+        where = scene.name
+        if scene.text is not None:
+            where = str(Path(folder) / f"{scene.name}.toml")
+            Path(where).write_text(scene.text, encoding="utf-8")
+        call = [_command(), "study", where, "--json", "--repeat", str(repeat), "--budget", repr(float(budget))]
+        for option, values in (("--methods", methods), ("--orders", orders), ("--steps", steps), ("--rtols", rtols)):
+            if len(values):
+                call += [option, ",".join(str(value) for value in values)]
+        for name, value in scene._changes.items():
+            call += ["--set", f"{name}={value!r}"]
+        call += ["--end", repr(float(until))] if until is not None else []
+        call += [] if ida else ["--without-ida"]
+        call += [] if erk else ["--without-erk"]
+        for plugin in scene._again["plugins"]:
+            call += ["--plugin", os.fspath(plugin)]
+        done = subprocess.run(call, capture_output=True, text=True, check=False)
+    if done.returncode == 2:
+        raise Misuse(done.stderr.strip())
+    if done.returncode != 0:
+        raise Failure(done.stderr.strip())
+    return Study(scene.name, json.loads(done.stdout))

@@ -1,0 +1,90 @@
+"""Scenes from files, from text, from the catalogue and from functions."""
+
+import numpy as np
+import pytest
+
+import diracstep as ds
+
+
+def test_the_catalogue_is_a_mapping():
+    assert "knife_edge" in ds.catalogue and len(list(ds.catalogue)) == len(ds.catalogue) > 20
+    assert ds.catalogue["knife_edge"].coordinates == ["x", "y", "ph"]
+    with pytest.raises(KeyError, match="knife_edge"):
+        ds.catalogue["no_such_scene"]
+    assert "Skate" in ds.catalogue._repr_html_()
+
+
+def test_a_file_is_loaded_with_parameters(tmp_path, spring):
+    file = tmp_path / "spring.toml"
+    file.write_text(spring.text)
+    scene = ds.load(file, k=4.0)
+    assert scene.parameters == {"k": 4.0}
+    assert scene.run(until=1.0)["x"][-1] == pytest.approx(np.cos(2.0), abs=1e-6)
+    with pytest.raises(ds.Misuse, match="no parameter 'm'.*are k"):
+        ds.load(file, m=1.0)
+    with pytest.raises(ds.Misuse, match="missing.toml"):
+        ds.load("missing.toml")
+
+
+def test_text_is_parsed_and_its_faults_have_a_place():
+    with pytest.raises(ds.Misuse, match="mine:2:.*'z'"):
+        ds.parse('name = "a"\nlagrangian = "v_x^2 + z"\n[coordinates]\nx = {}\n[span]\nend = 1\nstep = 0.1\n', name="mine")
+
+
+def test_parameters_change_without_tracing_again(spring):
+    stiff = spring.with_parameters(k=4.0)
+    assert stiff.run(until=1.0)["x"][-1] == pytest.approx(np.cos(2.0), abs=1e-6)
+    assert spring.parameters == {"k": 1.0}
+    assert stiff.with_parameters(k=9.0).parameters == {"k": 9.0}
+
+
+def test_traced_rows_are_those_of_the_catalogue(skate):
+    g = skate.parameters["g_sin_alpha"]
+    mine = ds.Scene(["x", "y", "a"], lambda q, v: v @ v / 2 + g * q.x, rows=lambda q, v: {"blade": v.x * ds.sin(q.a) - v.y * ds.cos(q.a)},
+                    v=[0, 0, 1.0], until=10.0)
+    assert mine.rows == ["blade"]
+    one, other = (scene.run(method="type1/gl:3", step=0.1, until=10.0) for scene in (mine, skate))
+    assert np.allclose(one.q, other.q, atol=1e-12) and np.allclose(one["blade"], other["blade"], atol=1e-10)
+
+
+def test_holonomic_rows_forces_and_dissipation():
+    pendulum = ds.Scene(["x", "y"], lambda q, v: v @ v / 2 - 9.81 * q.y, rows=lambda q: [q.x**2 + q.y**2 - 1.0], q=[1.0, 0.0],
+                        until=2.0, step=0.02)
+    run = pendulum.run()
+    assert np.abs(np.hypot(run["x"], run["y"]) - 1.0).max() < 1e-12
+    damped = ds.Scene(["x"], lambda v: v.x**2 / 2, dissipation=lambda v, c: c * v.x**2 / 2, parameters={"c": 0.5}, v=[1.0], until=2.0)
+    assert damped.run()["v_x"][-1] == pytest.approx(np.exp(-1.0), abs=1e-7)
+    driven = ds.Scene(["x"], lambda v: v.x**2 / 2, force=lambda t: {"x": ds.cos(t)}, until=2.0)
+    assert driven.run()["x"][-1] == pytest.approx(1 - np.cos(2.0), abs=1e-7)
+
+
+def test_a_hamiltonian_will_do():
+    scene = ds.Scene(["x"], hamiltonian=lambda q, p: p.x**2 / 2 + q.x**2 / 2, q=[1.0], p=[0.0], until=1.0)
+    assert scene.run()["p_x"][-1] == pytest.approx(-np.sin(1.0), abs=1e-8)
+
+
+@pytest.mark.parametrize("arguments, words", [
+    ({"q": [1.0, 2.0]}, "2 entries.*1 coordinates"),
+    ({"q": {"y": 1.0}}, "no coordinate 'y'"),
+    ({"force": lambda q: {"y": q.x}}, "no coordinate 'y'"),
+    ({"q": [float("nan")]}, "finite"),
+    ({"parameters": {"q": 1.0}}, "cannot be named 'q'"),
+    ({"plugins": ["missing.so"]}, "missing.so"),
+])
+def test_misuse_is_named(arguments, words):
+    with pytest.raises(ds.Misuse, match=words):
+        ds.Scene(["x"], lambda v: v.x**2 / 2, **arguments)
+
+
+def test_the_plan_is_a_table(skate):
+    plan = skate.plan
+    assert plan.heading == ("item", "decision", "reason") and len(plan) > 5
+    assert "KINSOL" in str(plan)
+    assert plan._repr_html_().count("<tr>") == len(plan) + 1
+    assert "KINSOL" in skate._repr_html_()
+
+
+def test_methods_are_listed_with_those_of_plugins(plugin):
+    assert "type1/midpoint" in {row[0] for row in ds.methods()}
+    assert "type1/galerkin2" in {row[0] for row in ds.methods([plugin])} - {row[0] for row in ds.methods()}
+    assert ds.load("knife_edge", plugins=[plugin]).run(steps=3, step=0.1, method="type1/galerkin2").statistics.order == 4
