@@ -40,19 +40,20 @@ void SaddlePointProblem::assemble(VectorRef& values) const {
 }
 
 void SaddlePointProblem::set_scales(ConstVectorRef momentum, ConstVectorRef velocity) {
-  known_momentum_ = momentum.cwiseAbs();
-  known_velocity_ = velocity.cwiseAbs();
-  blocks_[0].scale = scale_of(max_norm(known_momentum_));
-  if (m_ > 0) blocks_[1].scale = scale_of(max_norm(known_velocity_));
+  momentum_scales_.terms = momentum.cwiseAbs();
+  velocity_scales_.terms = velocity.cwiseAbs();
+  blocks_[0].scale = scale_of(max_norm(momentum_scales_.terms));
+  if (m_ > 0) blocks_[1].scale = scale_of(max_norm(velocity_scales_.terms));
 }
 
-void SaddlePointProblem::raise_scales(ConstVectorRef momentum, ConstVectorRef x) {
+void SaddlePointProblem::raise_scales(ConstVectorRef momentum, ConstVectorRef x, bool mass) {
   Vector& of_momentum = momentum_scales_.terms;
-  of_momentum = known_momentum_.cwiseMax(momentum.cwiseAbs());
-  scene_.lagrangian->pattern().for_each(
-      [&](Eigen::Index e, int r, int c) { of_momentum[r] = std::max(of_momentum[r], std::abs(lvv_[e] * x[c])); });
+  of_momentum = of_momentum.cwiseMax(momentum.cwiseAbs());
+  if (mass)
+    scene_.lagrangian->pattern().for_each([&](Eigen::Index e, int r, int c) {
+      of_momentum[r] = std::max(of_momentum[r], std::abs(lvv_[e] * x[c]));
+    });
   Vector& of_velocity = velocity_scales_.terms;
-  of_velocity = known_velocity_;
   if (m_ > 0)
     rows_.pattern().for_each([&](Eigen::Index e, int r, int c) {
       const double a = std::abs(rows_.coefficients()[e]);
@@ -71,6 +72,7 @@ void SaddlePointProblem::raise_scales(ConstVectorRef momentum, ConstVectorRef x)
 void VelocityProblem::begin(double t, ConstVectorRef q, ConstVectorRef p) {
   move_to(t, q);
   p_ = p;
+  mass_taken_ = false;
   set_scales(p, rows_.offsets());
 }
 
@@ -78,7 +80,7 @@ void VelocityProblem::residual(ConstVectorRef x, VectorRef f) {
   const auto v = x.head(n_);
   scene_.lagrangian->gradient(t_, q_, v, lq_, lv_);
   f.head(n_) = lv_ - p_;
-  raise_scales(lv_, x);
+  raise_scales(lv_, x, mass_taken_);
   if (m_ == 0) return;
   rows_.add_annihilator(x.tail(m_), f.head(n_), -1.0);
   rows_.velocity_residual(v, f.tail(m_));
@@ -87,6 +89,7 @@ void VelocityProblem::residual(ConstVectorRef x, VectorRef f) {
 void VelocityProblem::jacobian(ConstVectorRef x, VectorRef values) {
   if (!mass_known_) scene_.lagrangian->hessian(t_, q_, x.head(n_), lqq_, lqv_, lvv_);
   mass_known_ = scene_.lagrangian->structure().y_hessian_constant;
+  mass_taken_ = true;
   assemble(values);
 }
 
@@ -119,7 +122,7 @@ void AccelerationProblem::begin(double t, ConstVectorRef q, ConstVectorRef v) {
 void AccelerationProblem::residual(ConstVectorRef x, VectorRef f) {
   f.head(n_).setZero();
   scene_.lagrangian->pattern().multiply_add(lvv_.data(), x.data(), f.data());
-  raise_scales(f.head(n_), x);
+  raise_scales(f.head(n_), x, true);
   f.head(n_) -= known_force_;
   if (m_ == 0) return;
   rows_.add_annihilator(x.tail(m_), f.head(n_), -1.0);

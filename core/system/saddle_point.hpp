@@ -28,8 +28,9 @@ class SaddlePointProblem : public NonlinearProblem {
   void assemble(VectorRef& values) const;
   /// Scales by the right-hand sides alone.
   void set_scales(ConstVectorRef momentum, ConstVectorRef velocity);
-  /// The scales cover the terms at x as well: ∂²L/∂v² or ∂L/∂v of these sizes, and A times both parts of x.
-  void raise_scales(ConstVectorRef momentum, ConstVectorRef x);
+  /// From now on the scales cover the terms at x as well: momenta of these sizes, ∂²L/∂v² times x where `mass` says that it
+  /// was taken since move_to(), and A times both parts of x.
+  void raise_scales(ConstVectorRef momentum, ConstVectorRef x, bool mass);
 
   const Scene& scene_;
   int n_;
@@ -43,7 +44,6 @@ class SaddlePointProblem : public NonlinearProblem {
   SparsityPattern pattern_;
   BlockPattern layout_;
   std::vector<ResidualBlock> blocks_;
-  Vector known_momentum_, known_velocity_;  ///< sizes of the terms on the right-hand sides
   RowScales momentum_scales_, velocity_scales_;
 };
 
@@ -59,6 +59,7 @@ class VelocityProblem final : public SaddlePointProblem {
  private:
   Vector p_;
   bool mass_known_ = false;  ///< ∂²L/∂v² is constant and was taken
+  bool mass_taken_ = false;  ///< since begin()
 };
 
 /// Unknowns (a, Λ), linear:   d/dt(∂L/∂v) − ∂L/∂q − f = A(q)ᵀΛ,   d/dt(A(q) v + b(q)) = 0,   a = dv/dt.
