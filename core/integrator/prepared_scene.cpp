@@ -39,8 +39,8 @@ PreparedScene prepared(std::shared_ptr<const Scene> given, const IntegratorOptio
     const std::string kept_for =
         dependent.empty() ? "" : why_not_left_out(row_dependence(*scene, scene->start, dependent));
     if (!kept_for.empty())
-      throw Misuse("scene '" + scene->name + "': rows that depend on others at the start: " + joined(dependent) +
-                   "; " + kept_for);
+      throw Misuse("scene '" + scene->name +
+                   "': rows that depend on others at the start: " + joined(dependent) + "; " + kept_for);
     if (!dependent.empty() && !options.drop_redundant_rows)
       throw Misuse("scene '" + scene->name +
                    "': rows that depend on others at the start: " + joined(dependent) +
