@@ -39,8 +39,7 @@ void StepComparison::add(const Sample& start, double h, const Sample& whole, con
   ++steps_;
   longest_way_ = std::max({longest_way_, std::abs(h) * max_norm(start.v), max_norm(whole.q - start.q),
                            max_norm(parts.q - start.q)});
-  const double difference =
-      max_norm(whole.q - parts.q) / std::max(longest_way_, at_rest * max_norm(start.q));
+  const double difference = max_norm(whole.q - parts.q) / std::max(longest_way_, at_rest * max_norm(start.q));
   if (difference > 0.0 && !(difference <= worst_)) {
     worst_ = difference;
     worst_time_ = start.time;

@@ -6,8 +6,8 @@
 
 namespace diracstep {
 
-/// Divides a few steps of a run, one in 600 and at least three, to say when they are too large: at a step that
-/// resolves the motion, two parts end where the whole does; see StepComparison.
+/// Divides a few steps of a run, one in 600 and at least three, to say when they are too large: at a step
+/// that resolves the motion, two parts end where the whole does; see StepComparison.
 ///
 /// Needs no energy, so that it also sees forced and driven scenes.  The parts are taken between
 /// Integrator::save and restore: the run keeps its bits.  Silence proves nothing: a short event between the

@@ -246,9 +246,10 @@ class ImplicitStep final : public StepProblem {
   bool by_increment_ = false;  ///< the unknown is q1 − q0 instead of q1
   Vector last_x_, q1_, increment_, impulse_sizes_;
   Columns y_, gradient_, hessian_;
-  /// Size of the terms of each column of the gradient, and of each entry of the first, as the last step knew it.
+  /// Size of the terms of each column of the gradient, and of each entry of the first, as the last step knew
+  /// it.
   Vector terms_;
-  Vector multipliers_;  ///< of the last step
+  Vector multipliers_;          ///< of the last step
   bool hessian_known_ = false;  ///< hessian_ was taken in this step
 };
 

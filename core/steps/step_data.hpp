@@ -45,7 +45,8 @@ struct StepData {
     });
   }
 
-  /// Scales of the rows c(q0,q1), by the terms that cancel there: A(q0) times positions and the way of the step.
+  /// Scales of the rows c(q0,q1), by the terms that cancel there: A(q0) times positions and the way of the
+  /// step.
   void scale_rows(ResidualBlock& block) {
     const double h = std::abs(step.size);
     block.scale = scale_of(max_norm(start_rows.coefficients()) * max_norm(q0));

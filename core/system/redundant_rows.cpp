@@ -235,12 +235,14 @@ double distance_from(const ConstraintBlocks& holonomic, double t, const Vector& 
   return largest;
 }
 
-/// Whether all poses found around the start that the other rows allow break the holonomic ones of these names.
+/// Whether all poses found around the start that the other rows allow break the holonomic ones of these
+/// names.
 bool broken_by_the_others(const Scene& scene, const Start& start, const std::vector<std::string>& dependent) {
   constexpr double met = 1e-7;
   const ConstraintBlocks others = only_holonomic(without_rows(scene, dependent)->constraints);
   std::vector<std::string> kept = scene.row_names();
-  std::erase_if(kept, [&](const std::string& name) { return std::ranges::find(dependent, name) != dependent.end(); });
+  std::erase_if(
+      kept, [&](const std::string& name) { return std::ranges::find(dependent, name) != dependent.end(); });
   const ConstraintBlocks these = only_holonomic(without_rows(scene, kept)->constraints);
   bool any = false;
   for (const double distance : {-0.1, -0.03, -0.01, 0.01, 0.03, 0.1}) {
@@ -313,15 +315,16 @@ std::vector<std::string> redundant_rows(const Scene& scene, const Start& start, 
   return dependent;
 }
 
-RowDependence row_dependence(const Scene& scene, const Start& start, const std::vector<std::string>& dependent,
-                             double tolerance) {
+RowDependence row_dependence(const Scene& scene, const Start& start,
+                             const std::vector<std::string>& dependent, double tolerance) {
   if (scene.rows() == 0 || scene.rows() > max_rows_in_full) return RowDependence::lasting;
   const std::vector<Columns> poses = one_forms_around(scene, start);
   const std::size_t here = dependent_columns(poses[0], tolerance).size();
   // All poses: one that was found from afar may lie on another branch of the rows, of another rank.
-  const bool crosses = poses.size() > 1 && std::all_of(poses.begin() + 1, poses.end(), [&](const Columns& there) {
-                         return dependent_columns(there, std::max(tolerance, crossing)).size() < here;
-                       });
+  const bool crosses =
+      poses.size() > 1 && std::all_of(poses.begin() + 1, poses.end(), [&](const Columns& there) {
+        return dependent_columns(there, std::max(tolerance, crossing)).size() < here;
+      });
   if (crosses) return RowDependence::at_start_only;
   return broken_by_the_others(scene, start, dependent) ? RowDependence::touching : RowDependence::lasting;
 }
@@ -331,7 +334,8 @@ const char* why_not_left_out(RowDependence dependence) {
     case RowDependence::at_start_only:
       return "not so at poses near it: the start is singular, move it";
     case RowDependence::touching:
-      return "they only touch the others there, and without them other motions are possible: say what they mean "
+      return "they only touch the others there, and without them other motions are possible: say what they "
+             "mean "
              "by rows of another form";
     case RowDependence::lasting:
       break;

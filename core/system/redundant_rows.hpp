@@ -35,8 +35,8 @@ enum class RowDependence {
   touching,  ///< their one-forms do at every pose that all rows allow, but poses that the others allow break
              ///< them, as the third of three bars on a line: they cannot be left out
 };
-RowDependence row_dependence(const Scene& scene, const Start& start, const std::vector<std::string>& dependent,
-                             double tolerance = 1e-10);
+RowDependence row_dependence(const Scene& scene, const Start& start,
+                             const std::vector<std::string>& dependent, double tolerance = 1e-10);
 /// Why rows that depend so cannot be left out, and what to do; empty where they can.
 const char* why_not_left_out(RowDependence dependence);
 

@@ -43,7 +43,10 @@ void SaddlePointProblem::set_scales(ConstVectorRef momentum, ConstVectorRef velo
   momentum_scales_.terms = momentum.cwiseAbs();
   velocity_scales_.terms = velocity.cwiseAbs();
   blocks_[0].scale = scale_of(max_norm(momentum_scales_.terms));
-  if (m_ > 0) blocks_[1].scale = scale_of(max_norm(velocity_scales_.terms));
+  momentum_scales_.give_to(blocks_[0]);
+  if (m_ == 0) return;
+  blocks_[1].scale = scale_of(max_norm(velocity_scales_.terms));
+  velocity_scales_.give_to(blocks_[1]);
 }
 
 void SaddlePointProblem::raise_scales(ConstVectorRef momentum, ConstVectorRef x, bool mass) {

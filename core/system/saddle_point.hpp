@@ -28,8 +28,8 @@ class SaddlePointProblem : public NonlinearProblem {
   void assemble(VectorRef& values) const;
   /// Scales by the right-hand sides alone.
   void set_scales(ConstVectorRef momentum, ConstVectorRef velocity);
-  /// From now on the scales cover the terms at x as well: momenta of these sizes, ∂²L/∂v² times x where `mass` says that it
-  /// was taken since move_to(), and A times both parts of x.
+  /// From now on the scales cover the terms at x as well: momenta of these sizes, ∂²L/∂v² times x where
+  /// `mass` says that it was taken since move_to(), and A times both parts of x.
   void raise_scales(ConstVectorRef momentum, ConstVectorRef x, bool mass);
 
   const Scene& scene_;

@@ -120,8 +120,8 @@ class DenseLu final : public LinearSolver {
   Eigen::VectorXd solution_;
 };
 
-/// A matrix whose elimination meets a zero pivot is tried once more with rows and columns scaled so that their
-/// entries are about 1: a mass of 1e-20 beside rows of a constraint is no singularity.
+/// A matrix whose elimination meets a zero pivot is tried once more with rows and columns scaled so that
+/// their entries are about 1: a mass of 1e-20 beside rows of a constraint is no singularity.
 class Scaled final : public LinearSolver {
  public:
   Scaled(std::unique_ptr<LinearSolver> lu, int size) : lu_(std::move(lu)), size_(size) {}
@@ -146,8 +146,8 @@ class Scaled final : public LinearSolver {
  private:
   static constexpr int sweeps = 8;
 
-  /// Rows and columns in turn by the mean of their smallest and largest entries, in powers of two; false where
-  /// that leaves all as it is.
+  /// Rows and columns in turn by the mean of their smallest and largest entries, in powers of two; false
+  /// where that leaves all as it is.
   bool scale(const double* values) {
     matrix_ = Eigen::Map<const Eigen::MatrixXd>(values, size_, size_);
     if (!matrix_.allFinite()) return false;

@@ -133,7 +133,9 @@ TEST(Units, GiveTheSameDigitsOverTheCatalogue) {
     const Scene& scene = *entry.scene;
     if (!entry.needs.empty() || scene.dimension() + scene.rows() > 12) continue;
     if (completed(entry.scene)->lagrangian->structure().y_hessian_zero) continue;
-    ++scenes; std::fprintf(stderr,"%s n=%d m=%d %.2f\n",name.c_str(),scene.dimension(),scene.rows(),std::clock()/1e6);
+    ++scenes;
+    std::fprintf(stderr, "%s n=%d m=%d %.2f\n", name.c_str(), scene.dimension(), scene.rows(),
+                 std::clock() / 1e6);
     std::string doubt;
     const double step = 0.5 * entry.natural_step;
     const Sample in_own = InUnits(entry.scene, step, entry.t_end, {}).end(steps, doubt);

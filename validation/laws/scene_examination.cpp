@@ -62,8 +62,9 @@ Finding examine_rank(const Scene& scene) {
         fmt::format("{}'{}'", &name == dependent.data() ? "; follows from the others: " : ", ", name);
   if (dependent.empty()) return finding;
   const std::string kept_for = why_not_left_out(row_dependence(scene, scene.start, dependent));
-  finding.detail += kept_for.empty() ? "; remove it, or leave it out with --drop-redundant or redundant = \"drop\""
-                                     : "; " + kept_for;
+  finding.detail += kept_for.empty()
+                        ? "; remove it, or leave it out with --drop-redundant or redundant = \"drop\""
+                        : "; " + kept_for;
   return finding;
 }
 

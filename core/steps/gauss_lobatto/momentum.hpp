@@ -44,8 +44,8 @@ class StageMomentum {
 
   /// The largest of ∂L/∂q + f over so many stages, coordinate by coordinate.
   void size_forces(int stages, Vector& forces) const;
-  /// Sizes of the terms that make up ∂L/∂v and ∂L/∂q + f and may cancel there: raised by the second derivatives
-  /// of the first node times positions and velocities.  L's Hessian must have been taken.
+  /// Sizes of the terms that make up ∂L/∂v and ∂L/∂q + f and may cancel there: raised by the second
+  /// derivatives of the first node times positions and velocities.  L's Hessian must have been taken.
   void raise_by_terms(ConstVectorRef q, ConstVectorRef v, double h, Vector& momenta, Vector& forces);
   bool quadratic() const { return lagrangian_->structure().quadratic; }
 

@@ -40,8 +40,8 @@ class StageRows {
 
   /// Size of A(q0).
   double form_size() const;
-  /// Sizes of the terms A(q0) v + b of each row, those of all rows of the scene in `terms`, where coordinate i
-  /// has a velocity of size v[i].
+  /// Sizes of the terms A(q0) v + b of each row, those of all rows of the scene in `terms`, where coordinate
+  /// i has a velocity of size v[i].
   void size_terms(ConstVectorRef v, Vector& terms);
   /// sizes += |A(q0)ᵀλ| of these multipliers, those of all rows of the scene.
   void add_impulse_sizes(ConstVectorRef multipliers, Vector& sizes) const;

@@ -309,7 +309,8 @@ class GaussLobattoStep final : public StepProblem {
     sizes_.force = largest_entry(momentum_.forces().data(), n_);
     sizes_.curvature = largest_entry(momentum_.curvatures().data(), momentum_.curvatures().rows());
     momentum_.size_forces(1, sizes_.forces);
-    momentum_.raise_by_terms(points_.lobatto.col(0), v0, std::abs(step_size()), sizes_.momenta, sizes_.forces);
+    momentum_.raise_by_terms(points_.lobatto.col(0), v0, std::abs(step_size()), sizes_.momenta,
+                             sizes_.forces);
     v0_ = v0;
     evaluated_ = false;
     update_scales();
@@ -347,8 +348,8 @@ class GaussLobattoStep final : public StepProblem {
   double last_impulse_ = 0.0;  ///< size of it with the multipliers of the step before, at this start
   std::optional<StageSplitting> splitting_;  ///< small scenes with rows of one kind
   bool splitting_known_ = false;
-  bool affine_;             ///< the residual is affine in the unknowns
-  bool evaluated_ = false;  ///< at last_x_
+  bool affine_;                   ///< the residual is affine in the unknowns
+  bool evaluated_ = false;        ///< at last_x_
   bool curvature_taken_ = false;  ///< in this step
 };
 

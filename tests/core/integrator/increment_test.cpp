@@ -5,8 +5,8 @@
 #include <diracstep/core/system/phase_function.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
 
-/// Steps on two positions are solved for the increment q1 − q0: its velocity (q1 − q0)/h does not lose 1/h of the
-/// digits of q1.
+/// Steps on two positions are solved for the increment q1 − q0: its velocity (q1 − q0)/h does not lose 1/h of
+/// the digits of q1.
 namespace diracstep {
 namespace {
 

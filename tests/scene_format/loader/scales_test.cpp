@@ -52,13 +52,15 @@ step = 0.1
 TEST(Scales, AStartAtRestInSmallUnitsIsSolved) {
   for (const std::string& method : methods) {
     const Sample unit = end_of(scene_from_text("ion.toml", ion), method, 100, 0.1);
-    const Sample si = end_of(
-        scene_from_text("ion.toml", ion, {{"m", 1.67262192e-27}, {"w", 1e6}, {"a", 1e-6}}), method, 100, 1e-7);
+    const Sample si =
+        end_of(scene_from_text("ion.toml", ion, {{"m", 1.67262192e-27}, {"w", 1e6}, {"a", 1e-6}}), method,
+               100, 1e-7);
     EXPECT_LT(apart(1e6 * si.q, unit.q), 1e-12) << method;
     EXPECT_LT(apart(si.v, unit.v), 1e-12) << method;
   }
-  const Sample end = end_of(scene_from_text("ion.toml", ion, {{"m", 1.67262192e-27}, {"w", 1e6}, {"a", 1e-6}}),
-                            "type1/gl:4", 100, 1e-7);
+  const Sample end =
+      end_of(scene_from_text("ion.toml", ion, {{"m", 1.67262192e-27}, {"w", 1e6}, {"a", 1e-6}}), "type1/gl:4",
+             100, 1e-7);
   EXPECT_NEAR(end.q[0], 1e-6 * std::cos(10.0), 1e-15);
 }
 

@@ -263,8 +263,8 @@ step = 0.1
             RowDependence::at_start_only);
 }
 
-/// Three bars on a line, from the origin to a, from a to b, and from the origin to b: the third one-form depends
-/// on the others at every pose, and without the row the bars would fold.
+/// Three bars on a line, from the origin to a, from a to b, and from the origin to b: the third one-form
+/// depends on the others at every pose, and without the row the bars would fold.
 TEST(RedundantRows, RowsThatTouchAreNeitherLeftOutNorASingularStart) {
   const std::string text = R"toml(
 name = "bars"
@@ -297,7 +297,8 @@ step = 0.1
   EXPECT_EQ(redundant_rows(scene, scene.start).size(), 1u);
   EXPECT_EQ(row_dependence(scene, scene.start, redundant_rows(scene, scene.start)), RowDependence::touching);
   for (const char* drop : {"", "redundant = \"drop\"\n"})
-    EXPECT_NE(refusal(drop + text).find("without them other motions are possible"), std::string::npos) << drop;
+    EXPECT_NE(refusal(drop + text).find("without them other motions are possible"), std::string::npos)
+        << drop;
 }
 
 }  // namespace
