@@ -288,16 +288,18 @@ def call_interruptibly(call: Callable[[], int], stop: c_int,
         done.set()
 
     threading.Thread(target=work, name="diracstep", daemon=True).start()
-    interrupted = False
-    while not outcome:
-        try:
-            if not done.wait(0.1) and watch is not None:
-                watch()
-        except KeyboardInterrupt:
-            stop.value = 1
-            if interrupted:
-                raise
-            interrupted = True
+    try:
+        while not outcome:
+            try:
+                if not done.wait(0.1) and watch is not None:
+                    watch()
+            except KeyboardInterrupt:
+                if stop.value != 0:
+                    raise
+                stop.value = 1
+    except BaseException:
+        stop.value = 1  # the call must not go on by itself
+        raise
     code, message = outcome
     if isinstance(code, BaseException):
         raise code

@@ -15,7 +15,7 @@ from .scene_text import arguments_of, scene_name
 
 def _view(address: int, count: int) -> np.ndarray:
     """The library's column as an array, not copied."""
-    return np.frombuffer((ctypes.c_double * count).from_address(address))
+    return np.frombuffer((ctypes.c_double * count).from_address(address))  # type: ignore[call-overload]
 
 
 class _Called:
@@ -48,7 +48,7 @@ class CallbackScene:
         blocks = [self._block(function, q, k) for k, function in enumerate(
             rows if isinstance(rows, (list, tuple)) else [rows] if rows else [])]
         self.struct.row_blocks = len(blocks)
-        self.struct.rows = self._keep((ctypes.POINTER(c.Rows) * max(1, len(blocks)))(*map(ctypes.pointer, blocks)))
+        self.struct.rows = self._keep((ctypes.POINTER(c.Rows) * max(1, len(blocks)))(*(ctypes.pointer(block) for block in blocks)))
         if force is not None:
             self.struct.force = ctypes.pointer(self._keep(c.Force(value=self._force(force))))
 

@@ -6,9 +6,7 @@ import sys
 import time
 from typing import Any
 
-import numpy as np
-
-from . import _library as c
+from .points import Points
 
 _PATIENCE = 2.0  # seconds until a bar is shown that was not asked for
 
@@ -16,7 +14,7 @@ _PATIENCE = 2.0  # seconds until a bar is shown that was not asked for
 class Progress:
     """Shows what part of a run is done; used as a context."""
 
-    def __init__(self, wanted: bool | None, points: c.Points, room: int, start: float, end: float | None) -> None:
+    def __init__(self, wanted: bool | None, points: Points, room: int, start: float, end: float | None) -> None:
         self._points, self._room, self._start, self._end = points, room, start, end
         self._begun = time.monotonic()
         self._quiet = wanted is False or wanted is None and not sys.stderr.isatty() and "ipykernel" not in sys.modules
@@ -35,11 +33,11 @@ class Progress:
 
     def part(self) -> float | None:
         """Between 0 and 1, or None where it is not known."""
-        count = self._points.count
+        count = self._points.struct.count
         if self._room:
             return min(1.0, count / self._room)
         if count and self._end is not None and self._end != self._start:
-            now = np.ctypeslib.as_array((c.c_double * 1).from_address(self._points.t + 8 * (count - 1)))[0]
+            now = float(self._points.arrays["t"][count - 1])
             return min(1.0, max(0.0, (now - self._start) / (self._end - self._start)))
         return None
 
@@ -57,5 +55,5 @@ class Progress:
         if self._bar is not None:
             self._bar.update(100.0 * (part or 0.0) - self._bar.n)
         else:
-            done = f"{100.0 * part:.0f} %" if part is not None else f"{self._points.count} points"
+            done = f"{100.0 * part:.0f} %" if part is not None else f"{self._points.struct.count} points"
             print(f"\rdiracstep: {done}, {time.monotonic() - self._begun:.0f} s", end="", file=sys.stderr, flush=True)

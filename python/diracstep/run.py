@@ -69,7 +69,7 @@ class Run:
     search: Search | None = None  #: where an error was asked for
     doubt: str = ""  #: empty, or why the points are not to be believed
     interrupted: bool = False  #: whether Ctrl-C ended it
-    _places: dict[str, tuple[np.ndarray, int]] = field(default_factory=dict, compare=False)
+    _places: dict[str, tuple[np.ndarray, int]] = field(default_factory=dict, init=False, compare=False)
 
     def __post_init__(self) -> None:
         scene, places = self.scene, self._places

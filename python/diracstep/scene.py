@@ -161,7 +161,7 @@ class Scene:
         if room > 2**40:
             raise Misuse(f"{room} points would be kept; take a larger every")
         points = self._points(room or _ROOM)
-        with Progress(progress, points.struct, room, self.start_time, end) as bar:
+        with Progress(progress, points, room, self.start_time, end) as bar:
             code, message = c.call_interruptibly(
                 lambda: c.lib.run(integrator._handle, ctypes.byref(course), points.reference()), course.flag,
                 bar.show)
@@ -183,7 +183,7 @@ class Scene:
                 told.append(_search_from(found))
             return code
 
-        with Progress(progress, points.struct, 0, self.start_time, None) as bar:
+        with Progress(progress, points, 0, self.start_time, None) as bar:
             code, message = c.call_interruptibly(call, course.flag, bar.show)
         search = told[0] if told else None
         return self._finished(points, code, message, search=search, doubt=search.warning if search else "")
@@ -193,7 +193,8 @@ class Scene:
 
     def _finished(self, points: Points, code: int, message: str, *, statistics: Statistics | None = None,
                   search: Search | None = None, doubt: str = "") -> Run:
-        run = Run(self, **points.finish(), statistics=statistics, search=search, doubt=doubt, interrupted=code == c.INTERRUPTED)
+        arrays: dict[str, Any] = points.finish()
+        run = Run(self, **arrays, statistics=statistics, search=search, doubt=doubt, interrupted=code == c.INTERRUPTED)
         if points.failure is not None:
             raise points.failure
         if code == c.INTERRUPTED:
@@ -221,8 +222,10 @@ class Scene:
         request = c.Ensemble(members=members, q=starts_q.ctypes.data, v=_address(starts_v), time=_address(times),
                              steps=0 if steps is None else whole(steps, "steps", 1), momentum=momentum_from(momentum),
                              threads=whole(threads, "threads"), stop=ctypes.pointer(flag))
+        request.kept = starts_q, starts_v, times  # the call may go on after a second Ctrl-C has left this function
         chosen = options_from(options, None if steps is not None else self.until if until is None else until)
-        failures, table_of = {}, c.Table()
+        failures: dict[int, str] = {}
+        table_of = c.Table()
 
         def call() -> int:
             code = c.lib.run_ensemble(self._handle, ctypes.byref(chosen), ctypes.byref(request), points.reference(),
