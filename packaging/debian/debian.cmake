@@ -61,11 +61,5 @@ debian_package(command diracstep math "discrete Dirac mechanics, the command"
 set(CPACK_DEBIAN_COMMAND_PACKAGE_RECOMMENDS "gcc, libc6-dev, gnuplot-nox")  # scene files are compiled, studies plotted
 set(CPACK_DEBIAN_COMMAND_PACKAGE_SUGGESTS "libdiracstep-dev")
 
-install(DIRECTORY ${PROJECT_SOURCE_DIR}/examples DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/libdiracstep-dev
-        COMPONENT development)
-set(documents ${CMAKE_INSTALL_DATADIR}/doc/diracstep)
-install(FILES ${PROJECT_SOURCE_DIR}/README.md ${PROJECT_BINARY_DIR}/changelog.gz DESTINATION ${documents}
-        COMPONENT command)
-install(FILES ${PROJECT_SOURCE_DIR}/core/README.md DESTINATION ${documents}/core COMPONENT command)
-install(DIRECTORY ${PROJECT_SOURCE_DIR}/docs ${PROJECT_SOURCE_DIR}/scenes DESTINATION ${documents} COMPONENT command)
+install(FILES ${PROJECT_BINARY_DIR}/changelog.gz DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/diracstep COMPONENT command)
 include(CPack)
