@@ -1,4 +1,5 @@
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/numerics/near_names.hpp>
 #include <diracstep/core/system/redundant_rows.hpp>
 #include <diracstep/scene_format/loader/shipped_scenes.hpp>
 #include <diracstep/scene_format/scene_catalogue.hpp>
@@ -32,8 +33,8 @@ CatalogueScene make_scene(const std::string& name, const Parameters& changes) {
                              changes);
     known += std::string(" ") + scene.name;
   }
-  throw Misuse("unknown scene '" + name + "'; the scenes are" + known +
-               "; or give the path of a file NAME.toml");
+  throw Misuse("unknown scene '" + name + "'" + did_you_mean(name, scene_names()) + "; the scenes are" +
+               known + "; or give the path of a file NAME.toml");
 }
 
 }  // namespace diracstep
