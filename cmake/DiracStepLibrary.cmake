@@ -20,7 +20,8 @@ endfunction()
 # ./dev tidy shows it.
 set(diracstep_headers_library <Eigen/Core> <algorithm> <array> <cmath> <functional> <limits> <map> <memory> <optional>
   <span> <sstream> <string> <utility> <vector>)
-set(diracstep_headers_command ${diracstep_headers_library} <CLI/CLI.hpp> <fmt/format.h> <nlohmann/json.hpp>)
+set(diracstep_headers_command ${diracstep_headers_library} <CLI/App.hpp> <CLI/Config.hpp> <CLI/Formatter.hpp>
+  <fmt/format.h>)
 set(diracstep_headers_test ${diracstep_headers_library} <gtest/gtest.h>)
 
 # diracstep_precompile(<target> <kind> [<libraries>...]); the libraries are those of the kind's headers.

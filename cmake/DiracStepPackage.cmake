@@ -58,3 +58,17 @@ endif()
 if(DIRACSTEP_BUILD_C_INTERFACE)
   pkg_config_file(libdiracstep "DiracStep for C and languages that can call C" LIBS diracstep)
 endif()
+
+# What explains it: pages and scenes with the command, examples with the headers.  A package may have folders of its own.
+set(DIRACSTEP_EXAMPLES_DIR ${CMAKE_INSTALL_DATADIR}/doc/diracstep CACHE STRING "Where the folder examples/ is installed")
+mark_as_advanced(DIRACSTEP_EXAMPLES_DIR)
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/examples DESTINATION ${DIRACSTEP_EXAMPLES_DIR} COMPONENT development
+        PATTERN notebooks EXCLUDE)
+set(documents ${CMAKE_INSTALL_DATADIR}/doc/diracstep)
+install(FILES ${PROJECT_SOURCE_DIR}/README.md DESTINATION ${documents} COMPONENT command)
+if(NOT DIRACSTEP_DEBIAN_PACKAGES)  # they have a file copyright
+  install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${documents} COMPONENT command)
+endif()
+install(FILES ${PROJECT_SOURCE_DIR}/core/README.md DESTINATION ${documents}/core COMPONENT command)
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/docs ${PROJECT_SOURCE_DIR}/scenes DESTINATION ${documents} COMPONENT command
+        PATTERN site EXCLUDE)

@@ -5,11 +5,14 @@
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
+#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <diracstep/command/command_line.hpp>
 #include <diracstep/command/verbs.hpp>
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/numerics/near_names.hpp>
+#include <memory>
 #include <new>
 #include <string_view>
 
@@ -30,13 +33,54 @@ std::string allowed(const CLI::App& app) {
   return fmt::format("the arguments of {0} are{1}; diracstep {0} --help tells more", verb, list);
 }
 
+std::vector<std::string> verb_names(const CLI::App& app) {
+  std::vector<std::string> names;
+  for (const auto* verb : app.get_subcommands({})) names.push_back(verb->get_name());
+  return names;
+}
+
+/// The first word of the command line that nothing takes, with what may have been meant; or CLI11's message.
+std::string complaint(const CLI::App& app, const CLI::ParseError& error) {
+  const auto verbs = app.get_subcommands();
+  if (verbs.empty() && app.remaining_size() > 0) {
+    const std::string word = app.remaining().front();
+    return fmt::format("unknown verb '{}'{}", word, did_you_mean(word, verb_names(app)));
+  }
+  if (verbs.empty()) return error.what();
+  const auto rest = verbs.front()->remaining();
+  const auto option =
+      std::ranges::find_if(rest, [](const std::string& word) { return word.starts_with("-"); });
+  if (option == rest.end()) return error.what();
+  std::vector<std::string> known;
+  for (const auto* each : verbs.front()->get_options())
+    for (const std::string& name : each->get_lnames()) known.push_back("--" + name);
+  const std::string word = option->substr(0, option->find('='));
+  return fmt::format("unknown option '{}'{}", word, did_you_mean(word, known));
+}
+
 int tell(const CLI::App& app, const CLI::ParseError& error) {
   if (error.get_exit_code() == static_cast<int>(CLI::ExitCodes::Success)) return app.exit(error);
-  const bool unknown_verb = app.get_subcommands().empty() && app.remaining_size() > 0;
-  const std::string what =
-      unknown_verb ? fmt::format("unknown verb '{}'", app.remaining().front()) : error.what();
-  say(fmt::format("{}; {}", what, allowed(app)));
+  say(fmt::format("{}; {}", complaint(app, error), allowed(app)));
   return misused;
+}
+
+/// "diracstep help" and "diracstep help VERB", the same as --help.
+void add_help(CLI::App& app) {
+  CLI::App* verb = app.add_subcommand("help", "What a verb does and its options; the verbs without one");
+  const auto about = std::make_shared<std::string>();
+  verb->add_option("VERB", *about, "run, study, …");
+  verb->footer("Example:  diracstep help run");
+  verb->callback([&app, about] {
+    const std::vector<std::string> names = verb_names(app);
+    if (about->empty()) {
+      print(app.get_formatter()->make_help(&app, app.get_name(), CLI::AppFormatMode::Normal));
+    } else if (std::ranges::find(names, *about) == names.end()) {
+      throw Misuse(fmt::format("unknown verb '{}'{}; the verbs are {}", *about, did_you_mean(*about, names),
+                               fmt::join(names, " ")));
+    } else {
+      print(app.get_subcommand(*about)->help("diracstep"));
+    }
+  });
 }
 
 /// --plugin before or after every verb; the plugins are there when the verb runs, if it does.
@@ -112,6 +156,7 @@ int with_all_verbs(int count, char** arguments, bool run_verbs) {
       "  diracstep study knife_edge --orders 2,4,8 --out results\n"
       "Exit status: 0 done, 1 numerical failure or interrupt, 2 misuse, 3 a result that is doubted.");
   Session session;
+  add_help(app);
   add_check(app, session);
   add_list(app, session);
   add_new(app, session);

@@ -53,7 +53,7 @@ class Run {
     if (!last.ok())
       result_.failure = last.failure;
     else if (result_.failure.empty() && integrator_.work().steps < steps_)
-      result_.failure = fmt::format("{} at t = {:.17g}", interruption(), integrator_.time());
+      result_.failure = fmt::format("{} at t = {:.10g}", interruption(), integrator_.time());
     if (integrator_.time() != kept_time_) keep();
     result_.work = integrator_.work();
     result_.doubt = doubt_.text();

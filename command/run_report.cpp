@@ -2,23 +2,21 @@
 
 #include <cmath>
 #include <diracstep/command/run_report.hpp>
+#include <diracstep/files/json.hpp>
 #include <diracstep/reports/report.hpp>
 #include <diracstep/validation/studies/convergence_study.hpp>
-#include <nlohmann/json.hpp>
 #include <utility>
 
 namespace diracstep::command {
 
 namespace {
 
-using Json = nlohmann::ordered_json;
-
 Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
 Json by_name(const std::vector<std::string>& names, const Vector& values) {
   Json json = Json::object();
   for (std::size_t i = 0; i < names.size(); ++i)
-    json[names[i]] = number(values[static_cast<Eigen::Index>(i)]);
+    json.add(names[i], number(values[static_cast<Eigen::Index>(i)]));
   return json;
 }
 
@@ -182,7 +180,7 @@ std::string run_text(const RunResult& result, const CatalogueScene& entry, const
                   name(result.momentum));
   if (result.variable) text += summary(*result.variable);
   if (result.has_end()) {
-    text += fmt::format("\nt = {:.15g}\n{}energy: {:.15g}, changed by {:.2e}\n", result.end.time,
+    text += fmt::format("\nt = {:.10g}\n{}energy: {:.15g}, changed by {:.2e}\n", result.end.time,
                         end_table(result.end, *entry.scene), result.end.energy, energy_change(result, entry));
     text += invariants_text(result);
     if (std::isfinite(result.check.error_q))
@@ -224,7 +222,7 @@ std::string run_json(const RunResult& result, const CatalogueScene& entry, const
   json["points"] = result.lines;
   if (result.variable) json["adaptive"] = variable_json(*result.variable);
   if (result.search) json["error_control"] = search_json(*result.search);
-  return json.dump(2, ' ', false, Json::error_handler_t::replace) + '\n';
+  return json.dump(2) + '\n';
 }
 
 }  // namespace diracstep::command

@@ -1,4 +1,6 @@
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <CLI/App.hpp>
 #include <cerrno>
@@ -83,6 +85,11 @@ void say(std::string_view message) {
 void print(std::string_view given) {
   const std::string text = shown_lines(given);
   if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size()) refuse_output();
+}
+
+bool output_is_open() {  // prepare_standard_streams() opens a closed one for reading
+  const int flags = ::fcntl(STDOUT_FILENO, F_GETFL);  // NOLINT
+  return flags >= 0 && (flags & O_ACCMODE) != O_RDONLY;
 }
 
 void finish_output() {

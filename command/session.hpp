@@ -75,6 +75,7 @@ void say(std::string_view message);
 /// Text for standard output, and the end of it.  Both throw Error where it cannot be written.
 /// Here and in messages control characters are shown escaped: see shown_lines.
 void print(std::string_view text);
+bool output_is_open();  ///< false where standard output was closed when the command began
 void finish_output();
 
 }  // namespace diracstep::command

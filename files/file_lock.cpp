@@ -8,6 +8,7 @@
 #include <cstring>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/files/file_lock.hpp>
+#include <diracstep/files/paths.hpp>
 #include <filesystem>
 
 namespace diracstep {
@@ -30,7 +31,7 @@ bool take_lock(int descriptor) {
   return true;
 }
 
-FileLock::FileLock(const std::string& path) : name_(path + ".lock") {
+FileLock::FileLock(const std::string& path) : name_(behind_links(path) + ".lock") {
   std::error_code none;
   const auto status = std::filesystem::status(path, none);
   if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status)) return;

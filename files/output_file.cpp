@@ -9,6 +9,7 @@
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/files/file_lock.hpp>
 #include <diracstep/files/output_file.hpp>
+#include <diracstep/files/paths.hpp>
 #include <filesystem>
 #include <utility>
 
@@ -47,9 +48,19 @@ OutputFile::OutputFile(const std::string& path, Mode mode) : path_(path) {
   if (mode == Mode::existing) ::lseek(descriptor_, 0, SEEK_END);
 }
 
+OutputFile OutputFile::on_standard_output() {
+  OutputFile file;
+  file.path_ = "standard output";
+  file.shared_ = true;
+  file.descriptor_ = ::fcntl(STDOUT_FILENO, F_DUPFD_CLOEXEC, 0);  // NOLINT
+  if (file.descriptor_ < 0) throw Misuse(fmt::format("standard output is closed: {}", std::strerror(errno)));
+  return file;
+}
+
 OutputFile::OutputFile(OutputFile&& other) noexcept
     : path_(std::move(other.path_)),
       descriptor_(std::exchange(other.descriptor_, -1)),
+      shared_(other.shared_),
       name_is_new_(other.name_is_new_) {}
 
 OutputFile::~OutputFile() {
@@ -57,7 +68,7 @@ OutputFile::~OutputFile() {
 }
 
 void OutputFile::write(std::string_view bytes) {
-  const off_t begin = ::lseek(descriptor_, 0, SEEK_CUR);  // -1 for a pipe
+  const off_t begin = shared_ ? -1 : ::lseek(descriptor_, 0, SEEK_CUR);  // -1 for a pipe as well
   while (!bytes.empty()) {
     const ssize_t written = ::write(descriptor_, bytes.data(), bytes.size());
     if (written < 0 && errno == EINTR) continue;
@@ -180,8 +191,7 @@ void replace_file(const std::string& given, std::string_view bytes) {
   std::error_code none;
   const fs::file_status status = fs::status(given, none);
   if (fs::exists(status) && !fs::is_regular_file(status)) return write_to_device(given, bytes);
-  const bool link = fs::is_symlink(given, none) && fs::exists(status);
-  Replacement(link ? fs::canonical(given, none).string() : given).become(bytes);
+  Replacement(behind_links(given)).become(bytes);
 }
 
 }  // namespace diracstep

@@ -17,6 +17,8 @@ class OutputFile {
   /// Throws Misuse, naming the path and the reason, where the file cannot be opened, where another run writes
   /// it, and for a pipe that nobody reads.
   OutputFile(const std::string& path, Mode mode);
+  /// Standard output, from where it stands; throws Misuse where it is closed.
+  static OutputFile on_standard_output();
   OutputFile(const OutputFile&) = delete;
   OutputFile& operator=(const OutputFile&) = delete;
   OutputFile(OutputFile&& other) noexcept;
@@ -35,10 +37,12 @@ class OutputFile {
   std::string beginning(long count) const;
 
  private:
+  OutputFile() = default;
   [[noreturn]] void refuse(const char* what) const;
 
   std::string path_;
   int descriptor_ = -1;
+  bool shared_ = false;       ///< others write it as well, so it is never cut
   bool name_is_new_ = false;  ///< its folder has not been synchronised since it was opened
 };
 

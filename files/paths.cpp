@@ -26,16 +26,6 @@ bool same_inode(const std::string& a, const std::string& b) {
          first.st_ino == second.st_ino;
 }
 
-/// A link that leads nowhere yet names the file that will be made.
-std::string behind_links(std::string path) {
-  std::error_code none;
-  for (int links = 0; links < 40 && fs::is_symlink(path, none); ++links) {
-    const fs::path target = fs::read_symlink(path, none);
-    path = target.is_absolute() ? target.string() : (fs::path(folder_of(path)) / target).string();
-  }
-  return path;
-}
-
 void require_writable(const NamedPath& output) {
   const auto refuse = [&](int error) {
     throw Misuse(
@@ -46,14 +36,21 @@ void require_writable(const NamedPath& output) {
   if (::stat(path.c_str(), &status) == 0) {
     if (S_ISDIR(status.st_mode)) refuse(EISDIR);
     if (::access(path.c_str(), W_OK) != 0) refuse(errno);
-  } else if (errno != ENOENT) {
-    refuse(errno);
-  } else if (::access(folder_of(path).c_str(), W_OK | X_OK) != 0) {
-    refuse(errno);
+    return;
   }
+  if (errno != ENOENT || ::access(folder_of(path).c_str(), W_OK | X_OK) != 0) refuse(errno);
 }
 
 }  // namespace
+
+std::string behind_links(std::string path) {
+  std::error_code none;
+  for (int links = 0; links < 40 && fs::is_symlink(path, none); ++links) {
+    const fs::path target = fs::read_symlink(path, none);
+    path = target.is_absolute() ? target.string() : (fs::path(folder_of(path)) / target).string();
+  }
+  return path;
+}
 
 bool same_file(const std::string& a, const std::string& b) {
   std::error_code none;

@@ -11,6 +11,9 @@ struct NamedPath {
   std::string path;
 };
 
+/// The path that a chain of links ends at; one that leads nowhere yet names the file that will be made.
+std::string behind_links(std::string path);
+
 /// Whether both name one file: the same inode where both exist, else the same name in the same folder,
 /// whatever the spelling.  Devices and pipes are never the same: they are written to, not replaced.
 bool same_file(const std::string& a, const std::string& b);

@@ -9,7 +9,7 @@ _diracstep() {
   done
   COMPREPLY=()
   case "$prev" in
-    --method | --methods) words="$(diracstep list methods 2>/dev/null | awk 'NR > 1 { print $1 }')" ;;
+    --method | --methods) words="$(diracstep list methods 2>/dev/null | awk '/^$/ { exit } NR > 1 && /^[^ ]/ { print $1 }')" ;;
     --momentum) words="plus minus projected" ;;
     --jacobian) words="automatic fresh per-step kept" ;;
     --solver) words="newton fixed-point automatic" ;;
@@ -21,7 +21,7 @@ _diracstep() {
         *,list) words="scenes methods plugins" ;;
         *,check | *,plan | *,run | *,study)
           compopt -o default 2>/dev/null # and scene files
-          words="$(diracstep list scenes 2>/dev/null | awk 'NR > 1 { print $1 }')"
+          words="$(diracstep list scenes 2>/dev/null | awk '/^$/ { exit } NR > 1 && /^[^ ]/ { print $1 }')"
           ;;
       esac
       ;;

@@ -65,24 +65,25 @@ class CallbackLagrangian final : public Lagrangian {
         return f_.hessian(f_.data, t, x.data(), y.data(), fxx.data(), fxy.data(), fyy.data());
       });
     Vector other(dimension());
+    const Noise noise = noise_at(t, x, y);
     differences_.evaluate([&](ConstVectorRef q, VectorRef fx) { gradient_noted(t, q, y, fx, other, false); },
-                          x, fxx, origin_.q);
+                          x, fxx, origin_.q, nullptr, noise.x);
     differences_.evaluate([&](ConstVectorRef v, VectorRef fx) { gradient_noted(t, x, v, fx, other, false); },
-                          y, fxy, origin_.v);
+                          y, fxy, origin_.v, nullptr, noise.x);
     differences_.evaluate([&](ConstVectorRef v, VectorRef fy) { gradient_noted(t, x, v, other, fy, false); },
-                          y, fyy, origin_.v);
+                          y, fyy, origin_.v, nullptr, noise.y);
   }
 
   void gradient_rate(double t, ConstVectorRef x, ConstVectorRef y, VectorRef fyt) const override {
     Vector fx(dimension());
     rate_by_differences([&](double s, VectorRef fy) { gradient_noted(s, x, y, fx, fy, false); }, t, fyt,
-                        origin_.time_scale);
+                        origin_.time_scale, noise_at(t, x, y).y);
   }
 
   void position_gradient_rate(double t, ConstVectorRef x, ConstVectorRef y, VectorRef fxt) const override {
     Vector fy(dimension());
     rate_by_differences([&](double s, VectorRef fx) { gradient_noted(s, x, y, fx, fy, false); }, t, fxt,
-                        origin_.time_scale);
+                        origin_.time_scale, noise_at(t, x, y).x);
   }
 
  private:
@@ -102,6 +103,21 @@ class CallbackLagrangian final : public Lagrangian {
     if (quality == nullptr || speed_quality == nullptr) return;
     quality->note_size(fy.dot(y));
     speed_quality->note_size(quality->largest_energy());
+  }
+
+  /// What differences of L lose of the gradient; empty where callbacks give it.
+  struct Noise {
+    Vector x, y;
+  };
+  Noise noise_at(double t, ConstVectorRef x, ConstVectorRef y) const {
+    Noise noise;
+    if (f_.gradient != nullptr) return noise;
+    Vector g(dimension());
+    gradient_by_differences([&](ConstVectorRef shifted) { return value(t, shifted, y); }, x, g, origin_.q,
+                            nullptr, &noise.x);
+    gradient_by_differences([&](ConstVectorRef shifted) { return value(t, x, shifted); }, y, g, origin_.v,
+                            nullptr, &noise.y);
+    return noise;
   }
 
   diracstep_function f_;

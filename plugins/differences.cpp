@@ -12,14 +12,14 @@ namespace diracstep {
 namespace {
 
 constexpr double agreement = 1e-7;   // of both formulas, relative
-constexpr double resolution = 2e-6;  // relative, of both parts of f: about what δ of 2e-3 of a scale leaves
+constexpr double resolution = 2e-5;  // relative, of both parts of f; δ of 2e-3 of a scale leaves about 2e-6
 constexpr double round_off = 4.0 * std::numeric_limits<double>::epsilon();
 constexpr double divisor = 16.0;  // of the increment where they do not agree
 constexpr int most_divisions = 8;
 constexpr double scale_over_increment = 512.0;
-constexpr double known_to = 1e-5;         // relative error of derivatives from which they are doubted
-constexpr int most_rungs = 12;            // from a guess of a scale
-constexpr double slope_known_to = 1e-10;  // relative, from where a straight line asks for no larger scale
+constexpr double known_to = 1e-5;     // relative error of derivatives from which they are doubted
+constexpr int most_rungs = 12;        // from a guess of a scale
+constexpr double worth_a_rung = 0.5;  // of the error: less is gained at this point alone
 
 /// The increment for a variable of this scale: a power of two, so that x + kδ is exact for most x.
 double increment(double scale) { return std::exp2(std::ceil(std::log2(scale))) / scale_over_increment; }
@@ -36,10 +36,20 @@ struct Sums {
   Vector sixth, fourth;    ///< (45 Δ₁ − 9 Δ₂ + Δ₃)/60 and (8 Δ₁ − Δ₂)/12
   Vector bend, bend_near;  ///< about δ² f'', from Δ₁ and Δ₃ and from Δ₁ and Δ₂
   Vector largest;          ///< |f|
+  Vector noise;            ///< round-off of f beyond that of its size
 
-  explicit Sums(Eigen::Index rows) : sixth(rows), fourth(rows), bend(rows), bend_near(rows), largest(rows) {}
+  explicit Sums(Eigen::Index rows)
+      : sixth(rows), fourth(rows), bend(rows), bend_near(rows), largest(rows), noise(rows) {}
 
   double disagreement(Eigen::Index r) const { return std::abs(sixth[r] - fourth[r]); }
+  double loss(Eigen::Index r) const { return round_off * largest[r] + noise[r]; }
+  /// The difference, 0 where it is no more than what f loses by itself.
+  double change(Eigen::Index r) const { return std::abs(sixth[r]) <= noise[r] ? 0.0 : sixth[r]; }
+  /// The size of the terms of f, which may cancel at x: what f is a scale away.
+  double terms(Eigen::Index r, double factor) const {
+    const double per_scale = scale_over_increment / factor;
+    return std::max({largest[r], std::abs(sixth[r]) * per_scale, std::abs(bend[r]) * per_scale * per_scale});
+  }
   /// The size of f' that a disagreement is measured by: near a zero of f', what it is a scale away.
   double size(Eigen::Index r, double factor) const {
     return std::max(std::abs(sixth[r]), std::abs(bend[r]) * scale_over_increment / factor);
@@ -48,7 +58,7 @@ struct Sums {
   double misfit(double factor) const {
     double largest_part = 0.0;
     for (Eigen::Index r = 0; r < sixth.size(); ++r) {
-      const double beyond = disagreement(r) - 8.0 * round_off * largest[r];
+      const double beyond = disagreement(r) - 8.0 * loss(r);
       if (beyond <= 0.0) continue;
       const double part = beyond / size(r, factor);
       largest_part = std::isfinite(part) ? std::max(largest_part, part) : HUGE_VAL;
@@ -58,19 +68,7 @@ struct Sums {
   /// Whether f is a smooth function of some δ, as far as its odd and its even part show.
   bool resolved(Eigen::Index r) const {
     const double apart = disagreement(r) + std::abs(bend[r] - bend_near[r]);
-    return apart <= resolution * (std::abs(sixth[r]) + std::abs(bend[r])) + 8.0 * round_off * largest[r];
-  }
-  /// Whether f shows no curvature over some δ, so that it says nothing of how far it goes on like this.
-  bool straight(Eigen::Index r) const { return std::abs(bend[r]) <= 8.0 * round_off * largest[r]; }
-  /// Whether a larger δ is worth while: not for a constant, and for a straight line only to know its slope.
-  bool asks_for_more(Eigen::Index r) const {
-    return !straight(r) || round_off * largest[r] > slope_known_to * std::abs(sixth[r]);
-  }
-  /// Whether a smaller δ is worth while: not where round-off is all that both formulas differ by.  A smaller
-  /// one has less only where f is near zero at x by chance.
-  bool asks_for_less(Eigen::Index r) const { return disagreement(r) > 8.0 * round_off * largest[r]; }
-  bool constant(Eigen::Index r) const {
-    return straight(r) && std::abs(sixth[r]) <= 8.0 * round_off * largest[r];
+    return apart <= resolution * (std::abs(sixth[r]) + std::abs(bend[r])) + 8.0 * loss(r);
   }
   bool agree(double factor) const { return misfit(factor) <= agreement; }
 };
@@ -88,11 +86,18 @@ struct Workspace {
   bool taken = false;
 };
 
-/// A workspace of the thread, lent as long as this lives: differences of differences take two, and after the
-/// first ones of a size none allocates any more.
+/// A workspace of the thread, for functions with this noise or with none, lent as long as this lives:
+/// differences of differences take two, and after the first ones of a size none allocates any more.
 class Lent {
  public:
-  Lent(Eigen::Index n, Eigen::Index rows) : work_(free_one(n, rows)) { work_.taken = true; }
+  Lent(Eigen::Index n, Eigen::Index rows, const Vector& noise = {}) : work_(free_one(n, rows)) {
+    work_.taken = true;
+    for (Sums* sums : {&work_.sums, &work_.next})
+      if (noise.size() > 0)
+        sums->noise = noise;
+      else
+        sums->noise.setZero();
+  }
   Lent(const Lent&) = delete;
   Lent& operator=(const Lent&) = delete;
   ~Lent() { work_.taken = false; }
@@ -209,6 +214,8 @@ DifferenceScales find_scales(const std::function<double(ConstVectorRef)>& f, Con
   Vector& shifted = work->shifted = x;
   Sums& sums = work->sums;
   for (Eigen::Index i = 0; i < x.size(); ++i) {
+    double terms = 0.0;    // of f, the largest that a scale has shown so far
+    bool changes = false;  // f with this variable: else it says nothing of its scale
     const auto error = [&](double scale) {
       const double delta = increment(scale);
       const auto at = [&](double k, VectorRef out) {
@@ -217,8 +224,10 @@ DifferenceScales find_scales(const std::function<double(ConstVectorRef)>& f, Con
       };
       take(at, 1.0, work->ahead, work->behind, sums);
       shifted[i] = x[i];
+      changes = changes || std::max(std::abs(sums.sixth[0]), std::abs(sums.bend[0])) > 8.0 * sums.loss(0);
       if (!sums.resolved(0)) return HUGE_VAL;
-      const double sum = (sums.disagreement(0) + round_off * sums.largest[0]) / delta;
+      terms = std::max(terms, sums.terms(0, 1.0));
+      const double sum = (sums.disagreement(0) + round_off * terms) / delta;
       return std::isfinite(sum) ? sum : HUGE_VAL;
     };
     double best = error(scales[i]);
@@ -228,30 +237,27 @@ DifferenceScales find_scales(const std::function<double(ConstVectorRef)>& f, Con
       if (best < HUGE_VAL) scales[i] = smaller;
     }
     if (best == HUGE_VAL) continue;
-    (void)error(scales[i]);  // for the sums, which tell what f looks like there; so below
-    double further = scales[i];
-    for (int rung = 0; rung < most_rungs && sums.constant(0); ++rung) best = error(further *= divisor);
-    if (sums.constant(0) || best == HUGE_VAL) continue;
-    scales[i] = further;
+    const double terms_at_first = terms;
     for (const double factor : {divisor, 1.0 / divisor}) {
-      (void)error(scales[i]);
+      terms = terms_at_first;
       for (int rung = 0; rung < most_rungs; ++rung) {
-        if (factor > 1.0 ? !sums.asks_for_more(0) : !sums.asks_for_less(0)) break;
         const double next = error(scales[i] * factor);
-        if (!(next < 0.5 * best)) break;
+        if (!(next < worth_a_rung * best)) break;
         best = next;
         scales[i] *= factor;
       }
     }
+    if (!changes) scales[i] = guesses[i];
   }
   return scales;
 }
 
 void gradient_by_differences(const std::function<double(ConstVectorRef)>& f, ConstVectorRef x, VectorRef g,
-                             const DifferenceScales& scales, DifferenceQuality* quality) {
+                             const DifferenceScales& scales, DifferenceQuality* quality, Vector* noise) {
   Lent work(x.size(), 1);
   Vector& shifted = work->shifted = x;
   const Sums& sums = work->sums;
+  if (noise != nullptr) noise->resize(x.size());
   for (Eigen::Index i = 0; i < x.size(); ++i) {
     const double scale = scale_at(scales, i, x[i]), delta = increment(scale);
     const auto at = [&](double k, VectorRef out) {
@@ -261,8 +267,9 @@ void gradient_by_differences(const std::function<double(ConstVectorRef)>& f, Con
     const double factor = take_checked(at, *work);
     shifted[i] = x[i];
     g[i] = sums.sixth[0] / (factor * delta);
+    if (noise != nullptr) (*noise)[i] = round_off * sums.terms(0, factor) / (factor * delta);
     if (quality == nullptr) continue;
-    const double wrong = sums.agree(factor) ? round_off * sums.largest[0] : sums.disagreement(0);
+    const double wrong = sums.agree(factor) ? sums.loss(0) : sums.disagreement(0);
     const double per_scale = scale_over_increment / factor;
     quality->note_size(sums.bend[0] * per_scale * per_scale);  // near a zero of f', what it is a scale away
     quality->note_energy(g[i] * scale, wrong / (factor * delta) * scale);
@@ -270,12 +277,13 @@ void gradient_by_differences(const std::function<double(ConstVectorRef)>& f, Con
 }
 
 void rate_by_differences(const std::function<void(double, VectorRef)>& f, double t, VectorRef rate,
-                         double scale) {
-  Lent work(1, rate.size());
+                         double scale, const Vector& noise) {
+  Lent work(1, rate.size(), noise);
+  const Sums& sums = work->sums;
   const double delta = increment(std::max(scale, std::ldexp(std::abs(t), -20)));
   const auto at = [&](double k, VectorRef out) { f(t + k * delta, out); };
   const double factor = take_checked(at, *work);
-  rate = work->sums.sixth / (factor * delta);
+  for (Eigen::Index r = 0; r < rate.size(); ++r) rate[r] = sums.change(r) / (factor * delta);
 }
 
 JacobianByDifferences::JacobianByDifferences(SparsityPattern pattern) : pattern_(std::move(pattern)) {
@@ -295,8 +303,8 @@ JacobianByDifferences::JacobianByDifferences(SparsityPattern pattern) : pattern_
 
 void JacobianByDifferences::evaluate(const std::function<void(ConstVectorRef, VectorRef)>& f,
                                      ConstVectorRef x, VectorRef values, const DifferenceScales& scales,
-                                     DifferenceQuality* quality) const {
-  Lent work(x.size(), pattern_.rows());
+                                     DifferenceQuality* quality, const Vector& noise) const {
+  Lent work(x.size(), pattern_.rows(), noise);
   Vector &shifted = work->shifted = x, &deltas = work->deltas;
   const Sums& sums = work->sums;
   for (Eigen::Index i = 0; i < x.size(); ++i) deltas[i] = increment(scale_at(scales, i, x[i]));
@@ -311,7 +319,7 @@ void JacobianByDifferences::evaluate(const std::function<void(ConstVectorRef, Ve
       const int begin = pattern_.column_starts()[static_cast<std::size_t>(column)];
       const auto rows = rows_of(pattern_, column);
       for (std::size_t r = 0; r < rows.size(); ++r)
-        values[begin + static_cast<Eigen::Index>(r)] = sums.sixth[rows[r]] / (factor * deltas[column]);
+        values[begin + static_cast<Eigen::Index>(r)] = sums.change(rows[r]) / (factor * deltas[column]);
     }
     if (quality == nullptr || sums.agree(factor)) continue;
     for (Eigen::Index r = 0; r < sums.sixth.size(); ++r)

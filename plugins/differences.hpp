@@ -39,19 +39,19 @@ using DifferenceScales = Vector;
 
 /// Scales at a point, from guesses that may be off by far: of those at which f is resolved, so that both
 /// formulas agree for its odd part and two formulas for its even part, the one with the smallest error of
-/// ∂f/∂x_i.  Where f is resolved by none, or does not change with x_i, the guess stays; where f is a straight
-/// line, scales grow only until its slope is known: how far it stays one is not; where it is a polynomial, they
-/// do not become smaller.
+/// ∂f/∂x_i.  Where f is resolved by none, or does not change with x_i, the guess stays.
 DifferenceScales find_scales(const std::function<double(ConstVectorRef)>& f, ConstVectorRef x,
                              const Vector& guesses);
 
-/// g_i = ∂f/∂x_i of a scalar function.  Without scales each is max(1, |x_i|).
+/// g_i = ∂f/∂x_i of a scalar function.  Without scales each is max(1, |x_i|).  `noise` receives what each g_i
+/// may lose by the round-off of f, whose terms may cancel at x: differences of g are judged by that.
 void gradient_by_differences(const std::function<double(ConstVectorRef)>& f, ConstVectorRef x, VectorRef g,
-                             const DifferenceScales& scales = {}, DifferenceQuality* quality = nullptr);
+                             const DifferenceScales& scales = {}, DifferenceQuality* quality = nullptr,
+                             Vector* noise = nullptr);
 
-/// df/dt of a column f(t, out).
+/// df/dt of a column f(t, out).  Of a row that is itself known to `noise` only, a smaller difference is 0.
 void rate_by_differences(const std::function<void(double, VectorRef)>& f, double t, VectorRef rate,
-                         double scale = 1.0);
+                         double scale = 1.0, const Vector& noise = {});
 
 /// ∂f/∂x of columns on a known pattern.  Columns of the pattern that share no row are differenced together
 /// (Curtis, Powell, Reid 1974), so a sparse derivative takes few evaluations.
@@ -62,9 +62,11 @@ class JacobianByDifferences {
   const SparsityPattern& pattern() const { return pattern_; }
   std::size_t groups() const { return groups_.size(); }
 
-  /// values = ∂f/∂x on pattern(); `f(x, out)` writes pattern().rows() numbers.
+  /// values = ∂f/∂x on pattern(); `f(x, out)` writes pattern().rows() numbers, known to `noise` where that is
+  /// more than their round-off: a smaller difference of them is 0.
   void evaluate(const std::function<void(ConstVectorRef, VectorRef)>& f, ConstVectorRef x, VectorRef values,
-                const DifferenceScales& scales = {}, DifferenceQuality* quality = nullptr) const;
+                const DifferenceScales& scales = {}, DifferenceQuality* quality = nullptr,
+                const Vector& noise = {}) const;
 
  private:
   SparsityPattern pattern_;

@@ -14,13 +14,18 @@ namespace diracstep {
 namespace {
 
 constexpr double shown_error = 1e-6;
-constexpr long max_numbers = 60'000;  // positions kept of a run, give or take half
-constexpr long finer_track = 4;       // points of a motion to those of the other curves
+constexpr long fewest_steps = 50;
+constexpr long max_numbers = 30'000;  // positions kept of a run, give or take half
+constexpr long finer_track = 12;      // points of a motion to those of the other curves
 constexpr long fewest_points = 50;    // … and the points kept of the largest scene
 
-/// Better: below the shown error, and there the least work; else the smaller error.
+/// Better: below the shown error with enough steps for a curve, and there the least work; else the smaller
+/// error.
 bool better(const StudyRow& a, const StudyRow& b) {
-  const bool a_exact = a.error() <= shown_error, b_exact = b.error() <= shown_error;
+  const auto exact = [](const StudyRow& row) {
+    return row.error() <= shown_error && row.steps >= fewest_steps;
+  };
+  const bool a_exact = exact(a), b_exact = exact(b);
   if (a_exact != b_exact) return a_exact;
   return a_exact ? a.cpu_seconds.median < b.cpu_seconds.median : a.error() < b.error();
 }
@@ -148,7 +153,7 @@ void record_track(History& history, const Study& study, const StudyRow& row, lon
   const auto drawn = static_cast<long>(coordinates.size());
   const long kept =
       std::clamp(max_numbers / std::max(drawn, 1L), std::min(fewest_points, points), finer_track * points);
-  const StepGrid grid = grid_of(study, std::max(row.steps, kept / 2));
+  const StepGrid grid = grid_of(study, std::max(row.steps, kept));
   Integrator integrator = integrator_of(grid.step);
   const RunReport report = run_steps(integrator, grid.steps, study.momentum, std::max(1L, grid.steps / kept),
                                      [&](const Sample& sample) {

@@ -1,15 +1,20 @@
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <spawn.h>
 #include <sys/wait.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <csignal>
-#include <cstdio>
-#include <cstdlib>
+#include <cstring>
 #include <diracstep/files/shown_text.hpp>
 #include <diracstep/reports/plot.hpp>
 #include <filesystem>
+#include <string_view>
 #include <system_error>
+#include <utility>
 
 namespace diracstep {
 
@@ -51,14 +56,74 @@ class PipeSignalBlocked {
   sigset_t pipe_, before_;
 };
 
+/// A pipe to a gnuplot in a process group of its own, which an interrupt from the terminal does not reach,
+/// and whose messages nobody sees: what failed is read off its exit status.
+class Gnuplot {
+ public:
+  Gnuplot() {
+    std::array<int, 2> pipe{};
+    if (::pipe2(pipe.data(), O_CLOEXEC) != 0) return;
+    posix_spawn_file_actions_t actions;
+    posix_spawnattr_t attributes;
+    posix_spawn_file_actions_init(&actions);
+    posix_spawnattr_init(&attributes);
+    posix_spawn_file_actions_adddup2(&actions, pipe[0], STDIN_FILENO);
+    for (const int stream : {STDOUT_FILENO, STDERR_FILENO})
+      posix_spawn_file_actions_addopen(&actions, stream, "/dev/null", O_WRONLY, 0);
+    posix_spawnattr_setpgroup(&attributes, 0);
+    posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
+    std::string name = "gnuplot";
+    const std::array<char*, 2> arguments{name.data(), nullptr};
+    failure_ = posix_spawnp(&process_, name.c_str(), &actions, &attributes, arguments.data(), environ);
+    posix_spawnattr_destroy(&attributes);
+    posix_spawn_file_actions_destroy(&actions);
+    ::close(pipe[0]);
+    if (failure_ == 0)
+      input_ = pipe[1];
+    else
+      ::close(pipe[1]);
+  }
+  Gnuplot(const Gnuplot&) = delete;
+  Gnuplot& operator=(const Gnuplot&) = delete;
+  ~Gnuplot() { finish(); }
+
+  int failure() const { return failure_; }  ///< to start, as errno
+
+  bool write(std::string_view script) const {
+    while (!script.empty()) {
+      const ssize_t written = ::write(input_, script.data(), script.size());
+      if (written < 0 && errno == EINTR) continue;
+      if (written < 0) return false;
+      script.remove_prefix(static_cast<std::size_t>(written));
+    }
+    return true;
+  }
+
+  /// Ends the script and waits; the status as waitpid() gives it.
+  int finish() {
+    if (input_ < 0) return -1;
+    ::close(std::exchange(input_, -1));
+    int status = -1;
+    while (::waitpid(process_, &status, 0) < 0 && errno == EINTR) {
+    }
+    return status;
+  }
+
+ private:
+  int failure_ = EAGAIN;
+  pid_t process_ = -1;
+  int input_ = -1;
+};
+
 std::string run_gnuplot(const std::string& script) {
-  if (std::system("command -v gnuplot >/dev/null 2>&1") != 0)  // NOLINT: a fixed command
-    return "gnuplot was not found, so no pictures were drawn (Debian: apt install gnuplot-nox)";
   const PipeSignalBlocked blocked;
-  std::FILE* pipe = popen("gnuplot", "w");  // NOLINT: a fixed command
-  if (pipe == nullptr) return "gnuplot could not be started";
-  const bool written = std::fwrite(script.data(), 1, script.size(), pipe) == script.size();
-  const int status = pclose(pipe);
+  Gnuplot gnuplot;
+  if (gnuplot.failure() == ENOENT)
+    return "gnuplot was not found, so no pictures were drawn (Debian: apt install gnuplot-nox)";
+  if (gnuplot.failure() != 0)
+    return fmt::format("gnuplot could not be started: {}", std::strerror(gnuplot.failure()));
+  const bool written = gnuplot.write(script);
+  const int status = gnuplot.finish();
   if (written && WIFEXITED(status) && WEXITSTATUS(status) == 0) return {};
   return fmt::format("gnuplot failed with status {}", WIFEXITED(status) ? WEXITSTATUS(status) : status);
 }

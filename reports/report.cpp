@@ -4,14 +4,14 @@
 #include <cmath>
 #include <diracstep/reports/build_facts.hpp>
 #include <diracstep/reports/report.hpp>
+#include <diracstep/reports/study_json.hpp>
 #include <iterator>
-#include <nlohmann/json.hpp>
+#include <sstream>
 
 namespace diracstep {
 
 namespace {
 
-using Json = nlohmann::ordered_json;
 using Cells = std::vector<std::string>;
 
 std::string error_cell(double value) { return std::isfinite(value) ? fmt::format("{:.2e}", value) : "-"; }
@@ -35,6 +35,25 @@ std::string status_cell(const StudyRow& row) {
 
 std::size_t width(std::string_view text) {
   return static_cast<std::size_t>(std::ranges::count_if(text, [](char c) { return (c & 0xC0) != 0x80; }));
+}
+
+/// A text that begins in some column, broken between words so that no line goes beyond `line_width`.
+std::string broken(const std::string& text, std::size_t column, std::size_t line_width) {
+  std::string lines;
+  std::size_t at = column;
+  std::istringstream words(text);
+  for (std::string word; words >> word;) {
+    if (at > column && at + 1 + width(word) > line_width) {
+      lines += '\n' + std::string(column, ' ');
+      at = column;
+    } else if (at > column) {
+      lines += ' ';
+      ++at;
+    }
+    lines += word;
+    at += width(word);
+  }
+  return lines;
 }
 
 Cells row_cells(const StudyRow& row) {
@@ -78,12 +97,19 @@ bool has_run(const Study& study, const std::string& method, int order) {
 std::string comparison_table(const Study& study) {
   const auto cell = [](const std::optional<double>& seconds) { return seconds ? time_cell(*seconds) : "-"; };
   const auto ratio = [](const std::optional<double>& r) { return r ? fmt::format("{:.2f}", *r) : "-"; };
-  std::vector<Cells> cells{{"error", "method", "order", "CPU", "IDA", "IDA / ours", "erk", "erk / ours", ""}};
+  const bool with_ratios = sundials_is_optimised();
+  std::vector<Cells> cells{with_ratios ? Cells{"error", "method", "order", "CPU", "IDA", "IDA / ours",
+                                               "explicit", "explicit / ours", ""}
+                                       : Cells{"error", "method", "order", "CPU", "IDA", "explicit", ""}};
   for (const AtError& at : study.at_error) {
     if (!has_run(study, at.method, at.order)) continue;
-    cells.push_back({fmt::format("{:.0e}", at.error), at.method, fmt::format("{}", at.order),
-                     cell(at.cpu_seconds), cell(at.ida_cpu_seconds), ratio(at.ratio),
-                     cell(at.erk_cpu_seconds), ratio(at.erk_ratio), at.best ? "fastest of ours" : ""});
+    Cells row{fmt::format("{:.0e}", at.error), at.method, fmt::format("{}", at.order), cell(at.cpu_seconds),
+              cell(at.ida_cpu_seconds)};
+    if (with_ratios) row.push_back(ratio(at.ratio));
+    row.push_back(cell(at.erk_cpu_seconds));
+    if (with_ratios) row.push_back(ratio(at.erk_ratio));
+    row.emplace_back(at.best ? "fastest of ours" : "");
+    cells.push_back(std::move(row));
   }
   return aligned(cells);
 }
@@ -190,17 +216,20 @@ std::string csv_line(const Study& study, const StudyRow& row) {
 
 }  // namespace
 
-std::string aligned(const std::vector<std::vector<std::string>>& rows) {
+std::string aligned(const std::vector<std::vector<std::string>>& rows, std::size_t line_width) {
   std::vector<std::size_t> widths;
   for (const Cells& row : rows) {
     widths.resize(std::max(widths.size(), row.size()));
     for (std::size_t i = 0; i < row.size(); ++i) widths[i] = std::max(widths[i], width(row[i]));
   }
+  std::size_t before_last = 0;
+  for (std::size_t i = 0; i + 1 < widths.size(); ++i) before_last += widths[i] + 2;
   std::string text;
   for (const Cells& row : rows) {
     std::string line;
-    for (std::size_t i = 0; i < row.size(); ++i)
+    for (std::size_t i = 0; i + 1 < row.size(); ++i)
       line += row[i] + std::string(widths[i] - width(row[i]) + 2, ' ');
+    if (!row.empty()) line += line_width == 0 ? row.back() : broken(row.back(), before_last, line_width);
     text += line.substr(0, line.find_last_not_of(' ') + 1) + '\n';
   }
   return text;
@@ -226,35 +255,117 @@ std::string at_error_markdown(const Study& study) {
     text += fmt::format(" `{}`, order {} |", m.method, m.order);
     rule += "---|";
   }
-  text += " IDA |\n" + rule + "---|\n";
+  text += " IDA | explicit |\n" + rule + "---|---|\n";
   for (const double error : compared_errors) {
     text += fmt::format("| {:.0e} |", error);
-    std::optional<double> ida;
+    std::optional<double> ida, erk;
     for (const MeasuredOrder& m : series)
       for (const AtError& at : study.at_error) {
         if (at.error != error || at.method != m.method || at.order != m.order) continue;
         const std::string cell = at.cpu_seconds ? time_cell(*at.cpu_seconds) : "-";
         text += at.best ? " **" + cell + "** |" : " " + cell + " |";
         ida = at.ida_cpu_seconds;
+        erk = at.erk_cpu_seconds;
       }
-    text += fmt::format(" {} |\n", ida ? time_cell(*ida) : "-");
+    text += fmt::format(" {} | {} |\n", ida ? time_cell(*ida) : "-", erk ? time_cell(*erk) : "-");
   }
   return text + '\n';
 }
 
-std::string summary_markdown(const std::vector<Study>& studies) {
-  const auto time = [](std::optional<double> t) { return t ? time_cell(*t) : std::string("-"); };
-  const auto ratio = [](std::optional<double> r) { return r ? fmt::format("{:.2f}", *r) : std::string("-"); };
-  std::string text =
-      "| scene | error | fastest of ours | ours | IDA | IDA / ours | explicit | explicit / ours |\n"
-      "|---|---|---|---|---|---|---|---|\n";
+namespace {
+
+std::string time_or_dash(const std::optional<double>& time) { return time ? time_cell(*time) : "-"; }
+std::string ratio_or_dash(const std::optional<double>& r) { return r ? fmt::format("{:.2f}", *r) : "-"; }
+
+/// The lines that name the SUNDIALS of a table of times.
+std::string build_line(bool with_ratios) {
+  return "Times with " + sundials_build() +
+         (with_ratios
+              ? ""
+              : ";\nratios only with one that is known to be optimised: ./dev --optimised-sundials study");
+}
+
+std::vector<const AtError*> fastest_of_ours(const Study& study) {
+  std::vector<const AtError*> found;
+  for (const AtError& at : study.at_error)
+    if (at.best) found.push_back(&at);
+  return found;
+}
+
+/// A cell of a fixed width; a longer text pushes the rest on.
+std::string fixed(const std::string& text, std::size_t columns, bool right = false) {
+  const std::string blanks(width(text) < columns ? columns - width(text) : 0, ' ');
+  return right ? blanks + text : text + blanks;
+}
+
+std::string summary_row(const Cells& cells, bool with_ratios) {
+  std::string line = fixed(cells[0], 28) + fixed(cells[1], 7) + fixed(cells[2], 18) + fixed(cells[3], 6);
+  for (const std::size_t time : {4, 5, 7}) {
+    line += fixed(cells[time], 9, true);
+    if (with_ratios && time != 4) line += fixed(cells[time + 1], 8, true);
+  }
+  return line.substr(0, line.find_last_not_of(' ') + 1) + '\n';
+}
+
+}  // namespace
+
+std::string summary_markdown(const std::vector<Study>& studies, bool with_ratios) {
+  std::string text = build_line(with_ratios) + ".\n\n";
+  text += with_ratios
+              ? "| scene | error | fastest of ours | ours | IDA | IDA / ours | explicit | explicit / ours |\n"
+                "|---|---|---|---|---|---|---|---|\n"
+              : "| scene | error | fastest of ours | ours | IDA | explicit |\n|---|---|---|---|---|---|\n";
   for (const Study& study : studies)
-    for (const AtError& at : study.at_error)
-      if (at.best && (at.error == 1e-6 || at.error == 1e-9))
-        text += fmt::format("| `{}` | {:.0e} | `{}`, order {} | {} | {} | {} | {} | {} |\n", study.scene,
-                            at.error, at.method, at.order, time(at.cpu_seconds), time(at.ida_cpu_seconds),
-                            ratio(at.ratio), time(at.erk_cpu_seconds), ratio(at.erk_ratio));
+    for (const AtError* at : fastest_of_ours(study)) {
+      text += fmt::format("| `{}` | {:.0e} | `{}`, order {} | {} | {} |", study.scene, at->error, at->method,
+                          at->order, time_or_dash(at->cpu_seconds), time_or_dash(at->ida_cpu_seconds));
+      if (with_ratios) text += fmt::format(" {} |", ratio_or_dash(at->ratio));
+      text += fmt::format(" {} |", time_or_dash(at->erk_cpu_seconds));
+      text += with_ratios ? fmt::format(" {} |\n", ratio_or_dash(at->erk_ratio)) : "\n";
+    }
   return text;
+}
+
+std::string summary_head(bool with_ratios) {
+  return build_line(with_ratios) + "\n\n" +
+         summary_row(
+             {"scene", "error", "fastest of ours", "order", "ours", "IDA", "/ours", "explicit", "/ours"},
+             with_ratios);
+}
+
+std::string summary_rows(const Study& study, bool with_ratios) {
+  std::string text;
+  for (const double error : compared_errors) {
+    const auto found = std::ranges::find_if(
+        study.at_error, [&](const AtError& each) { return each.error == error && each.best; });
+    const std::string scene = text.empty() ? study.scene : "";
+    if (found == study.at_error.end()) {
+      const bool hidden = std::isfinite(study.reference_error) && error < study.reference_error;
+      text += summary_row(
+          {scene, power_text(error), hidden ? "reference ends" : "not reached", "", "-", "-", "", "-", ""},
+          with_ratios);
+      continue;
+    }
+    text += summary_row(
+        {scene, power_text(error), found->method, fmt::format("{}", found->order),
+         time_or_dash(found->cpu_seconds), time_or_dash(found->ida_cpu_seconds), ratio_or_dash(found->ratio),
+         time_or_dash(found->erk_cpu_seconds), ratio_or_dash(found->erk_ratio)},
+        with_ratios);
+  }
+  return text;
+}
+
+std::string summary_line(const Study& study) {
+  std::string text = study.scene + ":";
+  for (const AtError* at : fastest_of_ours(study))
+    text += fmt::format("{} {} {}, order {}: {} (IDA {}, explicit {})", text.back() == ':' ? "" : ";",
+                        power_text(at->error), at->method, at->order, time_or_dash(at->cpu_seconds),
+                        time_or_dash(at->ida_cpu_seconds), time_or_dash(at->erk_cpu_seconds));
+  return text + (text.back() == ':' ? " no method reaches an error of 1e-3\n" : "\n");
+}
+
+std::string power_text(double power_of_ten) {
+  return fmt::format("1e{}", std::lround(std::log10(power_of_ten)));
 }
 
 std::string studies_csv(const std::vector<Study>& studies) {
@@ -268,12 +379,14 @@ std::string studies_csv(const std::vector<Study>& studies) {
   return text;
 }
 
-std::string studies_json(const std::vector<Study>& studies) {
+Json studies_document(const std::vector<Study>& studies) {
   Json json{{"studies", Json::array()}, {"build", Json::object()}};
   for (const auto& [key, value] : build_facts()) json["build"][key] = value;
   for (const Study& study : studies) json["studies"].push_back(study_json(study));
-  return json.dump(2, ' ', false, Json::error_handler_t::replace);
+  return json;
 }
+
+std::string studies_json(const std::vector<Study>& studies) { return studies_document(studies).dump(2); }
 
 std::string time_cell(double seconds) {
   if (!std::isfinite(seconds) || seconds <= 0.0) return "-";

@@ -17,8 +17,7 @@ std::vector<SeriesStyle> series_styles(const std::vector<Study>& studies) {
         continue;
       if (std::ranges::find(methods, ours.method) == methods.end()) methods.push_back(ours.method);
       const auto colour = std::ranges::find(methods, ours.method) - methods.begin();
-      styles.push_back({ours.method, ours.order, static_cast<std::size_t>(colour),
-                        static_cast<std::size_t>(std::ranges::count_if(styles, same))});
+      styles.push_back({ours.method, ours.order, static_cast<std::size_t>(colour), styles.size()});
     }
   return styles;
 }

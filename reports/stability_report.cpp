@@ -2,15 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <diracstep/files/json.hpp>
 #include <diracstep/reports/report.hpp>
 #include <diracstep/reports/stability_report.hpp>
-#include <nlohmann/json.hpp>
 
 namespace diracstep {
 
 namespace {
 
-using Json = nlohmann::ordered_json;
 using Cells = std::vector<std::string>;
 
 Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
@@ -230,7 +229,7 @@ std::string stability_json(const std::vector<LinearStability>& linear,
                               {"damping_limit", number(stability.damping_limit)},
                               {"growth", growth_json(stability)}});
   for (const StabilityResult& result : results) json["cases"].push_back(case_json(result));
-  return json.dump(2, ' ', false, Json::error_handler_t::replace);
+  return json.dump(2);
 }
 
 std::string stability_markdown(const std::vector<LinearStability>& linear,

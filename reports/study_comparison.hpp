@@ -16,6 +16,9 @@ struct StudyChange {
   std::string verdict;  ///< "faster", "slower", "more exact", "less exact", or empty within the noise
 };
 
+/// Throws Misuse where the text is no study.json.
+void require_study(const std::string& json);
+
 /// Compares with the text of an earlier study.json: the CPU times of at_error, where a ratio within 1.25
 /// counts as noise, and the errors of rows at the same step, where one within 1.05, or both errors below
 /// 1e-12, does. Throws Misuse for a text that is no study, and where the two share nothing.

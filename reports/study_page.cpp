@@ -17,13 +17,7 @@ namespace diracstep {
 
 namespace {
 
-constexpr std::array<double, 3> summary_errors{1e-3, 1e-6, 1e-9};
 constexpr double headline_error = 1e-6;
-
-/// 1e-06 as "1e-6".
-std::string power_text(double power_of_ten) {
-  return fmt::format("1e{}", std::lround(std::log10(power_of_ten)));
-}
 
 HtmlCell seconds(std::optional<double> value) { return number_cell(value, value ? time_cell(*value) : ""); }
 HtmlCell exponent(double value) { return number_cell(value, power_text(value)); }
@@ -95,12 +89,16 @@ std::string tile(const std::vector<PageEntry>& entries, const std::string& basel
       faster);
 }
 
+/// Without ratios where the baselines' SUNDIALS may lack optimisation: they would rest on that.
 std::string tiles(const std::vector<PageEntry>& entries) {
+  if (!sundials_is_optimised()) return {};
   return fmt::format("<ul class=\"tiles\"><li><b>{}</b><span>scenes</span></li>{}{}</ul>\n", entries.size(),
                      tile(entries, "SUNDIALS IDA", &AtError::ratio),
                      tile(entries, "the explicit method", &AtError::erk_ratio));
 }
 
+/// Ratios of the times, or where SUNDIALS may lack optimisation the times: such a ratio would tell of the
+/// build.
 std::vector<HtmlCell> summary_row(const PageEntry& entry) {
   const Study& study = entry.study;
   const AtError* const best = best_at(study, headline_error);
@@ -108,18 +106,27 @@ std::vector<HtmlCell> summary_row(const PageEntry& entry) {
                             words(entry.kind),
                             words(best == nullptr ? "–" : label(*best)),
                             seconds(best == nullptr ? std::nullopt : best->cpu_seconds)};
-  for (const auto member : {&AtError::ratio, &AtError::erk_ratio})
-    for (const double error : summary_errors) {
+  const bool ratios = sundials_is_optimised();
+  for (const auto member : {ratios ? &AtError::ratio : &AtError::ida_cpu_seconds,
+                            ratios ? &AtError::erk_ratio : &AtError::erk_cpu_seconds})
+    for (const double error : compared_errors) {
       const AtError* const at = best_at(study, error);
-      row.push_back(ratio(at == nullptr ? std::nullopt : at->*member));
+      const auto value = at == nullptr ? std::nullopt : at->*member;
+      row.push_back(ratios ? ratio(value) : seconds(value));
     }
   return row;
 }
 
 std::string summary(const std::vector<PageEntry>& entries) {
-  HtmlTable table{{{"", 2}, {"fastest of ours at 1e-6", 2}, {"IDA / ours at", 3}, {"explicit / ours at", 3}},
-                  {"scene", "class", "method", "CPU", "1e-3", "1e-6", "1e-9", "1e-3", "1e-6", "1e-9"},
+  const bool ratios = sundials_is_optimised();
+  HtmlTable table{{{"", 2},
+                   {"fastest of ours at 1e-6", 2},
+                   {ratios ? "IDA / ours at" : "IDA at", 4},
+                   {ratios ? "explicit / ours at" : "explicit at", 4}},
+                  {"scene", "class", "method", "CPU"},
                   {}};
+  for (int baseline = 0; baseline < 2; ++baseline)
+    for (const double error : compared_errors) table.header.push_back(power_text(error));
   for (const PageEntry& entry : entries) table.rows.push_back(summary_row(entry));
   return table.text();
 }
@@ -127,13 +134,15 @@ std::string summary(const std::vector<PageEntry>& entries) {
 // ------------------------------------------------------------------ a scene
 
 std::string ratios(const Study& study) {
-  HtmlTable table{
-      {}, {"error", "fastest of ours", "ours", "IDA", "IDA / ours", "explicit", "explicit / ours"}, {}};
+  HtmlTable table{{}, {"error", "fastest of ours", "ours", "IDA", "explicit"}, {}};
+  if (sundials_is_optimised()) table.header.insert(table.header.end(), {"IDA / ours", "explicit / ours"});
   for (const double error : compared_errors)
-    if (const AtError* at = best_at(study, error))
-      table.rows.push_back({exponent(error), words(label(*at)), seconds(at->cpu_seconds),
-                            seconds(at->ida_cpu_seconds), ratio(at->ratio), seconds(at->erk_cpu_seconds),
-                            ratio(at->erk_ratio)});
+    if (const AtError* at = best_at(study, error)) {
+      std::vector<HtmlCell> row{exponent(error), words(label(*at)), seconds(at->cpu_seconds),
+                                seconds(at->ida_cpu_seconds), seconds(at->erk_cpu_seconds)};
+      if (sundials_is_optimised()) row.insert(row.end(), {ratio(at->ratio), ratio(at->erk_ratio)});
+      table.rows.push_back(std::move(row));
+    }
   return table.rows.empty() ? "<p>None of the methods reaches an error of 1e-3.</p>\n" : table.text();
 }
 
@@ -153,9 +162,10 @@ std::vector<HtmlCell> method_row(const Study& study, const MeasuredOrder& m) {
 
 std::string methods(const Study& study) {
   HtmlTable table{{{"", 1}, {"order", 2}, {"", 1}, {"CPU time at the error", 4}, {"", 1}},
-                  {"method", "stated", "measured", "points", "1e-3", "1e-6", "1e-9", "1e-12",
-                   "the ladder of steps ended because"},
+                  {"method", "stated", "measured", "points"},
                   {}};
+  for (const double error : compared_errors) table.header.push_back(power_text(error));
+  table.header.emplace_back("the ladder of steps ended because");
   for (const MeasuredOrder& m : study.measured_orders) table.rows.push_back(method_row(study, m));
   return table.rows.empty() ? "" : table.text();
 }
@@ -263,13 +273,22 @@ std::string study_page(const std::vector<PageEntry>& entries, const PageFacts& o
       "<link rel=\"icon\" href=\"data:,\">\n<title>DiracStep: error against run time</title>\n"
       "<style>\n{}</style>\n</head>\n<body>\n{}",
       study_page_parts::style, introduction);
-  text += tiles(entries) +
-          "<p class=\"muted\">Time of the baselines over the time of the fastest of ours; above 1 ours is "
-          "faster.</p>\n" +
-          summary(entries);
-  text +=
-      figure("summary", -1, "<b>Time of the baselines over ours</b>: to the right of 1 ours is faster",
-             "time of IDA and of the explicit method over ours, for every scene", directory / "summary.svg");
+  text += fmt::format("<p><b>{}.</b>{}</p>\n", html(sundials_build()),
+                      sundials_is_optimised()
+                          ? ""
+                          : " Debian's is compiled without, which slows the baselines most. So "
+                            "this page has times and no ratios of them; "
+                            "<code>./dev --optimised-sundials study</code> has.");
+  text += tiles(entries);
+  if (sundials_is_optimised())
+    text +=
+        "<p class=\"muted\">Time of the baselines over the time of the fastest of ours; above 1 ours is "
+        "faster.</p>\n";
+  text += summary(entries);
+  if (sundials_is_optimised())
+    text += figure("summary", -1, "<b>Time of the baselines over ours</b>: to the right of 1 ours is faster",
+                   "time of IDA and of the explicit method over ours, for every scene",
+                   directory / "summary.svg");
   PageFacts about = build_facts();
   about.insert(about.end(), options.begin(), options.end());
   text += "<h3>Machine, build and options</h3>\n" + facts(about) + "<div class=\"tools\" data-save></div>\n";

@@ -1,17 +1,16 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <diracstep/reports/report.hpp>
 #include <diracstep/reports/series_style.hpp>
+#include <diracstep/reports/study_json.hpp>
 #include <diracstep/reports/study_page.hpp>
-#include <nlohmann/json.hpp>
 
 namespace diracstep {
 
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 /// Six digits: more than a picture shows, in a third of the characters.
 Json rounded(double value) {
@@ -31,9 +30,20 @@ Json body_json(const Motion::Body& body) {
   return json;
 }
 
+constexpr std::size_t numbers_of_a_motion = 12'000;  // give or take half; the files have all
+
+/// Each so many points of the motion go to the page.
+std::size_t stride(const History& history) {
+  return std::max<std::size_t>(
+      1, history.track_time.size() * history.motion.coordinates.size() / numbers_of_a_motion);
+}
+
 Json motion_json(const History& history) {
   const Motion& motion = history.motion;
-  Json json{{"form", name(motion.form)}, {"time", rounded(history.track_time)}};
+  const std::size_t every = stride(history);
+  Json json{{"form", name(motion.form)}, {"time", Json::array()}};
+  for (std::size_t k = 0; k < history.track_time.size(); k += every)
+    json["time"].push_back(rounded(history.track_time[k]));
   for (const char* list : {"names", "units", "numbers", "bodies", "bars", "pins", "values"})
     json[list] = Json::array();
   for (std::size_t i = 0; i < motion.coordinates.size(); ++i) {
@@ -41,7 +51,8 @@ Json motion_json(const History& history) {
     json["units"].push_back(motion.coordinates[i].unit);
     json["numbers"].push_back(motion.coordinates[i].index + 1);
     Json values = Json::array();
-    for (const Vector& at : history.positions) values.push_back(rounded(at[static_cast<Eigen::Index>(i)]));
+    for (std::size_t k = 0; k < history.positions.size(); k += every)
+      values.push_back(rounded(history.positions[k][static_cast<Eigen::Index>(i)]));
     json["values"].push_back(std::move(values));
   }
   for (const Motion::Body& body : motion.bodies) json["bodies"].push_back(body_json(body));
@@ -73,7 +84,7 @@ Json history_json(const PageEntry& entry) {
 std::string study_page_data(const std::vector<PageEntry>& entries) {
   std::vector<Study> studies;
   for (const PageEntry& entry : entries) studies.push_back(entry.study);
-  Json json = Json::parse(studies_json(studies));
+  Json json = studies_document(studies);
   json["styles"] = Json::array();
   json["histories"] = Json::array();
   for (const SeriesStyle& style : series_styles(studies))
@@ -83,7 +94,7 @@ std::string study_page_data(const std::vector<PageEntry>& entries) {
                               {"colour", style.colour},
                               {"marker", style.marker}});
   for (const PageEntry& entry : entries) json["histories"].push_back(history_json(entry));
-  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+  return json.dump();
 }
 
 }  // namespace diracstep

@@ -6,6 +6,7 @@
 #include <diracstep/reports/plot.hpp>
 #include <diracstep/reports/study_plot.hpp>
 #include <functional>
+#include <limits>
 #include <string_view>
 
 namespace diracstep {
@@ -16,11 +17,14 @@ namespace {
 /// baselines', and without yellow.  The page of the study has the same, see study_page/style.css.
 constexpr std::array<std::string_view, 6> colours{"#0072B2", "#D55E00", "#009E73",
                                                   "#CC79A7", "#E69F00", "#56B4E9"};
-constexpr std::array<int, 6> markers{7, 5, 9, 13, 11, 15};
-constexpr std::array<std::string_view, 3> dashes{"solid", "(9,5)", "(2,4)"};
+/// Full ones and then hollow ones, told apart in grey print; squares and triangles that are hollow are the
+/// baselines'.
+constexpr std::array<int, 8> markers{7, 5, 9, 13, 11, 6, 12, 10};
+constexpr std::array<std::string_view, 4> dashes{"solid", "(9,4)", "(2,3)", "(9,3,2,3)"};
 constexpr double largest_drawn = 10.0;  // errors above it show no trend
-constexpr double drawn_zero = 1e-18;    // a change of exactly zero has no logarithm
+constexpr double drawn_zero = 1e-16;    // smaller changes are below the spacing of numbers
 constexpr double summary_error = 1e-6;
+constexpr double shown_near_reference = 10.0;
 constexpr std::size_t max_trails = 8;  // of bodies in one picture
 
 constexpr std::string_view style = R"(set encoding utf8
@@ -45,8 +49,8 @@ struct Curve {
 };
 
 std::string line_look(std::size_t k) {
-  return fmt::format("with lines linewidth 1.5 dashtype {} linecolor '{}'",
-                     dashes[k / colours.size() % dashes.size()], colours[k % colours.size()]);
+  return fmt::format("with lines linewidth 1.5 dashtype {} linecolor '{}'", dashes[k % dashes.size()],
+                     colours[k % colours.size()]);
 }
 
 std::string axes(const std::string& title, const std::string& x, const std::string& y) {
@@ -67,13 +71,41 @@ std::string plotted(std::vector<Curve> curves) {
   return data + plots + "\n";
 }
 
+/// Smaller errors are those of the reference.
+double smallest_drawn(const Study& study) {
+  return std::isfinite(study.reference_error) ? study.reference_error : 0.0;
+}
+
+/// A level line where the reference ends, if the picture goes down to it.
+std::string reference_line(const Study& study, const std::vector<Curve>& curves) {
+  const double own = smallest_drawn(study);
+  const bool near = std::ranges::any_of(study.rows, [&](const StudyRow& row) {
+    return row.ok() && row.error() > 0.0 && row.error() < shown_near_reference * own;
+  });
+  if (!near || curves.empty()) return {};
+  return fmt::format(
+      "set arrow from graph 0, first {0:.3e} to graph 1, first {0:.3e} nohead linewidth 1 dashtype (4,4) "
+      "linecolor '#808080'\nset label 'own error of the reference' at graph 0.01, first {0:.3e} offset "
+      "0,-0.55 "
+      "textcolor '#606060'\n",
+      own);
+}
+
+/// Few enough tics that their labels stand apart, whatever shape an equal scale gives the picture.
+std::string tics(const char* axis, double least, double most) {
+  if (!(most > least)) return {};
+  const double rough = (most - least) / 3.0, power = std::pow(10.0, std::floor(std::log10(rough)));
+  const double nice = rough >= 5.0 * power ? 5.0 : rough >= 2.0 * power ? 2.0 : 1.0;
+  return fmt::format("set {}tics {:g}\n", axis, nice * power);
+}
+
 using Abscissa = std::function<double(const StudyRow&)>;
 
 using Choice = std::function<bool(const StudyRow&)>;
 
 void add_rows(Curve& curve, const Study& study, const Choice& chosen, const Abscissa& x) {
   for (const StudyRow& row : study.rows)
-    if (row.ok() && chosen(row) && row.error() > 0.0 && row.error() <= largest_drawn)
+    if (row.ok() && chosen(row) && row.error() > smallest_drawn(study) && row.error() <= largest_drawn)
       curve.add(x(row), row.error());
 }
 
@@ -83,8 +115,8 @@ std::vector<Curve> curves_of(const Study& study, const std::vector<SeriesStyle>&
     all.push_back(
         {s.label(), fmt::format("with linespoints linewidth 2 dashtype {} pointtype {} "
                                 "pointsize 0.85 linecolor '{}'",
-                                dashes[s.colour / colours.size() % dashes.size()],
-                                markers[s.marker % markers.size()], colours[s.colour % colours.size()])});
+                                dashes[s.marker % dashes.size()], markers[s.marker % markers.size()],
+                                colours[s.colour % colours.size()])});
     add_rows(
         all.back(), study,
         [&](const StudyRow& row) { return row.method == s.method && row.order == s.order; }, x);
@@ -143,20 +175,34 @@ std::string history_script(const History& history, const std::string& title, con
   if (!history.constraint.empty()) curves.push_back(logarithmic("rows", 1, history, history.constraint));
   for (const History::Change& invariant : history.invariants)
     curves.push_back(logarithmic(invariant.name, curves.size(), history, invariant.values));
-  return std::string(style) + "unset logscale x\nset format x '%g'\n" +
+  return std::string(style) + "unset logscale x\nunset mxtics\nset format x '%g'\nset yrange [1e-16:*]\n" +
+         tics("x", history.time.front(), history.time.back()) +
          axes(title, time, "relative change, or violation [1]") + plotted(curves);
 }
 
 std::string error_script(const History& history, const std::string& title, const std::string& time,
                          const std::vector<SeriesStyle>& styles) {
   const auto style_of = std::ranges::find(styles, history.method, &SeriesStyle::method);
-  Curve error{"error", line_look(style_of == styles.end() ? 0 : style_of->colour)};
+  Curve error{"error",
+              fmt::format("with lines linewidth 1.5 linecolor '{}'",
+                          colours[style_of == styles.end() ? 0 : style_of->colour % colours.size()])};
   for (std::size_t i = 0; i < history.time.size(); ++i)
     if (history.time[i] > history.time.front() && history.error[i] > 0.0)
       error.add(history.time[i] - history.time.front(), history.error[i]);
   if (error.data.empty()) return {};
   return std::string(style) + axes(title, time, "error over largest q, p [1]") +
          fmt::format("set key off\n{}", plotted({error}));
+}
+
+/// The range of a coordinate of all bodies.
+std::string tics(const char* axis, const History& history, int Motion::Body::*coordinate) {
+  double least = std::numeric_limits<double>::infinity(), most = -least;
+  for (const Vector& at : history.positions)
+    for (const Motion::Body& body : history.motion.bodies) {
+      least = std::min(least, at[body.*coordinate]);
+      most = std::max(most, at[body.*coordinate]);
+    }
+  return tics(axis, least, most);
 }
 
 std::string plane_script(const History& history) {
@@ -172,7 +218,7 @@ std::string plane_script(const History& history) {
   }
   const std::string key = curves.size() < 2 ? "set key off\n" : "";
   const std::string equal = x.unit == y.unit ? "set size ratio -1\n" : "";
-  return key + equal +
+  return key + equal + tics("x", history, &Motion::Body::x) + tics("y", history, &Motion::Body::y) +
          axes("", in_unit(motion.bodies.size() > 1 ? "x" : x.name, x.unit),
               in_unit(motion.bodies.size() > 1 ? "y" : y.name, y.unit)) +
          plotted(curves);
@@ -192,21 +238,23 @@ std::string profile_script(const History& history) {
   }
   const auto& first = history.motion.coordinates.front();
   const std::string family = first.name.substr(0, first.name.find_last_of('_'));
-  return axes("", "number [1]", in_unit(family, first.unit)) + plotted(curves);
+  return tics("x", number.front(), number.back()) + axes("", "number [1]", in_unit(family, first.unit)) +
+         plotted(curves);
 }
 
 std::string curves_script(const History& history, const std::string& time) {
   std::vector<Curve> curves;
   for (std::size_t i = 0; i < history.motion.coordinates.size(); ++i) {
     const auto& c = history.motion.coordinates[i];
-    curves.push_back(
-        curve(in_unit(c.name, c.unit), i, history.time, component(history.positions, static_cast<int>(i))));
+    curves.push_back(curve(in_unit(c.name, c.unit), i, history.track_time,
+                           component(history.positions, static_cast<int>(i))));
   }
-  return axes("", time, "coordinates") + plotted(curves);
+  return tics("x", history.track_time.front(), history.track_time.back()) + axes("", time, "coordinates") +
+         plotted(curves);
 }
 
 std::string motion_script(const History& history, const std::string& time) {
-  const std::string linear = std::string(style) + "unset logscale\nset format '%g'\n";
+  const std::string linear = std::string(style) + "unset logscale\nunset mxtics\nset format '%g'\n";
   switch (history.motion.form) {
     case Motion::Form::plane:
       return linear + plane_script(history);
@@ -226,7 +274,8 @@ std::string first_failure(std::initializer_list<std::string> failures) {
 
 }  // namespace
 
-std::string draw_work_precision(const Study& study, const std::vector<SeriesStyle>& styles,
+std::string draw_work_precision(const Study& study, const std::string& time_unit,
+                                const std::vector<SeriesStyle>& styles,
                                 const std::filesystem::path& directory) {
   std::vector<Curve> work = curves_of(study, styles, [](const auto& row) { return row.cpu_seconds.median; });
   add_baselines(work, study, [](const auto& row) { return row.cpu_seconds.median; });
@@ -239,12 +288,14 @@ std::string draw_work_precision(const Study& study, const std::vector<SeriesStyl
   const bool two_steps =  // an order takes two
       std::ranges::any_of(steps, [](const Curve& c) { return std::ranges::count(c.data, '\n') > 1; });
   return first_failure(
-      {render(std::string(style) + axes(title, "CPU time [s]", error + " at the end [1]") + plotted(work),
+      {render(std::string(style) + axes(title, "CPU time [s]", error + " at the end [1]") +
+                  reference_line(study, work) + plotted(work),
               stem, 980, height),
-       two_steps
-           ? render(std::string(style) + axes(title, "step size", error + " at the end [1]") + plotted(steps),
-                    stem + "-orders", 980, height)
-           : ""});
+       two_steps ? render(std::string(style) +
+                              axes(title, in_unit("step size", time_unit), error + " at the end [1]") +
+                              reference_line(study, steps) + plotted(steps),
+                          stem + "-orders", 980, height)
+                 : ""});
 }
 
 std::string draw_history(const History& history, const std::string& scene, const std::string& time_unit,

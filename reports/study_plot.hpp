@@ -12,8 +12,10 @@ namespace diracstep {
 /// returns an empty text, or what went wrong.
 
 /// SCENE: error at t_end, the larger one of q and p, over CPU time, both logarithmic, one curve for each
-/// method and order and one for each baseline.  SCENE-orders: the same error over the step.
-std::string draw_work_precision(const Study& study, const std::vector<SeriesStyle>& styles,
+/// method and order and one for each baseline.  SCENE-orders: the same error over the step.  Errors below
+/// that of the reference are not drawn; where the curves come near it a level line shows it.
+std::string draw_work_precision(const Study& study, const std::string& time_unit,
+                                const std::vector<SeriesStyle>& styles,
                                 const std::filesystem::path& directory);
 
 /// SCENE-history: what should stay constant, that is the change of energy and invariants and the violation

@@ -1,4 +1,5 @@
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/numerics/near_names.hpp>
 #include <diracstep/core/system/redundant_rows.hpp>
 #include <diracstep/scene_format/loader/shipped_scenes.hpp>
 #include <diracstep/scene_format/scene_catalogue.hpp>
@@ -16,7 +17,7 @@ void drop_redundant_rows(CatalogueScene& entry) {
   const std::shared_ptr<const Scene> scene = completed(entry.scene);
   if (!scene->start.q.allFinite() || scene->start.q.size() != scene->dimension()) return;  // refused by runs
   const std::vector<std::string> dependent = redundant_rows(*scene, scene->start);
-  if (dependent.empty() || singular_at_start_only(*scene, scene->start)) return;
+  if (dependent.empty() || row_dependence(*scene, scene->start, dependent) != RowDependence::lasting) return;
   entry.scene = without_rows(*entry.scene, dependent);
   std::string names;
   for (const std::string& name : dependent) names += (names.empty() ? "'" : ", '") + name + "'";
@@ -32,8 +33,8 @@ CatalogueScene make_scene(const std::string& name, const Parameters& changes) {
                              changes);
     known += std::string(" ") + scene.name;
   }
-  throw Misuse("unknown scene '" + name + "'; the scenes are" + known +
-               "; or give the path of a file NAME.toml");
+  throw Misuse("unknown scene '" + name + "'" + did_you_mean(name, scene_names()) + "; the scenes are" +
+               known + "; or give the path of a file NAME.toml");
 }
 
 }  // namespace diracstep

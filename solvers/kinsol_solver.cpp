@@ -202,8 +202,14 @@ class KinsolSolver final : public NonlinearSolver {
   /// The largest scaled entry of the last residual.
   double scaled_norm() const {
     double largest = 0.0;
-    for (std::size_t b = 0; b < norms_.size(); ++b)
-      largest = std::max(largest, norms_[b] * inverse_scales_[b]);
+    const double* row = residual_;
+    std::size_t b = 0;
+    for (const ResidualBlock& block : problem_.blocks()) {
+      const double norm = norms_.at(b) * inverse_scales_.at(b);
+      largest = std::max(largest, block.each != nullptr ? scaled_norm(block, row) : norm);
+      row += block.rows;
+      ++b;
+    }
     return largest;
   }
 
@@ -211,13 +217,20 @@ class KinsolSolver final : public NonlinearSolver {
   double report_residual() {
     report_.residual_norms = norms_;
     double largest = 0.0;
+    const double* row = residual_;
     std::size_t b = 0;
     for (const ResidualBlock& block : problem_.blocks()) {
       const double norm = norms_.at(b++);
       if (std::isnan(norm)) return HUGE_VAL;
-      largest = std::max(largest, norm / block.scale);
+      largest = std::max(largest, block.each != nullptr ? scaled_norm(block, row) : norm / block.scale);
+      row += block.rows;
     }
     return largest;
+  }
+
+  /// The largest entry of a block, each in units of its own.
+  static double scaled_norm(const ResidualBlock& block, const double* row) {
+    return largest_of(block.rows, [&](Eigen::Index i) { return row[i] / block.each[i]; });
   }
 
   void set_scales() {
@@ -228,7 +241,7 @@ class KinsolSolver final : public NonlinearSolver {
     std::size_t b = 0;
     for (const ResidualBlock& block : problem_.blocks()) {
       inverse_scales_.at(b) = 1.0 / block.scale;
-      runs.at(b) = {block.rows, inverse_scales_.at(b)};
+      runs.at(b) = {block.rows, inverse_scales_.at(b), block.each};
       ++b;
     }
     detail::set_weights(residual_scale_.get(), std::span(runs).first(b));

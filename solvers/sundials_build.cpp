@@ -2,6 +2,7 @@
 
 #include <array>
 #include <diracstep/solvers/sundials_build.hpp>
+#include <string_view>
 
 namespace diracstep {
 
@@ -12,7 +13,16 @@ std::string sundials_build() {
 #ifdef DIRACSTEP_SUNDIALS_FLAGS
   return std::string("SUNDIALS ") + version.data() + " built with " DIRACSTEP_SUNDIALS_FLAGS;
 #else
-  return std::string("SUNDIALS ") + version.data() + " of the system";
+  return std::string("SUNDIALS ") + version.data() + " of the system, which may lack optimisation";
+#endif
+}
+
+bool sundials_is_optimised() {
+#ifdef DIRACSTEP_SUNDIALS_FLAGS
+  const std::string_view flags = DIRACSTEP_SUNDIALS_FLAGS;
+  return flags.find("-O2") != flags.npos || flags.find("-O3") != flags.npos;
+#else
+  return false;
 #endif
 }
 

@@ -24,6 +24,7 @@ std::string header(const Scene& scene, const std::vector<Invariant>& invariants)
 
 OutputFile opened(const std::string& path, OutputFile::Mode mode) {
   try {
+    if (path == standard_output) return OutputFile::on_standard_output();
     return {path, mode};
   } catch (const Misuse& misuse) {
     throw Misuse(fmt::format("--out: {}", misuse.what()));

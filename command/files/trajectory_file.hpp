@@ -8,9 +8,13 @@
 
 namespace diracstep::command {
 
+/// The path that stands for standard output.
+inline constexpr const char* standard_output = "-";
+
 /// A trajectory as CSV: t, the coordinates, v_NAME, p_NAME, lambda_ROW, energy, and invariant_NAME where the
 /// scene declares some, with 17 significant digits.
-/// Lines are gathered and written many at a time, always whole ones.
+/// Lines are gathered and written many at a time, always whole ones; only where the process is killed in the
+/// middle of a write, or the power fails, may half a line stand at the end.
 class TrajectoryFile {
  public:
   /// Where a file stood at some moment.

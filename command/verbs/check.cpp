@@ -9,18 +9,16 @@
 #include <diracstep/command/verbs.hpp>
 #include <diracstep/command/verbs/published_check.hpp>
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/files/json.hpp>
 #include <diracstep/reports/report.hpp>
 #include <diracstep/validation/laws/count_allocations.hpp>
 #include <diracstep/validation/laws/method_check.hpp>
 #include <diracstep/validation/laws/scene_examination.hpp>
 #include <memory>
-#include <nlohmann/json.hpp>
 
 namespace diracstep::command {
 
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 struct Options {
   std::vector<std::string> names;
@@ -130,9 +128,10 @@ class Examiner {
 
   void print_all() {
     if (!options_.json) return;
-    const bool one_scene =
-        document_.size() == 1 && document_.contains("scenes") && options_.names.size() == 1;
-    print((one_scene ? document_["scenes"][0] : document_).dump(2) + '\n');
+    if (document_.empty() && scenes_.size() == 1 && options_.names.size() == 1)
+      return print(scenes_.front().dump(2) + '\n');
+    if (!scenes_.empty()) document_.add("scenes", scenes_);
+    print(document_.dump(2) + '\n');
   }
 
  private:
@@ -146,7 +145,7 @@ class Examiner {
     const CatalogueScene entry = make_scene(session_, scene, parameters(options_.set));
     const Examination examination = examine(entry, session_.registry, session_.solvers);
     if (!examination.passed()) session_.exit_status = failed;
-    document_["scenes"].push_back(as_json(entry, examination));
+    scenes_.push_back(as_json(entry, examination));
     if (!options_.json) print(as_text(entry, examination));
   }
 
@@ -154,7 +153,8 @@ class Examiner {
   Session& session_;
   std::vector<OrderScene> order_scenes_;
   Progress progress_;
-  Json document_ = Json::object();
+  Json document_ = Json::object();  ///< methods and rules
+  std::vector<Json> scenes_;
 };
 
 void check(const Options& options, Session& session) {

@@ -5,22 +5,22 @@
 #include <diracstep/command/interrupt.hpp>
 #include <diracstep/command/progress.hpp>
 #include <diracstep/command/verbs.hpp>
+#include <diracstep/command/verbs/published_orders.hpp>
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/numerics/near_names.hpp>
+#include <diracstep/files/json.hpp>
 #include <diracstep/reports/report.hpp>
 #include <diracstep/validation/studies/convergence_study.hpp>
 #include <iterator>
 #include <memory>
-#include <nlohmann/json.hpp>
 
 namespace diracstep::command {
 
 namespace {
 
-using Json = nlohmann::ordered_json;
-
 struct Options {
   std::string what;
-  bool measure = false;
+  bool measure = false, parameters = false;
   bool json = false;
 };
 
@@ -31,21 +31,25 @@ struct Measurement {
 };
 using Measurements = std::vector<Measurement>;
 
-std::string scene_table(const Session& session) {
-  std::vector<std::vector<std::string>> rows{
-      {"scene", "class", "coordinates", "rows", "t_end", "step", "parameters", "description"}};
+constexpr std::size_t line_width = 100;
+
+/// The list, with the step and the parameters of each scene below it where they are asked for.
+std::string scene_table(const Session& session, bool with_parameters) {
+  std::vector<std::vector<std::string>> rows{{"scene", "size", "end", "class: description"}};
   for (const auto& name : scene_names(session)) {
     const CatalogueScene entry = make_scene(session, name);
-    std::vector<std::string> parameters;
-    for (const auto& [key, value] : entry.parameters)
-      parameters.push_back(fmt::format("{}={:.6g}", key, value));
     const std::string needs = entry.needs.empty() ? "" : " (not run yet)";
-    rows.push_back({name, entry.kind + needs, fmt::format("{}", entry.scene->dimension()),
-                    fmt::format("{}", entry.scene->rows()), fmt::format("{:g}", entry.t_end),
-                    fmt::format("{:g}", entry.natural_step), fmt::format("{}", fmt::join(parameters, " ")),
-                    entry.description});
+    rows.push_back({name, fmt::format("{} + {}", entry.scene->dimension(), entry.scene->rows()),
+                    fmt::format("{:.4g}", entry.t_end),
+                    fmt::format("{}{}: {}", entry.kind, needs, entry.description)});
+    if (!with_parameters) continue;
+    std::string values = fmt::format("step {:g};", entry.natural_step);
+    for (const auto& [key, value] : entry.parameters) values += fmt::format(" {}={:.6g}", key, value);
+    rows.push_back({"", "", "", values});
   }
-  return aligned(rows);
+  return aligned(rows, line_width) +
+         fmt::format("\nsize: coordinates + rows; end: of the scene's own motion{}\n",
+                     with_parameters ? "" : "; --parameters tells what --set changes");
 }
 
 Json scene_json(const Session& session) {
@@ -98,41 +102,83 @@ Measurements measure(const std::string& method, const Session& session, Progress
   return measurements;
 }
 
-std::string range(const Measurements& measurements) {
-  std::vector<double> slopes;
-  for (const auto& measurement : measurements)
-    if (measurement.slope) slopes.push_back(*measurement.slope);
+/// The methods of the registry, and those of more Gauss-Lobatto stages that studies use.
+std::vector<std::string> listed_methods(const Session& session) {
+  std::vector<std::string> names = session.registry.names();
+  for (const char* type : {"type1", "type2", "type3"}) {
+    const auto last = std::ranges::find(names, fmt::format("{}/gl:4", type));
+    names.insert(last + 1, {fmt::format("{}/gl:5", type), fmt::format("{}/gl:6", type)});
+  }
+  return names;
+}
+
+/// The slopes just measured, or those of the published table.
+std::vector<double> slopes(const MethodInfo& info, const std::optional<Measurements>& measured) {
+  std::vector<double> all;
+  if (measured) {
+    for (const Measurement& measurement : *measured)
+      if (measurement.slope) all.push_back(*measurement.slope);
+  } else {
+    for (const PublishedOrder& published : published_orders(info.name, info.order))
+      all.push_back(published.slope);
+  }
+  return all;
+}
+
+std::string range(const std::vector<double>& slopes) {
   if (slopes.empty()) return "-";
   const auto [least, most] = std::ranges::minmax(slopes);
-  return fmt::format("{:.2f} to {:.2f} on {} of {} scenes", least, most, slopes.size(), measurements.size());
+  if (fmt::format("{:.2f}", least) == fmt::format("{:.2f}", most)) return fmt::format("{:.2f}", least);
+  return fmt::format("{:.2f} to {:.2f}", least, most);
 }
 
-std::string method_table(const Session& session, const std::vector<Measurements>& measured) {
-  std::vector<std::vector<std::string>> rows{
-      {"method", "type", "order", "measured", "can be run at", "summary"}};
-  const auto names = session.registry.names();
+/// Of each method what was measured, by its place in the list; empty where nothing was to be measured.
+using AllMeasured = std::vector<Measurements>;
+
+std::optional<Measurements> measured_of(const AllMeasured& all, std::size_t i) {
+  return all.empty() ? std::nullopt : std::optional(all[i]);
+}
+
+std::string method_table(const Session& session, const AllMeasured& measured) {
+  std::vector<std::vector<std::string>> rows{{"method", "order", "measured", "composed to", "summary"}};
+  const auto names = listed_methods(session);
   for (std::size_t i = 0; i < names.size(); ++i) {
     const MethodInfo info = session.registry.method(names[i]).info;
-    rows.push_back({info.name, fmt::format("{}", static_cast<int>(info.type)), fmt::format("{}", info.order),
-                    measured.empty() ? "see --measure" : range(measured[i]),
-                    fmt::format("{}", fmt::join(possible_orders(info), " ")),
+    const int most = std::ranges::max(possible_orders(info));
+    rows.push_back({info.name, fmt::format("{}", info.order), range(slopes(info, measured_of(measured, i))),
+                    most > info.order ? fmt::format("{}", most) : "-",
                     info.solved_as.empty() ? info.summary : info.summary + "; " + info.solved_as});
   }
-  return aligned(rows);
+  const std::string source =
+      measured.empty()
+          ? "\nmeasured: smallest and largest over the classes of scenes of docs/orders.md, which\n"
+            "diracstep orders writes; -: its error is at round-off before the order shows, or it "
+            "is a plugin's\n"
+          : "\nmeasured: smallest and largest over the scenes that have a closed form, just now\n";
+  return aligned(rows, line_width) + source;
 }
 
-Json method_json(const Session& session, const std::vector<Measurements>& measured) {
+Json slopes_json(const MethodInfo& info, const std::optional<Measurements>& measured) {
+  Json json;  // null where nothing is known
+  if (!measured) {
+    for (const PublishedOrder& published : published_orders(info.name, info.order))
+      json.push_back({{"class", published.scene_class}, {"slope", published.slope}});
+    return json;
+  }
+  for (const auto& [scene, slope] : *measured)
+    json.push_back({{"scene", scene}, {"slope", slope ? Json(*slope) : Json(nullptr)}});
+  return json;
+}
+
+Json method_json(const Session& session, const AllMeasured& measured) {
   Json methods = Json::array();
-  const auto names = session.registry.names();
+  const auto names = listed_methods(session);
   for (std::size_t i = 0; i < names.size(); ++i) {
     const MethodInfo info = session.registry.method(names[i]).info;
-    Json slopes;  // null where nothing was measured
-    for (const auto& [scene, slope] : measured.empty() ? Measurements{} : measured[i])
-      slopes.push_back({{"scene", scene}, {"slope", slope ? Json(*slope) : Json(nullptr)}});
     methods.push_back({{"name", info.name},
                        {"type", static_cast<int>(info.type)},
                        {"order", info.order},
-                       {"measured_order", slopes},
+                       {"measured_order", slopes_json(info, measured_of(measured, i))},
                        {"orders", possible_orders(info)},
                        {"self_adjoint", info.self_adjoint},
                        {"constraint_rule", name(info.constraint_rule)},
@@ -168,23 +214,27 @@ Json plugin_json(const Session& session) {
   return plugins;
 }
 
-std::vector<Measurements> measure_all(const Session& session) {
+AllMeasured measure_all(const Session& session) {
   Progress progress;
-  std::vector<Measurements> measured;
-  for (const auto& method : session.registry.names()) measured.push_back(measure(method, session, progress));
+  AllMeasured measured;
+  for (const auto& method : listed_methods(session)) measured.push_back(measure(method, session, progress));
   return measured;
 }
 
 void list(const Options& options, Session& session) {
+  const std::vector<std::string> known{"scenes", "methods", "plugins"};
+  if (!options.what.empty() && std::ranges::find(known, options.what) == known.end())
+    throw Misuse(fmt::format("list: '{}' is not one of {}{}", options.what, fmt::join(known, ", "),
+                             did_you_mean(options.what, known)));
   if (options.measure) catch_interrupts();
   const auto wanted = [&](const char* what) { return options.what.empty() || options.what == what; };
-  std::vector<Measurements> measured;
+  AllMeasured measured;
   if (options.measure && wanted("methods")) measured = measure_all(session);
   Json json = Json::object();
   std::vector<std::string> tables;
   if (wanted("scenes")) {
     json["scenes"] = scene_json(session);
-    tables.push_back(scene_table(session));
+    tables.push_back(scene_table(session, options.parameters));
   }
   if (wanted("methods")) {
     json["methods"] = method_json(session, measured);
@@ -205,9 +255,9 @@ void list(const Options& options, Session& session) {
 void add_list(CLI::App& app, Session& session) {
   CLI::App* verb = app.add_subcommand("list", "Scenes, methods and plugins");
   const auto options = std::make_shared<Options>();
-  verb->add_option("WHAT", options->what, "scenes, methods or plugins; everything without it")
-      ->check(CLI::IsMember({"scenes", "methods", "plugins"}));
-  verb->add_flag("--measure", options->measure, "Measure the order of each method, beside the stated one");
+  verb->add_option("WHAT", options->what, "scenes, methods or plugins; everything without it");
+  verb->add_flag("--parameters", options->parameters, "Below each scene its parameters, which --set changes");
+  verb->add_flag("--measure", options->measure, "Measure the orders now, on scenes with a closed form");
   verb->add_flag("--json", options->json, "One JSON document on standard output");
   verb->footer("Example:  diracstep list methods --measure");
   verb->callback([options, &session] { list(*options, session); });

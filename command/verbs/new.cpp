@@ -4,9 +4,9 @@
 #include <cstdio>
 #include <diracstep/command/verbs.hpp>
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/files/json.hpp>
 #include <diracstep/scene_format/loader/scene_template.hpp>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <string>
 #include <system_error>
 
@@ -34,7 +34,7 @@ void make(const Options& options) {
   const std::string path = options.name + ".toml";
   write_new(path, scene_template(options.name));
   if (options.json)
-    print(nlohmann::ordered_json{{"file", path}}.dump(2) + '\n');
+    print(Json{{"file", path}}.dump(2) + '\n');
   else
     print(fmt::format("{0} written; next: diracstep check {0}, diracstep run {0}\n", path));
 }

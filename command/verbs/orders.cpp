@@ -6,11 +6,11 @@
 #include <diracstep/command/interrupt.hpp>
 #include <diracstep/command/verbs.hpp>
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/files/json.hpp>
 #include <diracstep/files/output_file.hpp>
 #include <diracstep/files/paths.hpp>
 #include <diracstep/validation/laws/order_table.hpp>
 #include <memory>
-#include <nlohmann/json.hpp>
 
 namespace diracstep::command {
 
@@ -45,21 +45,17 @@ constexpr const char* explanation =
     "is 10\n"
     "(`tests/core/methods/composition_test.cpp`, with all order conditions).\n\n";
 
-nlohmann::ordered_json number(double x) {
-  return std::isfinite(x) ? nlohmann::ordered_json(x) : nlohmann::ordered_json();
-}
+Json number(double x) { return std::isfinite(x) ? Json(x) : Json(); }
 
-nlohmann::ordered_json as_json(const RuleRow& row) {
-  nlohmann::ordered_json json{
-      {"method", row.method}, {"order", row.order}, {"measured", nlohmann::json::array()}};
+Json as_json(const RuleRow& row) {
+  Json json{{"method", row.method}, {"order", row.order}, {"measured", Json::array()}};
   for (const OrderMeasurement& measured : row.measured) json["measured"].push_back(number(measured.order));
   json["holds"] = holds(row);
   return json;
 }
 
-nlohmann::ordered_json as_json(const OrderTableRow& row, const std::vector<OrderScene>& scenes) {
-  nlohmann::ordered_json json{
-      {"method", row.method}, {"order", row.order}, {"measured", nlohmann::json::object()}};
+Json as_json(const OrderTableRow& row, const std::vector<OrderScene>& scenes) {
+  Json json{{"method", row.method}, {"order", row.order}, {"measured", Json::object()}};
   for (std::size_t k = 0; k < scenes.size(); ++k)
     json["measured"][scenes[k].constraint_class] = number(row.measured[k].order);
   json["reversal_defect"] = number(row.reversal_defect);
@@ -88,11 +84,11 @@ void orders(const Options& options, Session& session) {
   if (!options.out.empty()) {
     replace_file(options.out, explanation + table);
   }
-  nlohmann::ordered_json json{{"orders", nlohmann::json::array()}};
+  Json json{{"orders", Json::array()}};
   for (const OrderTableRow& row : rows) json["orders"].push_back(as_json(row, scenes));
-  json["rules"] = nlohmann::json::array();
+  json["rules"] = Json::array();
   for (const RuleRow& row : rules) json["rules"].push_back(as_json(row));
-  json["circuits"] = nlohmann::json::array();
+  json["circuits"] = Json::array();
   for (const CircuitRow& row : circuits)
     json["circuits"].push_back({{"method", row.method},
                                 {"order", row.order},

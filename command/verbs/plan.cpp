@@ -6,10 +6,10 @@
 #include <diracstep/command/variable_steps.hpp>
 #include <diracstep/command/verbs.hpp>
 #include <diracstep/core/integrator/integrator.hpp>
+#include <diracstep/files/json.hpp>
 #include <diracstep/reports/report.hpp>
 #include <diracstep/scene_format/scene_catalogue.hpp>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <optional>
 
 namespace diracstep::command {
@@ -26,11 +26,11 @@ struct Options {
 };
 
 std::string as_json(const Integrator& integrator, const std::vector<PlanLine>& lines) {
-  nlohmann::ordered_json json;
+  Json json;
   json["scene"] = integrator.scene().name;
   json["method"] = integrator.options().method;
   json["order"] = integrator.options().order;
-  json["plan"] = nlohmann::ordered_json::array();
+  json["plan"] = Json::array();
   for (const PlanLine& line : lines)
     json["plan"].push_back({{"item", line.item}, {"decision", line.decision}, {"reason", line.reason}});
   return json.dump(2) + '\n';

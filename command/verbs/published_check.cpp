@@ -3,16 +3,16 @@
 #include <algorithm>
 #include <diracstep/command/interrupt.hpp>
 #include <diracstep/command/verbs/published_check.hpp>
+#include <diracstep/files/json.hpp>
 #include <diracstep/reports/report.hpp>
 #include <diracstep/validation/references/published_cases.hpp>
-#include <nlohmann/json.hpp>
 
 namespace diracstep::command {
 
 namespace {
 
 std::string as_json(const std::vector<PublishedCase>& cases) {
-  nlohmann::ordered_json json{{"cases", nlohmann::json::array()}};
+  Json json{{"cases", Json::array()}};
   for (const PublishedCase& one : cases)
     json["cases"].push_back({{"scene", one.scene},
                              {"method", one.run.method},

@@ -62,7 +62,7 @@ StepGrid fitted_steps(const CatalogueScene& entry, double end, double step, cons
     throw Misuse(fmt::format("{} steps of {:g} lead to t = {:g}; --max-steps allows {}", grid.steps,
                              grid.step, end, most));
   if (std::abs(grid.step - step) > 1e-9 * std::abs(step))
-    say(fmt::format("step {:g} adjusted to {:.17g}, so that {} steps end at t = {:g}", step, grid.step,
+    say(fmt::format("step {:g} adjusted to {:.10g}, so that {} steps end at t = {:g}", step, grid.step,
                     grid.steps, end));
   return grid;
 }
@@ -89,6 +89,8 @@ void require_sense(const Options& options) {
   if (!options.at.empty() && !options.adaptive) throw Misuse("--at needs --adaptive");
   if (options.fixed && options.adaptive) throw Misuse("--fixed and --adaptive exclude each other");
   require_limits(options);
+  if (options.out == standard_output && (options.json || checkpoints))
+    throw Misuse("--out - gives standard output to the points: --json, --checkpoint and --resume exclude it");
   if (options.doubt != "report" && options.doubt != "ignore")
     throw Misuse(fmt::format("--doubt: '{}' is not one of report, ignore", options.doubt));
   if (options.checkpoint_every < 0)
@@ -114,7 +116,7 @@ void require_files(const Options& options, const Session& session) {
   std::vector<NamedPath> inputs, outputs;
   if (options.scene.ends_with(".toml")) inputs.push_back({"the scene", options.scene});
   for (const Plugin& plugin : session.plugins) inputs.push_back({"the plugin", plugin.path()});
-  if (!options.out.empty()) outputs.push_back({"--out", options.out});
+  if (!options.out.empty() && options.out != standard_output) outputs.push_back({"--out", options.out});
   if (const std::string checkpoint = checkpoint_path(options); !checkpoint.empty())
     outputs.push_back({options.checkpoint.empty() ? "--resume" : "--checkpoint", checkpoint});
   if (!options.resume.empty() && !options.out.empty() && same_file(options.resume, options.out))
@@ -177,7 +179,7 @@ void run_variable(const Options& options, const CatalogueScene& entry, AdaptiveI
                                : run_at(integrator, times, result.momentum, keep, &checks);
   result.failure = report.last.failure;
   if (result.failure.empty() && interrupted())
-    result.failure = fmt::format("{} at t = {:.17g}", interruption(), integrator.time());
+    result.failure = fmt::format("{} at t = {:.10g}", interruption(), integrator.time());
   result.work = integrator.work();
   result.doubt = checks.text();
   result.variable =
@@ -189,7 +191,7 @@ void run_variable(const Options& options, const CatalogueScene& entry, AdaptiveI
 void finish(std::optional<TrajectoryFile>& file, const Options& options, RunResult& result) {
   if (!file) return;
   file->close();
-  result.out = options.out;
+  result.out = options.out == standard_output ? "standard output" : options.out;
   result.lines = file->lines();
   say(fmt::format("{} points written to {}", result.lines, result.out));
 }
@@ -269,7 +271,7 @@ IntegratorOptions take_found(const Options& options, const CatalogueScene& entry
                                     });
   result.failure = again.last.failure;
   if (result.failure.empty() && interrupted())
-    result.failure = fmt::format("{} at t = {:.17g}", interruption(), result.end.time);
+    result.failure = fmt::format("{} at t = {:.10g}", interruption(), result.end.time);
   finish(file, options, result);
   return used;
 }
@@ -299,10 +301,10 @@ void compare_invariants(const Options& options, const CatalogueScene& entry, Run
 
 void report(const RunResult& result, const Options& options, const CatalogueScene& entry,
             const IntegratorOptions& used, Session& session) {
-  if (options.json)
-    print(run_json(result, entry, used));
-  else if (result.out.empty())
-    print(run_text(result, entry, used));
+  if (options.out == standard_output)  // which belongs to the points
+    say("the run whose points went to standard output:\n" + run_text(result, entry, used));
+  else if (options.json || result.out.empty() || output_is_open())  // with a file the summary is an extra
+    print(options.json ? run_json(result, entry, used) : run_text(result, entry, used));
   if (!result.doubt.empty()) say(result.doubt);
   if (!result.doubt.empty() && options.doubt == "report") session.exit_status = doubted;
   if (result.failure.empty()) return;
@@ -356,7 +358,8 @@ void add_run(CLI::App& app, Session& session) {
   verb->add_option("--momentum", options->momentum,
                    "Representative of the momentum: plus, minus or projected")
       ->capture_default_str();
-  verb->add_option("--out", options->out, "CSV file for the trajectory")->type_name("FILE");
+  verb->add_option("--out", options->out, "CSV file for the trajectory; - is standard output")
+      ->type_name("FILE");
   verb->add_option("--every", options->every, "Keep each K-th point")->type_name("K")->capture_default_str();
   verb->add_option("--substeps", options->substeps,
                    "Take a step that cannot be solved in 2, 4, … up to N smaller ones")

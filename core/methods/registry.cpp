@@ -5,6 +5,7 @@
 #include <diracstep/core/methods/quadrature.hpp>
 #include <diracstep/core/methods/registry.hpp>
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/numerics/near_names.hpp>
 #include <optional>
 #include <utility>
 
@@ -110,17 +111,20 @@ void Registry::add_rule(const StepRule& rule) {
 StepRule Registry::rule(std::string_view wanted) const {
   const auto found = std::ranges::find(rules_, wanted, &StepRule::name);
   if (found != rules_.end()) return *found;
+  std::vector<std::string> names;
+  for (const StepRule& known : rules_) names.emplace_back(name(known));
   std::string message = "unknown constraint rule '";
-  message.append(wanted).append("'; the rules are");
-  for (const StepRule& known : rules_) message.append(" ").append(name(known));
+  message.append(wanted).append("'").append(did_you_mean(wanted, names)).append("; the rules are");
+  for (const std::string& known : names) message.append(" ").append(known);
   throw Misuse(message);
 }
 
 Method Registry::transformed(const std::string& name) const {
   Transform transform;
   if (!parse_transform(name, transform)) {
-    std::string message = "unknown method '" + name + "'; the methods are";
-    for (const std::string& known : names()) message += " " + known;
+    const std::vector<std::string> known = names();
+    std::string message = "unknown method '" + name + "'" + did_you_mean(name, known) + "; the methods are";
+    for (const std::string& each : known) message += " " + each;
     throw Misuse(message + " typeN/gl:S typeN/adjoint(...)");
   }
   const Method inner = method(transform.inner);

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/numerics/row_scales.hpp>
 #include <diracstep/core/system/consistent_start.hpp>
 #include <diracstep/core/system/constraint_distribution.hpp>
 #include <diracstep/core/system/hidden_rows.hpp>
@@ -27,7 +28,8 @@ class NearestPointProblem final : public NonlinearProblem {
         n_(static_cast<int>(given.size())),
         m_(rows_.rows()),
         pattern_(SparsityPattern::dense(n_ + m_, n_ + m_)),
-        residual_blocks_{{"distance", n_, 1.0 + given.lpNorm<Eigen::Infinity>()}, {"constraint", m_, 1.0}} {}
+        residual_blocks_{{"distance", n_, scale_of(max_norm(given))}, {"constraint", m_, smallest_scale}},
+        row_scales_(m_) {}
 
   int size() const override { return n_ + m_; }
   const SparsityPattern& pattern() const override { return pattern_; }
@@ -38,6 +40,7 @@ class NearestPointProblem final : public NonlinearProblem {
     f.head(n_) = x.head(n_) - given_;
     rows_.add_annihilator(x.tail(m_), f.head(n_));
     for (const int i : held_) f[i] = x[i] - given_[i];
+    raise_scales(x);
     int row = n_;
     for (const auto& block : blocks_) {
       block->position(t_, x.head(n_), f.segment(row, block->rows()));
@@ -70,6 +73,22 @@ class NearestPointProblem final : public NonlinearProblem {
   }
 
  private:
+  /// The scales cover the terms at x: positions, and rows times positions.
+  void raise_scales(ConstVectorRef x) {
+    ResidualBlock &distance = residual_blocks_[0], &constraint = residual_blocks_[1];
+    const double size = max_norm(x.head(n_));
+    if (std::isfinite(size)) distance.scale = std::max(distance.scale, scale_of(size));
+    Vector forms = Vector::Zero(m_), sizes = forms;
+    rows_.pattern().for_each([&](Eigen::Index e, int r, int c) {
+      forms[r] = std::max(forms[r], std::abs(rows_.coefficients()[e]));
+      sizes[r] = std::max({sizes[r], std::abs(x[c]), std::abs(given_[c])});
+    });
+    row_scales_.terms = row_scales_.terms.cwiseMax(forms.cwiseProduct(sizes));
+    const double largest = max_norm(row_scales_.terms);
+    if (std::isfinite(largest)) constraint.scale = std::max(constraint.scale, scale_of(largest));
+    row_scales_.give_to(constraint);
+  }
+
   ConstraintBlocks blocks_;
   std::vector<int> held_;
   ConstraintsAtPoint rows_;
@@ -78,6 +97,7 @@ class NearestPointProblem final : public NonlinearProblem {
   int n_, m_;
   SparsityPattern pattern_;
   std::vector<ResidualBlock> residual_blocks_;
+  RowScales row_scales_;
 };
 
 [[noreturn]] void throw_not_found(const Scene& scene, const char* what, const SolveReport& report) {
@@ -131,6 +151,15 @@ std::shared_ptr<const Scene> independent(std::shared_ptr<const Scene> scene, con
   for (const int r : dependent_columns(full_one_forms(rows, held), rank_tolerance))
     left.push_back(names[static_cast<std::size_t>(r)]);
   return left.empty() ? scene : without_rows(*scene, left);
+}
+
+/// Throws Misuse before memory is taken: the matrices of a projection are full.
+void require_few_unknowns(const Scene& scene) {
+  constexpr int most = 10000;
+  if (scene.dimension() + scene.rows() > most)
+    throw Misuse("scene '" + scene.name + "': the start cannot be projected: it has " +
+                 std::to_string(scene.dimension()) + " coordinates and " + std::to_string(scene.rows()) +
+                 " rows, and at most " + std::to_string(most) + " together are looked through");
 }
 
 /// The nearest point of the holonomic rows that differs in guesses alone.  Rows that these cannot move, or
@@ -191,6 +220,7 @@ ConsistentStart project_start(const Scene& given, const Start& given_start, cons
   const Start& start = complete->start;
   require_size("the start q", start.q.size(), scene.storage_size());
   require_size("the start v", start.v.size(), scene.dimension());
+  require_few_unknowns(scene);
   ConsistentStart result{start, 0.0, 0.0};
   const Eigen::Index n = start.q.size();
   result.start.q = nearest_position(scene, start, guesses, solvers);

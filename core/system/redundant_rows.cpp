@@ -3,6 +3,7 @@
 #include <Eigen/SparseCholesky>
 #include <algorithm>
 #include <cmath>
+#include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/system/redundant_rows.hpp>
 #include <optional>
 #include <set>
@@ -105,9 +106,23 @@ Eigen::SparseMatrix<double> sparse_one_forms(const ConstraintsAtPoint& rows) {
   return one_forms;
 }
 
+/// Throws Misuse before memory is taken where the Gram matrix would be too large: each coordinate fills the
+/// products of all rows that it is in.
+void require_few_products(const Eigen::SparseMatrix<double>& one_forms) {
+  constexpr double most = 5e7;
+  Vector rows = Vector::Zero(one_forms.rows());
+  for (Eigen::Index c = 0; c < one_forms.outerSize(); ++c)
+    for (Eigen::SparseMatrix<double>::InnerIterator entry(one_forms, c); entry; ++entry)
+      rows[entry.row()] += 1.0;
+  if (rows.squaredNorm() > most)
+    throw Misuse("too many rows share a coordinate, " + std::to_string(std::lround(rows.maxCoeff())) +
+                 " of them: whether they depend on each other cannot be found");
+}
+
 /// The pivots of the Gram matrix are squared distances from the columns before.  The shift keeps those that
 /// vanish from dividing, and 1e-12 is what round-off leaves to be told from zero.
 std::vector<int> dependent_sparse_columns(const Eigen::SparseMatrix<double>& one_forms, double tolerance) {
+  require_few_products(one_forms);
   const Eigen::SparseMatrix<double> products = one_forms.transpose() * one_forms;
   Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factors;
   factors.setShift(1e-14);
@@ -120,9 +135,46 @@ std::vector<int> dependent_sparse_columns(const Eigen::SparseMatrix<double>& one
   return dependent;
 }
 
+/// The same, with a part of the columns at a time beside those found independent before: where there are more
+/// than coordinates, most of them depend on others.
+std::vector<int> dependent_in_parts(const Eigen::SparseMatrix<double>& one_forms, double tolerance) {
+  const int part = std::max(static_cast<int>(one_forms.rows()), max_rows_in_full);
+  const int count = static_cast<int>(one_forms.cols());
+  std::vector<int> independent, dependent;
+  for (int first = 0; first < count; first += part) {
+    std::vector<int> columns = independent;
+    for (int c = first; c < std::min(first + part, count); ++c) columns.push_back(c);
+    Eigen::SparseMatrix<double> chosen(one_forms.rows(), static_cast<Eigen::Index>(columns.size()));
+    for (std::size_t k = 0; k < columns.size(); ++k)
+      chosen.col(static_cast<Eigen::Index>(k)) = one_forms.col(columns[k]);
+    std::vector<bool> left_out(columns.size(), false);
+    for (const int k : dependent_sparse_columns(chosen, tolerance)) {
+      left_out[static_cast<std::size_t>(k)] = true;
+      dependent.push_back(columns[static_cast<std::size_t>(k)]);
+    }
+    independent.clear();
+    for (std::size_t k = 0; k < columns.size(); ++k)
+      if (!left_out[k]) independent.push_back(columns[k]);
+  }
+  return dependent;
+}
+
 /// Poses around the start fulfil the rows to about 1e-10, and what depends on others there does so to as
 /// much.
 constexpr double pose_tolerance = 1e-7;
+
+/// Where motions cross at the start, poses around it are farther than this from being singular; where rows
+/// touch, poses are found to the square root of round-off only, and seem regular by so much.
+constexpr double crossing = 1e-3;
+
+/// A start moved by this part of its size in all coordinates.
+Vector moved(const Start& start, double distance) {
+  const double size = std::max(start.q.lpNorm<Eigen::Infinity>(), 1e-2);
+  Vector q = start.q;
+  for (Eigen::Index i = 0; i < q.size(); ++i)
+    q[i] += distance * size * std::sin(1.0 + 1.7 * static_cast<double>(i));
+  return q;
+}
 
 /// One-forms at the start, and at poses around it that the rows allow.
 std::vector<Columns> one_forms_around(const Scene& scene, const Start& start) {
@@ -133,12 +185,8 @@ std::vector<Columns> one_forms_around(const Scene& scene, const Start& start) {
   };
   std::vector<Columns> all{at(start.q)};
   const ConstraintBlocks holonomic = only_holonomic(scene.constraints);
-  const double size = std::max(start.q.lpNorm<Eigen::Infinity>(), 1e-2);
   for (const double distance : {-0.3, -0.1, 0.1, 0.3}) {
-    Vector q = start.q;
-    for (Eigen::Index i = 0; i < q.size(); ++i)
-      q[i] += distance * size * std::sin(1.0 + 1.7 * static_cast<double>(i));
-    const auto pose = pose_near(holonomic, start.time, q, {});
+    const auto pose = pose_near(holonomic, start.time, moved(start, distance), {});
     if (!pose) continue;
     if (Columns there = at(*pose); there.allFinite()) all.push_back(std::move(there));
   }
@@ -172,6 +220,38 @@ std::vector<int> best_choice(std::vector<int> at_start, const std::vector<Column
     at_start = std::move(other);
   }
   return at_start;
+}
+
+/// How far the rows of these blocks are from zero, in parts of their one-forms times the size of the pose.
+double distance_from(const ConstraintBlocks& holonomic, double t, const Vector& q) {
+  double largest = 0.0;
+  for (const auto& block : holonomic) {
+    Vector phi(block->rows()), a(block->pattern().nonzeros()), b(block->rows());
+    block->position(t, q, phi);
+    block->coefficients(t, q, a, b);
+    const double size = a.lpNorm<Eigen::Infinity>() * q.lpNorm<Eigen::Infinity>();
+    largest = std::max(largest, phi.lpNorm<Eigen::Infinity>() / size);
+  }
+  return largest;
+}
+
+/// Whether all poses found around the start that the other rows allow break the holonomic ones of these
+/// names.
+bool broken_by_the_others(const Scene& scene, const Start& start, const std::vector<std::string>& dependent) {
+  constexpr double met = 1e-7;
+  const ConstraintBlocks others = only_holonomic(without_rows(scene, dependent)->constraints);
+  std::vector<std::string> kept = scene.row_names();
+  std::erase_if(
+      kept, [&](const std::string& name) { return std::ranges::find(dependent, name) != dependent.end(); });
+  const ConstraintBlocks these = only_holonomic(without_rows(scene, kept)->constraints);
+  bool any = false;
+  for (const double distance : {-0.1, -0.03, -0.01, 0.01, 0.03, 0.1}) {
+    const auto pose = pose_near(others, start.time, moved(start, distance), {});
+    if (!pose) continue;
+    if (distance_from(these, start.time, *pose) <= met) return false;
+    any = true;
+  }
+  return any;
 }
 
 }  // namespace
@@ -225,7 +305,7 @@ std::vector<std::string> redundant_rows(const Scene& scene, const Start& start, 
   rows.evaluate(start.time, start.q);
   const bool full = scene.rows() <= max_rows_in_full;
   std::vector<int> numbers = full ? dependent_columns(full_one_forms(rows), tolerance)
-                                  : dependent_sparse_columns(sparse_one_forms(rows), tolerance);
+                                  : dependent_in_parts(sparse_one_forms(rows), tolerance);
   if (numbers.empty()) return {};
   if (full) numbers = best_choice(std::move(numbers), one_forms_around(scene, start), tolerance);
   const std::vector<std::string> names = scene.row_names();
@@ -235,14 +315,32 @@ std::vector<std::string> redundant_rows(const Scene& scene, const Start& start, 
   return dependent;
 }
 
-bool singular_at_start_only(const Scene& scene, const Start& start, double tolerance) {
-  if (scene.rows() == 0 || scene.rows() > max_rows_in_full) return false;
+RowDependence row_dependence(const Scene& scene, const Start& start,
+                             const std::vector<std::string>& dependent, double tolerance) {
+  if (scene.rows() == 0 || scene.rows() > max_rows_in_full) return RowDependence::lasting;
   const std::vector<Columns> poses = one_forms_around(scene, start);
   const std::size_t here = dependent_columns(poses[0], tolerance).size();
   // All poses: one that was found from afar may lie on another branch of the rows, of another rank.
-  return poses.size() > 1 && std::all_of(poses.begin() + 1, poses.end(), [&](const Columns& there) {
-           return dependent_columns(there, std::max(tolerance, pose_tolerance)).size() < here;
-         });
+  const bool crosses =
+      poses.size() > 1 && std::all_of(poses.begin() + 1, poses.end(), [&](const Columns& there) {
+        return dependent_columns(there, std::max(tolerance, crossing)).size() < here;
+      });
+  if (crosses) return RowDependence::at_start_only;
+  return broken_by_the_others(scene, start, dependent) ? RowDependence::touching : RowDependence::lasting;
+}
+
+const char* why_not_left_out(RowDependence dependence) {
+  switch (dependence) {
+    case RowDependence::at_start_only:
+      return "not so at poses near it: the start is singular, move it";
+    case RowDependence::touching:
+      return "they only touch the others there, and without them other motions are possible: say what they "
+             "mean "
+             "by rows of another form";
+    case RowDependence::lasting:
+      break;
+  }
+  return "";
 }
 
 std::shared_ptr<const Scene> without_rows(const Scene& scene, const std::vector<std::string>& names) {

@@ -97,7 +97,7 @@ class RowsAlongMotions final : public ConstraintRows {
     for (int k = 0; k < w.cols(); ++k)
       for (int i = 0; i < w.rows(); ++i)
         if (w(i, k) != 0.0) entries.emplace_back(i, k);
-    return {static_cast<int>(w.rows()), static_cast<int>(w.cols()), std::move(entries)};
+    return {static_cast<int>(w.rows()), static_cast<int>(w.cols()), entries};
   }
   static SparsityPattern union_of(const Scene& scene, const Columns& w, const PatternProduct& by_lagrangian,
                                   const PatternProduct& by_force, BlockPattern* layout) {

@@ -35,6 +35,15 @@ DIRACSTEP_XML="$work/xml" DIRACSTEP_STATIC="$work/static" \
   sphinx-build -q -W -n --keep-going -c "$site" -d "$work/doctrees" "$work/source" "$out"
 rm -rf "$work"
 
+# Debian's Furo takes the rules of normalize.css from the web server's root: here they stand in its own style sheet.
+normalize="${DIRACSTEP_NORMALIZE:-/usr/share/javascript/normalize.css/normalize.css}"
+furo="$out/_static/styles/furo.css"
+if grep -q '^@import url(/javascript/normalize' "$furo"; then
+  { cat "$normalize" && sed 's|^@import url(/javascript/normalize[^;]*;||' "$furo"; } >"$furo.new"
+  mv "$furo.new" "$furo"
+fi
+python3 "$site/excerpts.py" "$out"
+
 # Debian's furo.js imports its second script as a module does, but no page loads it as one: both as one file.
 scripts="$out/_static/scripts"
 if grep -q '^import Gumshoe' "$scripts/furo.js"; then

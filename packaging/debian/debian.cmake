@@ -76,11 +76,5 @@ install(DIRECTORY ${PROJECT_SOURCE_DIR}/python/diracstep DESTINATION lib/python3
         FILES_MATCHING PATTERN "*.py" PATTERN "py.typed" PATTERN "__pycache__" EXCLUDE)
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/examples/notebooks DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/python3-diracstep
         COMPONENT python)
-install(DIRECTORY ${PROJECT_SOURCE_DIR}/examples DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/libdiracstep-dev
-        COMPONENT development PATTERN notebooks EXCLUDE)
-set(documents ${CMAKE_INSTALL_DATADIR}/doc/diracstep)
-install(FILES ${PROJECT_SOURCE_DIR}/README.md ${PROJECT_BINARY_DIR}/changelog.gz DESTINATION ${documents}
-        COMPONENT command)
-install(FILES ${PROJECT_SOURCE_DIR}/core/README.md DESTINATION ${documents}/core COMPONENT command)
-install(DIRECTORY ${PROJECT_SOURCE_DIR}/docs ${PROJECT_SOURCE_DIR}/scenes DESTINATION ${documents} COMPONENT command)
+install(FILES ${PROJECT_BINARY_DIR}/changelog.gz DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/diracstep COMPONENT command)
 include(CPack)

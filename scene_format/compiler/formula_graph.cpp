@@ -195,8 +195,9 @@ std::vector<Node> FormulaGraph::reachable(std::span<const Node> roots, bool with
     if (std::exchange(last, searches_) != searches_) nodes.push_back(node);
   };
   for (const Node root : roots) reach(root);
-  for (std::size_t next = 0; next < nodes.size(); ++next) {
-    const NodeData& data = (*this)[nodes[next]];
+  std::size_t next = 0;
+  while (next < nodes.size()) {  // which grows
+    const NodeData& data = (*this)[nodes[next++]];
     if (arity(data.op) >= 1) reach(data.a);
     const bool index =
         with_indices && (data.op == Op::element || data.op == Op::coordinate) && data.b != none;

@@ -2,6 +2,7 @@
 #include <array>
 #include <diracstep/scene_format/compiler/formula_parser.hpp>
 #include <numbers>
+#include <ranges>
 #include <stdexcept>
 
 namespace diracstep::scene_compiler {
@@ -155,8 +156,8 @@ class FormulaParser::Reader : FormulaScanner {
   Node named(std::size_t place, const std::string& name) {
     if (peek() == '(') return call(place, name);
     if (name == "pi") return graph_.number(std::numbers::pi);
-    for (auto loop = context_.loops.rbegin(); loop != context_.loops.rend(); ++loop)
-      if (symbols_.loops[static_cast<std::size_t>(*loop)].variable == name) return graph_.loop_index(*loop);
+    for (const int loop : std::views::reverse(context_.loops))
+      if (symbols_.loops[static_cast<std::size_t>(loop)].variable == name) return graph_.loop_index(loop);
     if (name == "t") {
       if (!context_.time) fail(place, "the time t may not stand in " + context_.what);
       return graph_.time();
@@ -288,7 +289,7 @@ class FormulaParser::Reader : FormulaScanner {
     Node node = expression();
     expect(')', "')'");
     context_.loops = outside;
-    for (auto id = loops.rbegin(); id != loops.rend(); ++id) node = located(graph_.sum(node, *id), place);
+    for (const int id : std::views::reverse(loops)) node = located(graph_.sum(node, id), place);
     return node;
   }
 
@@ -366,7 +367,7 @@ Node FormulaParser::equation(const FormulaText& text, const Context& context) {
   return Reader(*this, text, context).whole_equation();
 }
 
-std::vector<int> FormulaParser::loops(const FormulaText& text, Context context) {
+std::vector<int> FormulaParser::loops(const FormulaText& text, const Context& context) {
   return Reader(*this, text, context).whole_loops();
 }
 

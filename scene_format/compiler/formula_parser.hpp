@@ -83,7 +83,7 @@ class FormulaParser {
   /// Left side minus right side of "a = b".
   Node equation(const FormulaText& text, const Context& context);
   /// "i = 1..N, j = 1..i-1": adds the loops to the symbols and returns their numbers.
-  std::vector<int> loops(const FormulaText& text, Context context);
+  std::vector<int> loops(const FormulaText& text, const Context& context);
   /// A coordinate, velocity or momentum: "x", "v_x[N]".
   Node coordinate(const FormulaText& text, const Context& context);
 

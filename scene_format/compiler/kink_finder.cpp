@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <diracstep/scene_format/compiler/kink_finder.hpp>
+#include <ranges>
 
 namespace diracstep::scene_compiler {
 
@@ -129,13 +130,13 @@ bool KinkFinder::holds(Node root, Op op, Role role) const {
 std::vector<int> KinkFinder::loops_of(Node root, const std::vector<int>& loops) const {
   std::vector<Node> roots{root};
   std::vector<int> kept;
-  for (auto loop = loops.rbegin(); loop != loops.rend(); ++loop) {
+  for (const int loop : std::views::reverse(loops)) {
     const bool held = std::ranges::any_of(graph_.reachable(roots, true), [&](Node node) {
-      return graph_[node].op == Op::loop_index && graph_[node].a == *loop;
+      return graph_[node].op == Op::loop_index && graph_[node].a == loop;
     });
     if (!held) continue;
-    kept.insert(kept.begin(), *loop);
-    const Loop& range = program_.symbols.loops[static_cast<std::size_t>(*loop)];
+    kept.insert(kept.begin(), loop);
+    const Loop& range = program_.symbols.loops[static_cast<std::size_t>(loop)];
     roots.insert(roots.end(), {range.first, range.last});
   }
   return kept;

@@ -1,6 +1,8 @@
 /// diracstep-scene-compiler OUTPUT_DIRECTORY SCENE.toml…: the scenes that come with the library, as C++
 /// sources. Writes NAME.cpp with the kernels of each, and shipped_scenes.cpp with a table of all kernels and
 /// texts.
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <diracstep/scene_format/compiler/scene_program.hpp>
 #include <exception>
@@ -48,8 +50,9 @@ void compile(const fs::path& directory, const std::vector<fs::path>& scenes) {
     const bool first = kernels.insert(program->name).second;  // two scenes may have the same formulas
     write(directory / (name + ".cpp"), first ? program->source : "// The same formulas as another scene.\n");
     if (first)
-      declarations += "extern \"C\" const CompiledKernel diracstep_kernels_" + program->name + "[];\n";
-    texts += "const unsigned char text_" + name + "[] = {" + as_bytes(text) + "};\n";
+      declarations +=
+          fmt::format("extern \"C\" const CompiledKernel diracstep_kernels_{}[];\n", program->name);
+    texts += fmt::format("const unsigned char text_{}[] = {{{}}};\n", name, as_bytes(text));
     table += "    {\"" + name + "\", text_" + name + ", sizeof text_" + name + " - 1, \"" + program->name +
              "\", diracstep_kernels_" + program->name + "},\n";
   }

@@ -44,8 +44,8 @@ bool PieceBuilder::has_kink(const Piece& piece) const {
   });
 }
 
-void PieceBuilder::add_kernel(Piece& piece, std::vector<Store> stores) {
-  piece.kernels.emplace_back(graph_, std::move(stores), piece.layout, known_, piece.instance);
+void PieceBuilder::add_kernel(Piece& piece, const std::vector<Store>& stores) {
+  piece.kernels.emplace_back(graph_, stores, piece.layout, known_, piece.instance);
 }
 
 void PieceBuilder::add_value(SceneFunction& function, Piece piece) {
@@ -59,7 +59,7 @@ void PieceBuilder::add_outputs(SceneFunction& function, Piece piece) {
   std::vector<Store> values;
   for (std::size_t r = 0; r < piece.outputs.size(); ++r)
     values.push_back({0, Table::slots, piece.layout.slot_count + static_cast<int>(r), piece.outputs[r]});
-  add_kernel(piece, std::move(values));
+  add_kernel(piece, values);
   function.pieces.push_back(std::move(piece));
 }
 
@@ -106,10 +106,10 @@ void PieceBuilder::add_phase(SceneFunction& function, Piece piece) {
   }
   if (!zero(graph_.derivative(piece.outputs, graph_.time())[0])) function.autonomous = false;
   add_kernel(piece, {{0, Table::fixed, 0, piece.outputs[0]}});
-  add_kernel(piece, std::move(gradient));
-  add_kernel(piece, std::move(hessian));
-  add_kernel(piece, std::move(rate));
-  add_kernel(piece, std::move(position_rate));
+  add_kernel(piece, gradient);
+  add_kernel(piece, hessian);
+  add_kernel(piece, rate);
+  add_kernel(piece, position_rate);
   function.pieces.push_back(std::move(piece));
 }
 
@@ -159,11 +159,11 @@ void PieceBuilder::add_rows(SceneFunction& function, Piece piece, const std::vec
       annihilator.push_back({0, Table::positions, static_cast<int>(piece.curvature.size()), by_q[k][l]});
       piece.curvature.emplace_back(k, l);
     }
-  add_kernel(piece, function.holonomic ? std::move(position) : std::vector<Store>{});
-  add_kernel(piece, std::move(coefficients));
-  add_kernel(piece, std::move(derivative));
-  add_kernel(piece, std::move(rate));
-  add_kernel(piece, std::move(annihilator));
+  add_kernel(piece, function.holonomic ? position : std::vector<Store>{});
+  add_kernel(piece, coefficients);
+  add_kernel(piece, derivative);
+  add_kernel(piece, rate);
+  add_kernel(piece, annihilator);
   function.pieces.push_back(std::move(piece));
 }
 
@@ -182,8 +182,8 @@ void PieceBuilder::add_force(SceneFunction& function, Piece piece) {
                          {{0, Table::positions, entry, fq[r][k]}, {1, Table::positions, entry, fv[r][k]}});
     }
   }
-  add_kernel(piece, std::move(value));
-  add_kernel(piece, std::move(derivatives));
+  add_kernel(piece, value);
+  add_kernel(piece, derivatives);
   function.pieces.push_back(std::move(piece));
 }
 

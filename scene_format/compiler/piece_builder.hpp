@@ -29,7 +29,7 @@ class PieceBuilder {
   bool zero(Node node) const { return graph_.is_number(node, 0.0); }
   bool varies(Node node) const { return graph_.known(node) == Known::each_call; }
   bool has_kink(const Piece& piece) const;
-  void add_kernel(Piece& piece, std::vector<Store> stores);
+  void add_kernel(Piece& piece, const std::vector<Store>& stores);
 
   FormulaGraph& graph_;
   Constants& known_;

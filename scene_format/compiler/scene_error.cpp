@@ -1,7 +1,7 @@
 #include <algorithm>
+#include <diracstep/core/numerics/near_names.hpp>
 #include <diracstep/files/shown_text.hpp>
 #include <diracstep/scene_format/compiler/scene_error.hpp>
-#include <numeric>
 
 namespace diracstep::scene_compiler {
 
@@ -16,22 +16,6 @@ std::string with_place(const std::string& file, Place place, const std::string& 
   return text + ": " + message;
 }
 
-/// Levenshtein's distance.
-std::size_t distance(std::string_view a, std::string_view b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  std::iota(row.begin(), row.end(), std::size_t{0});
-  for (std::size_t i = 1; i <= a.size(); ++i) {
-    std::size_t diagonal = row[0];
-    row[0] = i;
-    for (std::size_t j = 1; j <= b.size(); ++j) {
-      const std::size_t replaced = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
-      diagonal = row[j];
-      row[j] = std::min({row[j] + 1, row[j - 1] + 1, replaced});
-    }
-  }
-  return row[b.size()];
-}
-
 }  // namespace
 
 SceneError::SceneError(const std::string& file, Place place, const std::string& message)
@@ -39,11 +23,7 @@ SceneError::SceneError(const std::string& file, Place place, const std::string& 
 
 std::string suggestion(std::string_view name, const std::vector<std::string>& known) {
   if (known.empty()) return "";
-  const std::string_view start = name.substr(0, 64);  // a longer name is near to nothing
-  const auto nearest = std::ranges::min_element(
-      known, {}, [&](const std::string& candidate) { return distance(start, candidate); });
-  if (distance(start, *nearest) <= std::max<std::size_t>(1, name.size() / 3))
-    return "; did you mean '" + *nearest + "'?";
+  if (const std::string near = near_name(name, known); !near.empty()) return "; did you mean '" + near + "'?";
   std::string list = "; known are";
   for (std::size_t i = 0; i < std::min(known.size(), longest_list); ++i) list += ' ' + known[i];
   return known.size() > longest_list ? list + " …" : list;

@@ -54,7 +54,8 @@ std::string found_compiler() {
   for (const std::string& name : names) {
     std::istringstream folders(variable("PATH"));
     for (std::string folder; std::getline(folders, folder, ':');)
-      if (const std::string path = folder + '/' + name; !folder.empty() && is_program(path)) return path;
+      if (std::string path = fmt::format("{}/{}", folder, name); !folder.empty() && is_program(path))
+        return path;
   }
   return "";
 }

@@ -14,7 +14,7 @@ namespace {
 SparsityPattern symmetric_pattern(int n, std::vector<std::pair<int, int>> entries) {
   const std::size_t count = entries.size();
   for (std::size_t k = 0; k < count; ++k) entries.emplace_back(entries[k].second, entries[k].first);
-  return {n, n, std::move(entries)};
+  return {n, n, entries};
 }
 
 /// Member by member: a struct set to zero as a whole costs more than the kernel of a small scene.

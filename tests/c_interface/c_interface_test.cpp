@@ -175,6 +175,43 @@ TEST_F(CInterface, AnErrorOfACallbackIsAFailureAndKeepsTheState) {
   expect_message({"scene 'callbacks'", "lagrangian.value returned error 9"});
 }
 
+/// A particle on a spring of rest length l in the plane, its Lagrangian alone: one problem in three units.
+TEST_F(CInterface, TheUnitOfLengthDoesNotCount) {
+  Vector in_metres;
+  for (const double l : {1.0, 1e-2, 1e-3, 1e6}) {
+    diracstep_function lagrangian{};
+    lagrangian.data = &l;
+    lagrangian.value = [](const void* data, double, const double* x, const double* v, double* f) {
+      const double stretch = std::hypot(x[0], x[1]) - *static_cast<const double*>(data);
+      *f = 0.5 * (v[0] * v[0] + v[1] * v[1]) - 50.0 * stretch * stretch;
+      return 0;
+    };
+    const double q0[] = {1.1 * l, 0.0}, v0[] = {0.0, l};
+    diracstep_scene scene{};
+    scene.name = "spring";
+    scene.dimension = 2;
+    scene.lagrangian = &lagrangian;
+    scene.start_q = q0;
+    scene.start_v = v0;
+    scene.end_time = 5.0;
+    scene.step = 0.05;
+    diracstep_options options{};
+    options.method = "type1/gl:3";
+    ASSERT_EQ(create(&scene, &options), DIRACSTEP_OK) << diracstep_message(made_);
+    ASSERT_EQ(diracstep_step(made_, 100), DIRACSTEP_OK) << diracstep_message(made_);
+    Vector q(2);
+    diracstep_state state{};
+    state.q = q.data();
+    ASSERT_EQ(diracstep_read(made_, DIRACSTEP_PROJECTED, &state), DIRACSTEP_OK);
+    q /= l;
+    if (in_metres.size() == 0) in_metres = q;
+    EXPECT_LT((q - in_metres).lpNorm<Eigen::Infinity>(), 1e-8) << l;
+    EXPECT_NEAR(state.energy / (l * l), 1.0, 1e-5) << l;
+    EXPECT_STREQ(diracstep_doubt(made_), "");
+  }
+}
+
+/// The motion is that of a force of 1e-3; the constant beside it leaves nothing of it in differences.
 TEST_F(CInterface, DifferencesLostInRoundOffAreDoubted) {
   diracstep_function lagrangian{};
   lagrangian.value = [](const void*, double, const double* x, const double* v, double* f) {

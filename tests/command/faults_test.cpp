@@ -31,8 +31,10 @@ class Faults : public Command {
     fs::create_directory(folder());
   }
 
+  /// Without gnuplot and a compiler, which take most of the time and are tried elsewhere.
   static std::string preload(const std::string& kind, const std::string& more) {
-    return "LD_PRELOAD='" DIRACSTEP_FAULTS "/failing_calls.so' DIRACSTEP_FAULT_KIND=" + kind + " " + more;
+    return "PATH=/none LD_PRELOAD='" DIRACSTEP_FAULTS "/failing_calls.so' DIRACSTEP_FAULT_KIND=" + kind +
+           " " + more;
   }
 
   std::string first(const Task& task) const {
@@ -62,6 +64,7 @@ class Faults : public Command {
                                            (lasting ? " DIRACSTEP_FAULT_LASTING=1" : "")));
     ASSERT_TRUE(outcome.status >= 0 && outcome.status <= 2)
         << what << ": status " << outcome.status << outcome.err;
+    if (outcome.status != 0 && fs::is_empty(folder())) return;  // as before the task
     if (!task.checkpoints) {
       const Outcome again = run(task.line);
       ASSERT_EQ(again.status, 0) << what << again.err;
@@ -117,7 +120,7 @@ TEST_F(Faults, OfAStudy_slow) {
                   false,
                   {"out/study.csv", "out/study.json", "out/report.html", "t.md"}};
   fail_everywhere(task, "io", 1);
-  fail_everywhere(task, "memory", 11);
+  fail_everywhere(task, "memory", 23);
 }
 #endif
 

@@ -1,4 +1,7 @@
+#include <algorithm>
+#include <fstream>
 #include <nlohmann/json.hpp>
+#include <string>
 
 #include "run_command.hpp"
 
@@ -18,7 +21,20 @@ TEST_F(GeneralCommand, HelpAndVersionSucceed) {
     EXPECT_EQ(help.status, 0) << verb;
     EXPECT_NE(help.out.find("Example"), std::string::npos) << verb;
     EXPECT_EQ(help.err, "") << verb;
+    EXPECT_EQ(run(std::string("help ") + verb).out, help.out) << verb;
   }
+  expect_misuse("help rnu", {"'rnu'", "did you mean 'run'"});
+}
+
+TEST_F(GeneralCommand, ANameThatIsNearlyKnownIsSuggested) {
+  expect_misuse("stdy", {"unknown verb 'stdy'", "did you mean 'study'"});
+  expect_misuse("run knife_edge --metod x", {"unknown option '--metod'", "did you mean '--method'"});
+  expect_misuse("run knife_edge --metod=x", {"unknown option '--metod'", "did you mean '--method'"});
+  expect_misuse("run knife_egde", {"unknown scene 'knife_egde'", "did you mean 'knife_edge'"});
+  expect_misuse("run knife_edge --method type1/mdpoint", {"did you mean 'type1/midpoint'"});
+  expect_misuse("run knife_edge --rule midpont", {"did you mean 'midpoint'"});
+  expect_misuse("list methds", {"did you mean 'methods'"});
+  EXPECT_EQ(run("plan zzzzzz").err.find("did you mean"), std::string::npos);
 }
 
 TEST_F(GeneralCommand, MisuseListsWhatIsAllowed) {
@@ -39,6 +55,37 @@ TEST_F(GeneralCommand, ListNamesScenesMethodsAndPlugins) {
   EXPECT_EQ(run("list scenes").out.find("type1/midpoint"), std::string::npos);
 }
 
+TEST_F(GeneralCommand, ListsFitTheScreen) {
+  for (const char* list : {"list scenes", "list methods", "list scenes --parameters"})
+    for (const std::string& line : lines(run(list).out)) {
+      const auto columns = std::count_if(line.begin(), line.end(), [](char c) { return (c & 0xC0) != 0x80; });
+      EXPECT_LE(columns, 100) << line;
+    }
+  EXPECT_EQ(run("list scenes").out.find("g_sin_alpha="), std::string::npos);
+  EXPECT_NE(run("list scenes --parameters").out.find("g_sin_alpha="), std::string::npos);
+}
+
+TEST_F(GeneralCommand, ListShowsTheOrdersOfThePublishedTable) {
+  std::ifstream page(DIRACSTEP_SOURCE "/docs/orders.md");
+  std::string row, wanted = "| `type1/gl:4` | 8 |";
+  while (std::getline(page, row) && !row.starts_with(wanted)) {
+  }
+  ASSERT_TRUE(row.starts_with(wanted));
+  const double first = std::stod(row.substr(wanted.size()));
+  const Json methods = Json::parse(run("list methods --json").out)["methods"];
+  int found = 0;
+  for (const Json& method : methods) {
+    if (method["name"] == "type1/gl:6") found += method["order"] == 12;
+    if (method["name"] != "type1/gl:4") continue;
+    ++found;
+    ASSERT_EQ(method["measured_order"].size(), 7u) << method;
+    EXPECT_EQ(method["measured_order"][0]["class"], "unconstrained");
+    EXPECT_EQ(method["measured_order"][0]["slope"], first);
+  }
+  EXPECT_EQ(found, 2);
+  EXPECT_EQ(run("list methods").out.find("--measure"), std::string::npos);
+}
+
 TEST_F(GeneralCommand, ListAsJson) {
   const Json all = Json::parse(run("list --json").out);
   EXPECT_TRUE(all["plugins"].is_array());
@@ -51,7 +98,6 @@ TEST_F(GeneralCommand, ListAsJson) {
     EXPECT_EQ(scene["rows"], Json::array({"blade"}));
   }
   EXPECT_TRUE(found);
-  for (const Json& method : all["methods"]) EXPECT_TRUE(method["measured_order"].is_null());
   EXPECT_FALSE(Json::parse(run("list plugins --json").out).contains("scenes"));
 }
 

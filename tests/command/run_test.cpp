@@ -15,13 +15,27 @@ class RunCommand : public Command {};
 TEST_F(RunCommand, WritesTheTrajectoryAsCsv) {
   const Outcome outcome = run("run knife_edge --step 0.1 --end 1 --out " + path("k.csv"));
   ASSERT_EQ(outcome.status, 0) << outcome.err;
-  EXPECT_EQ(outcome.out, "");
+  EXPECT_EQ(outcome.out, run("run knife_edge --step 0.1 --end 1").out);
   const auto all = lines(contents(path("k.csv")));
   ASSERT_EQ(all.size(), 12u);
   EXPECT_EQ(all[0], "t,x,y,ph,v_x,v_y,v_ph,p_x,p_y,p_ph,lambda_blade,energy");
   for (const auto& line : all) EXPECT_EQ(fields(line).size(), 12u) << line;
   EXPECT_EQ(fields(all[1])[0], "0");
   EXPECT_DOUBLE_EQ(std::stod(fields(all[11])[0]), 1.0);
+}
+
+TEST_F(RunCommand, ADashStandsForStandardOutput) {
+  ASSERT_EQ(run("run knife_edge --step 0.1 --end 1 --out " + path("k.csv")).status, 0);
+  const Outcome outcome = run("run knife_edge --step 0.1 --end 1 --out -");
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_EQ(outcome.out, contents(path("k.csv")));
+  EXPECT_NE(outcome.err.find("largest residual of the constraint rows"), std::string::npos) << outcome.err;
+  std::ofstream(path("all")) << "kept\n";
+  run("run knife_edge --step 0.1 --end 1 --out - >>" + path("all"));
+  EXPECT_EQ(contents(path("all")), "kept\n" + outcome.out);
+  EXPECT_EQ(run("run knife_edge --step 0.1 --end 1 --out - >/dev/full").status, 1);
+  expect_misuse("run knife_edge --out - --json", {"--out -", "--json"});
+  expect_misuse("run knife_edge --out - --checkpoint " + path("c"), {"--out -", "--checkpoint"});
 }
 
 TEST_F(RunCommand, OfALargeSceneTheFirstCoordinatesAndTheLastAreShown) {

@@ -51,6 +51,12 @@ TEST_F(Strangers, NoOutputMeetsAnInputOrAnotherOutput) {
                     path("../" + fs::path(path("c")).parent_path().filename().string() + "/c") + "'",
                 {"--out"});
   expect_misuse("study " + own + " --table '" + path("s.toml") + "'", {"--table", "the scene"});
+  const std::string study = "study knife_edge --methods type1/midpoint --steps 0.2 --repeat 1 --out '";
+  ASSERT_EQ(run(study + path("out") + "'").status, 0);
+  const std::string json = path("out/study.json"), earlier = contents(json);
+  expect_misuse(study + path("out/../out") + "' --compare '" + json + "'", {"--out", "over --compare"});
+  expect_misuse(study + path("out") + "' --table '" + json + "'", {"--out", "over --table"});
+  EXPECT_EQ(contents(json), earlier);
   fs::create_hard_link(path("s.toml"), path("hard"));
   expect_misuse("run " + own + " --out '" + path("hard") + "'", {"--out", "the scene"});
   EXPECT_EQ(contents(path("s.toml")), text);
@@ -81,6 +87,19 @@ TEST_F(Strangers, TwoRunsDoNotWriteOneFile) {
         << second.err;
   }
   EXPECT_FALSE(fs::exists(path("c.lock")));
+}
+
+TEST_F(Strangers, LinksToACheckpointLeadToOneFileAndOneLock) {
+  fs::create_directory(path("far"));
+  for (const char* name : {"a", "b"}) fs::create_symlink("far/c", path(name));
+  const std::string line = "run knife_edge --end 1 --checkpoint '";
+  ASSERT_EQ(run(line + path("a") + "'").status, 0);
+  EXPECT_TRUE(fs::is_symlink(path("a"))) << "the link was replaced, not what it leads to";
+  EXPECT_TRUE(fs::is_regular_file(path("far/c")));
+  const std::string held = "flock -x '" + path("far/c.lock") + "'";
+  const Outcome outcome = run(line + path("b") + "'", held);
+  EXPECT_EQ(outcome.status, 2);
+  EXPECT_NE(outcome.err.find("under way"), std::string::npos) << outcome.err;
 }
 
 TEST_F(Strangers, ALinkInTheWayOfACheckpointIsNotFollowed) {
@@ -192,7 +211,9 @@ TEST_F(Strangers, SmallFilesOfLargeSystemsAreRefusedAtOnce) {
       "run " + scene("outer.toml", "v_x^2/2 - sum(i = 1..100000, j = 1..100000, k = 1..0, x)"),
       {"repeated elements"});
 
-  write("large.toml", std::string(17'000'000, '#'));
+  std::string large;
+  large.resize(17'000'000, '#');
+  write("large.toml", large);
   expect_refused_at_once("run '" + path("large.toml") + "'", {"16000000 bytes"});
 }
 
@@ -226,6 +247,19 @@ TEST_F(Strangers, ManyRowsLoadInATimeThatGrowsWithTheirNumber) {
   };
   const double few = seconds(5000), many = seconds(40000);
   EXPECT_LT(many, 8.0 * 4.0 * few) << "quadratic: 64 times";
+}
+
+TEST_F(Strangers, ManyRowsOfOneCoordinateAreRefusedAtOnce) {
+  std::string rows;
+  for (int k = 0; k < 20000; ++k) rows += "[[rows]]\nequation = \"x = 1\"\n";
+  const std::string limited = "ulimit -v 4000000; DIRACSTEP_CC=none";
+  const std::string own = scene("rows.toml", "v_x^2/2", rows);
+  const auto begin = std::chrono::steady_clock::now();
+  const Outcome refused = run("run " + own, limited);
+  EXPECT_EQ(refused.status, 2);
+  EXPECT_NE(refused.err.find("and 19949 more; remove them"), std::string::npos) << refused.err.substr(0, 500);
+  EXPECT_EQ(run("run " + own + " --drop-redundant", limited).status, 0);
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(30));
 }
 
 // Strangers' text.

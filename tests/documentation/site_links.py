@@ -2,6 +2,7 @@
 """site_links.py SITE: every local link and picture of the built site exists, with its anchor, and nothing is fetched from a network."""
 import html.parser
 import pathlib
+import re
 import sys
 import urllib.parse
 
@@ -37,5 +38,14 @@ for path, page in pages.items():
             faults.append(f"{path}: dead link {target}")
         elif file in pages and urllib.parse.unquote(place.fragment) not in pages[file].anchors:
             faults.append(f"{path}: no such place {target}")
+for sheet in site.rglob("*.css"):  # what a style sheet takes in beside the pages: fonts, other sheets
+    for target in re.findall(r"""url\(\s*["']?([^"')]+)""", sheet.read_text(encoding="utf-8")):
+        place = urllib.parse.urlparse(target)
+        if place.scheme == "data":
+            continue
+        if place.scheme or target.startswith("/"):
+            faults.append(f"{sheet}: fetches {target}")
+        elif not (sheet.parent / urllib.parse.unquote(place.path)).exists():
+            faults.append(f"{sheet}: lacks {target}")
 print(f"{len(pages)} pages, {count} links")
 sys.exit("\n".join(faults) or (0 if count > 1000 else "hardly any links: is this the site?"))

@@ -1,14 +1,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <deque>
-#include <diracstep/core/runs/run.hpp>
-#include <diracstep/plugins/callback_scene.hpp>
 #include <diracstep/plugins/differences.hpp>
-#include <diracstep/scene_format/scene_catalogue.hpp>
-#include <diracstep/solvers/kinsol_solver.hpp>
 
-/// A scene given by values alone moves alike in all units: derivatives by differences follow the coordinates.
+/// Derivatives by differences follow the scales of the variables.
 namespace diracstep::testing {
 namespace {
 

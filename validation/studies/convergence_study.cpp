@@ -6,6 +6,7 @@
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/runs/run.hpp>
 #include <diracstep/plugins/callback_error.hpp>
+#include <diracstep/validation/studies/converged_reference.hpp>
 #include <diracstep/validation/studies/convergence_study.hpp>
 #include <diracstep/validation/studies/formulation_choice.hpp>
 #include <diracstep/validation/studies/work_precision.hpp>
@@ -22,8 +23,12 @@ constexpr int plateau_length = 2;         // refinements in vain that end a ladd
 constexpr double usual_ladder = 12.0;     // rows, for the progress only
 constexpr std::size_t longest_ladder = 40;
 constexpr double fewest_steps = 2.0;
-constexpr double natural_eps = 1.0;       // radians of the coarsest variable step
-constexpr double smallest_error = 1e-17;  // an error of zero has no logarithm
+constexpr double natural_eps = 1.0;                   // radians of the coarsest variable step
+constexpr double smallest_error = 1e-17;              // an error of zero has no logarithm
+constexpr long most_steps_in_limited_time = 200'000;  // of a baseline: some tenths of a second
+constexpr double near_the_reference = 3.0;    // times its own error: what is smaller shows the reference's
+constexpr double of_a_share = 0.03;           // of a ladder's time, for a run that compares formulations
+constexpr double ladders_of_baselines = 3.0;  // times the length of one of ours
 
 struct Interrupted {};
 
@@ -41,18 +46,20 @@ class StudyInProgress {
     study_.momentum = options.momentum;
     natural_step_ = std::copysign(scene.natural_step, study_.t_end - study_.t_start);
     require_options();
-    for (const auto& method : options_.methods)
-      for (const int order : orders_of(method)) {
-        series_.push_back(chosen(method, order));
-        if (options.adaptive) series_.push_back(series_.back().with_variable_steps());
-      }
+    for (const auto& [method, order] : options_.series) add(chosen(method, order));
+    if (options_.series.empty())
+      for (const auto& method : options_.methods)
+        for (const int order : orders_of(method)) add(chosen(method, order));
+    if (!options_.series.empty())
+      std::erase_if(series_, [&](const Series& s) { return !refusal(s).empty(); });
     require_one_that_fits();
   }
 
   Study run() {
+    begin_ = thread_seconds();
     try {
       look(0.0, "reference");
-      reference_ = reference_end(entry_, study_.t_end);
+      reference_ = reference();
       study_.reference_kind = reference_.kind;
       study_.reference_how = reference_.how;
       study_.reference_error = reference_.self_error;
@@ -77,8 +84,30 @@ class StudyInProgress {
     Series with_variable_steps() const { return {method, order, true}; }
   };
 
+  void add(const Series& series) {
+    series_.push_back(series);
+    if (options_.adaptive) series_.push_back(series.with_variable_steps());
+  }
+
+  ReferenceEnd reference() const {
+    if (auto known = known_point(entry_, study_.t_end)) return *std::move(known);
+    ReferenceEnd ours =
+        converged_reference(entry_, registry_, solvers_, study_.t_end, options_.reference_budget,
+                            [&] { look(0.0, "a converged reference"); });
+    return ours.missing.empty() ? ours : reference_end(entry_, study_.t_end);
+  }
+
+  /// CPU seconds that the ladder which begins now may take: an even share of what is left.
+  double share_of_time() const {
+    const double left = options_.time_limit - (thread_seconds() - begin_);
+    const double ladders = static_cast<double>(series_.size() - series_done_) +
+                           (series_done_ < series_.size() ? ladders_of_baselines : 1.0);
+    return left / ladders;
+  }
+
   void require_options() const {
-    if (options_.methods.empty()) throw Misuse("a study needs at least one method");
+    if (options_.methods.empty() && options_.series.empty())
+      throw Misuse("a study needs at least one method");
     if (options_.repeats < 1) throw Misuse(fmt::format("repeat = {}; 1 or more is needed", options_.repeats));
     if (!(options_.run_budget > 0.0))
       throw Misuse(fmt::format("the budget of a run is {} s; a time above 0 is needed", options_.run_budget));
@@ -104,16 +133,23 @@ class StudyInProgress {
     return options_.orders.empty() ? possible_orders(known.info) : options_.orders;
   }
 
+  /// Empty, or why the scene does not take a method at an order.
+  std::string refusal(const Series& series) const {
+    try {
+      (void)integrator(series, natural_step_);
+      return {};
+    } catch (const Misuse& misuse) {
+      return misuse.what();
+    }
+  }
+
   /// A method or order that fits nothing is a mistake; one of several that does not fit becomes a row.
   void require_one_that_fits() const {
-    std::string reason;
+    std::string reason = series_.empty() ? "none of the methods fits the scene" : "";
     for (const Series& series : series_) {
-      try {
-        (void)integrator(series, natural_step_);
-        return;
-      } catch (const Misuse& misuse) {
-        if (reason.empty()) reason = misuse.what();
-      }
+      const std::string why = refusal(series);
+      if (why.empty()) return;
+      if (reason.empty()) reason = why;
     }
     throw Misuse(reason);
   }
@@ -178,14 +214,18 @@ class StudyInProgress {
   std::string climb(const Series& series) {
     const double factor = series.order > 4 ? std::sqrt(2.0) : 2.0;
     const std::size_t first = study_.rows.size();
-    const double start = series.variable ? natural_eps : natural_step_;
+    const double start = series.variable ? natural_eps : natural_step_, time = share_of_time();
+    const double begin = thread_seconds();
     const StudyRow natural = run_row(series, start, 0.0);
     if (!series.variable) coarsen(series, factor, natural.error());
     double cpu_seconds = natural.cpu_seconds.median, best = natural.error();
     int in_vain = 0;
+    const double smallest = std::isfinite(reference_.self_error) ? reference_.self_error : 0.0;
     for (double step = start / factor; study_.rows.size() < first + longest_ladder; step /= factor) {
       if (cpu_seconds * factor > options_.run_budget)
         return fmt::format("the next run would take about {:.2g} s", cpu_seconds * factor);
+      if (thread_seconds() - begin + cpu_seconds * factor * (1.0 + options_.repeats) > time)
+        return "its share of the time of the study is used up";
       const double part =
           0.95 * std::min(1.0, static_cast<double>(study_.rows.size() - first) / usual_ladder);
       const StudyRow& row = run_row(series, step, part);
@@ -193,7 +233,11 @@ class StudyInProgress {
       if (!row.ok()) continue;
       in_vain = best < plateau_ceiling && row.error() > still_falling * best ? in_vain + 1 : 0;
       best = std::isnan(best) ? row.error() : std::min(best, row.error());
-      if (in_vain == plateau_length) return fmt::format("round-off keeps the error above {:.1e}", best);
+      if (row.error() < smallest) return fmt::format("the reference is known to {:.1e} only", smallest);
+      if (in_vain == plateau_length)
+        return best < near_the_reference * smallest
+                   ? fmt::format("the reference, known to {:.1e} only, hides smaller errors", smallest)
+                   : fmt::format("round-off keeps the error above {:.1e}", best);
     }
     return fmt::format("{} runs", longest_ladder);
   }
@@ -211,7 +255,8 @@ class StudyInProgress {
     if (baseline != ida_method) return {DaeFormulation::rates};  // it has none
     if (options_.ida_formulation) return {*options_.ida_formulation};
     if (!reference_.missing.empty()) return {DaeFormulation::rates};
-    return best_formulations(*entry_.scene, study_.t_end, rtols, reference_, options_.run_budget,
+    return best_formulations(*entry_.scene, study_.t_end, rtols, reference_,
+                             std::min(options_.run_budget, of_a_share * share_of_time()),
                              [&] { look(part, "the formulations of IDA"); });
   }
 
@@ -225,15 +270,22 @@ class StudyInProgress {
   void run_baseline_ladder(const std::string& baseline, DaeFormulation formulation,
                            const std::vector<double>& rtols, double part) {
     const std::size_t first = study_.rows.size();
+    const double begin = thread_seconds();
+    const double time = share_of_time();
     std::vector<Sample> ends(rtols.size());
     const auto run = [&](double rtol, int repeats, Sample& end) {
-      return run_baseline(baseline, *entry_.scene, study_.t_end, {.rtol = rtol, .formulation = formulation},
-                          repeats, reference_, end);
+      ReferenceOptions reference{.rtol = rtol, .formulation = formulation};
+      if (std::isfinite(options_.time_limit)) reference.max_steps = most_steps_in_limited_time;
+      return run_baseline(baseline, *entry_.scene, study_.t_end, reference, repeats, reference_, end);
     };
     for (std::size_t i = 0; i < rtols.size(); ++i) {
       look(part, fmt::format("{}, rtol {:g}", baseline, rtols[i]));
       study_.rows.push_back(run(rtols[i], options_.repeats, ends[i]));
       if (i > 0) compare(study_.rows[first + i - 1], ends[i - 1], study_.rows[first + i].ok(), ends[i]);
+      if (study_.rows.back().error() < options_.smallest_error) return;
+      if (thread_seconds() - begin + 1.5 * study_.rows.back().cpu_seconds.median * (1.0 + options_.repeats) >
+          time)
+        return;
     }
     if (rtols.empty() || rtols.back() < 1e-13) return;
     Sample tighter;  // for the last row's own estimate only
@@ -255,14 +307,27 @@ class StudyInProgress {
   std::vector<Series> series_;
   std::size_t series_done_ = 0;
   ReferenceEnd reference_;
+  double begin_ = 0.0;  ///< of the study, CPU time
   Study study_;
 };
 
+/// The runs of a method at an order; an error below the reference's own counts as that.
 std::vector<WorkPoint> points(const Study& study, const std::string& method, int order) {
+  const double smallest =
+      std::isfinite(study.reference_error) ? std::max(study.reference_error, smallest_error) : smallest_error;
   std::vector<WorkPoint> found;
   for (const StudyRow& row : study.rows)
     if (row.ok() && row.method == method && row.order == order)
-      found.push_back({row.step, std::max(row.error(), smallest_error), row.cpu_seconds.median});
+      found.push_back({row.step, std::max(row.error(), smallest), row.cpu_seconds.median});
+  return found;
+}
+
+/// Those that show an order: well above the error of the reference.
+std::vector<WorkPoint> telling_points(const Study& study, const std::string& method, int order) {
+  std::vector<WorkPoint> found = points(study, method, order);
+  if (std::isfinite(study.reference_error))
+    std::erase_if(found,
+                  [&](const WorkPoint& p) { return p.error < near_the_reference * study.reference_error; });
   return found;
 }
 
@@ -292,9 +357,33 @@ Study convergence_study(const CatalogueScene& scene, const Registry& registry, c
   return StudyInProgress(scene, registry, solvers, options, observer).run();
 }
 
+double expected_seconds(const CatalogueScene& scene, const Registry& registry, const SolverFactory& solvers,
+                        const StudyOptions& options) {
+  constexpr long probed = 8;                   // steps
+  constexpr double longest_ladder_runs = 3.0;  // a ladder takes about so many times its longest run …
+  constexpr double usual_ladder_runs = 60.0;   // … or of the run with the natural step
+  constexpr double baselines = 4.0;            // as many ladders
+  const double t_end = options.t_end.value_or(scene.t_end), length = t_end - scene.scene->start.time;
+  const StepGrid grid = fit_steps(scene.scene->start.time, t_end, std::copysign(scene.natural_step, length));
+  double seconds = options.run_budget;
+  try {
+    Integrator integrator(scene.scene, registry, solvers, {.method = "type1/gl:3", .step = grid.step});
+    const double before = thread_seconds();
+    long taken = 0;
+    while (taken < std::min(probed, grid.steps) && integrator.step().ok()) ++taken;
+    if (taken > 0)
+      seconds = (thread_seconds() - before) / static_cast<double>(taken) * static_cast<double>(grid.steps);
+  } catch (const Misuse&) {  // the study itself says why
+  }
+  const double ladder = std::min(longest_ladder_runs * options.run_budget, usual_ladder_runs * seconds);
+  const auto ladders =
+      static_cast<double>(options.series.empty() ? options.methods.size() : options.series.size());
+  return std::min(options.time_limit, (ladders + baselines) * (1.0 + options.repeats) * ladder);
+}
+
 void conclude(Study& study) {
   for (MeasuredOrder& measured : study.measured_orders) {
-    const auto fit = measure_order(points(study, measured.method, measured.order));
+    const auto fit = measure_order(telling_points(study, measured.method, measured.order));
     measured.slope = fit ? std::optional(fit->slope) : std::nullopt;
     measured.points = fit ? fit->points : 0;
   }
@@ -302,7 +391,7 @@ void conclude(Study& study) {
   const std::vector<WorkPoint> ida = points(study, ida_method, 0), erk = points(study, erk_method, 0);
   for (const double error : compared_errors) {
     const std::size_t first = study.at_error.size();
-    const auto ida_seconds = cpu_seconds_at(ida, error), erk_seconds = cpu_seconds_at(erk, error);
+    const auto ida_seconds = cpu_seconds_within(ida, error), erk_seconds = cpu_seconds_within(erk, error);
     std::optional<std::size_t> best;
     for (const MeasuredOrder& ours : study.measured_orders) {
       AtError at{.error = error,

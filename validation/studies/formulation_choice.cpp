@@ -36,7 +36,7 @@ const Candidate* fastest_at(double error, const std::vector<Candidate>& all,
   const Candidate* best = nullptr;
   double least = std::numeric_limits<double>::infinity();
   for (const Candidate& candidate : all) {
-    const auto seconds = cpu_seconds_at(candidate.points, error);
+    const auto seconds = cpu_seconds_within(candidate.points, error);
     if (!seconds) continue;
     const bool known = std::ranges::find(chosen, candidate.formulation) != chosen.end();
     if (const double judged = known ? *seconds / nearly : *seconds; judged < least) {

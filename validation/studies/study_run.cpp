@@ -13,8 +13,8 @@ namespace diracstep {
 
 namespace {
 
-constexpr double long_run = 0.3;          // CPU seconds above which a run is repeated less often
-constexpr double own_warm_up = 1.0;       // … above which it is not run once more to warm up
+constexpr double long_run = 0.03;         // CPU seconds above which a run is repeated less often
+constexpr double own_warm_up = 0.1;       // … above which it is not run once more to warm up
 constexpr double reference_rtol = 1e-13;  // of IDA, where a scene has no reference
 constexpr long steps_between_looks = 4096;
 

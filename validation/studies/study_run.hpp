@@ -56,7 +56,7 @@ struct StudyRow {
 
 /// The true end of a motion, and where it is known from.
 struct ReferenceEnd {
-  std::string kind;  ///< "exact", "published" or "ida"
+  std::string kind;  ///< "exact", "published", "own", "converged" or "ida"
   std::string how;
   double self_error = StudyRow::none;
   std::string missing;  ///< empty, or why there is no reference
@@ -84,7 +84,7 @@ using Look = std::function<void()>;
 
 /// Runs from the start to the end of `steps` steps, once to warm up and `repeats` times for the clock.  The
 /// time of a run holds the start, all steps and the reading of the end; construction is left out.  A run
-/// above 0.3 s is repeated less often, and one above 1 s is its own warm-up.
+/// above 0.03 s is repeated less often, and one above 0.1 s is its own warm-up.
 StudyRow run_ours(Integrator& integrator, long steps, Momentum momentum, int repeats,
                   const ReferenceEnd& reference, const Look& look = {});
 

@@ -37,7 +37,7 @@ std::shared_ptr<const Scene> kepler(double eccentricity) {
 double circular_rate(double, ConstVectorRef q, ConstVectorRef) { return std::pow(q.norm(), -1.5); }
 
 AdaptiveIntegrator adaptive(const std::shared_ptr<const Scene>& scene, const std::string& method,
-                            AdaptiveOptions options, int order = 0, double step = 0.1) {
+                            const AdaptiveOptions& options, int order = 0, double step = 0.1) {
   return {
       scene, Registry::with_built_ins(), kinsol(), {.method = method, .order = order, .step = step}, options};
 }

@@ -17,8 +17,6 @@ using testing::expect_parts;
 using testing::integrator_for;
 using testing::ScenePointer;
 
-const double nan = std::numeric_limits<double>::quiet_NaN();
-
 double distance(const Vector& a, const Vector& b) { return (a - b).lpNorm<Eigen::Infinity>(); }
 
 // --- Failure
@@ -58,7 +56,7 @@ StepReport failing_step(Integrator& integrator, long step) {
   for (long k = 0; k < step; ++k) EXPECT_TRUE(integrator.step().ok()) << "step " << k;
   Sample before, after;
   EXPECT_TRUE(integrator.sample(Momentum::plus, before).ok());
-  const StepReport report = integrator.step();
+  StepReport report = integrator.step();
   EXPECT_FALSE(report.ok());
   EXPECT_EQ(report.step, step);
   EXPECT_EQ(report.time, before.time);

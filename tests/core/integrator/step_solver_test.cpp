@@ -81,10 +81,14 @@ TEST(Predictor, AStepWithdrawnIsForgotten) {
   for (int k = 0; k < 20; ++k) {
     Vector x = Vector::LinSpaced(once.x.size(), std::sin(0.3 * k), std::cos(0.2 * k));
     once.predictor.accept_step(x);
-    twice.predictor.accept_step(2.0 * x);
+    const std::string before = twice.memory();
+    const Vector other =
+        k % 2 == 0 ? Vector(2.0 * x) : Vector(x.cwiseInverse());  // of which another rule is best
+    twice.predictor.accept_step(other);
     Vector withdrawn(x.size());
     twice.predictor.withdraw_step(withdrawn);
-    EXPECT_EQ(withdrawn, 2.0 * x);
+    EXPECT_EQ(withdrawn, other);
+    EXPECT_TRUE(twice.memory() == before) << k;
     twice.predictor.accept_step(x);
     EXPECT_TRUE(once.memory() == twice.memory()) << k;
   }

@@ -14,8 +14,8 @@ namespace {
 using testing::expect_misuse;
 using testing::samples_of;
 
-Integrator make(const std::shared_ptr<const Scene>& scene, IntegratorOptions options) {
-  return {scene, Registry::with_built_ins(), kinsol(), std::move(options)};
+Integrator make(const std::shared_ptr<const Scene>& scene, const IntegratorOptions& options) {
+  return {scene, Registry::with_built_ins(), kinsol(), options};
 }
 
 TEST(VariableStep, OfTheOptionsSizeIsThePlainStepBitByBit) {

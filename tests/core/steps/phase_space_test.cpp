@@ -146,7 +146,8 @@ TEST(PhaseSpaceStep, FixedPointStepsAreThoseOfNewtonsMethodWithoutJacobians) {
 TEST(PhaseSpaceStep, UnstableConstructionsAreRefusedUnlessForced) {
   for (const char* name : {"type1/left", "type1/right", "type1/trapezoidal"}) {
     try {
-      Integrator(lotka_volterra<0>(), Registry::with_built_ins(), kinsol(), {.method = name, .step = 0.1});
+      const Integrator taken(lotka_volterra<0>(), Registry::with_built_ins(), kinsol(),
+                             {.method = name, .step = 0.1});
       FAIL() << name << " was taken";
     } catch (const Misuse& misuse) {
       EXPECT_NE(std::string(misuse.what()).find("linear in v"), std::string::npos) << misuse.what();

@@ -109,7 +109,7 @@ TEST(RedundantRows, AreNamedWhateverTheirUnits) {
 
 TEST(RedundantRows, AreRefusedOrDroppedAsAsked) {
   try {
-    Integrator(redundant(), Registry::with_built_ins(), kinsol(), {.step = 0.1});
+    const Integrator taken(redundant(), Registry::with_built_ins(), kinsol(), {.step = 0.1});
     FAIL() << "dependent rows were taken";
   } catch (const Misuse& misuse) {
     EXPECT_NE(std::string(misuse.what()).find("contact"), std::string::npos) << misuse.what();

@@ -1,9 +1,11 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/reports/report.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
+#include <diracstep/validation/studies/converged_reference.hpp>
 #include <diracstep/validation/studies/convergence_study.hpp>
 #include <nlohmann/json.hpp>
 #include <sstream>
@@ -63,6 +65,61 @@ TEST(Conclude, ComparesWithIdaOnlyWhereBothGetThere) {
   const auto json = nlohmann::json::parse(studies_json({study}));
   EXPECT_TRUE(json["studies"][0]["at_error"][5]["cpu_seconds"].is_null());
   EXPECT_TRUE(json["studies"][0]["at_error"][2]["ratio"].is_null());
+}
+
+TEST(Conclude, TakesTheTimeOfTheCoarsestRunOnEverySideWhereThatIsExactEnough) {
+  Study study;
+  study.measured_orders = {{"ours", 2, {}, 0, {}}};
+  for (const char* method : {"ours", ida_method, erk_method}) {
+    StudyRow row{.method = method, .order = study.rows.empty() ? 2 : 0, .step = 0.1};
+    row.error_q = row.error_p = 1e-7;
+    row.cpu_seconds = {1.0, 1.0, 1.0, 1};
+    study.rows.push_back(row);
+  }
+  conclude(study);
+  EXPECT_EQ(study.at_error[0].ratio, 1.0);
+  EXPECT_EQ(study.at_error[0].erk_ratio, 1.0);
+}
+
+TEST(Conclude, ReadsNothingOffErrorsBelowThatOfTheReference) {
+  Study study;
+  study.reference_error = 2e-8;
+  study.measured_orders = {{"ours", 2, {}, 0, {}}};
+  for (int k = 0; k < 12; ++k) {
+    const double h = 0.1 * std::pow(0.5, k);
+    StudyRow row{.method = "ours", .order = 2, .step = h};
+    row.error_q = row.error_p = k < 9 ? 0.1 * h * h : 1e-12;
+    row.cpu_seconds = {1.0 / h, 1.0 / h, 1.0 / h, 1};
+    study.rows.push_back(row);
+  }
+  conclude(study);
+  EXPECT_TRUE(study.at_error[1].cpu_seconds.has_value()) << "1e-6";
+  EXPECT_FALSE(study.at_error[2].cpu_seconds.has_value()) << "1e-9 is below the error of the reference";
+  ASSERT_TRUE(study.measured_orders[0].slope.has_value());
+  EXPECT_NEAR(*study.measured_orders[0].slope, 2.0, 1e-9);
+}
+
+TEST(ConvergenceStudy, ALadderThatReachesTheReferenceSaysSo) {
+  CatalogueScene entry = make_scene("knife_edge");
+  entry.reference.self_error = 1e-9;
+  StudyOptions options;
+  options.series = {{"type1/gl:4", 8}};
+  options.rtols = {};
+  options.repeats = 1;
+  const Study study = convergence_study(entry, Registry::with_built_ins(), kinsol(), options);
+  EXPECT_NE(study.measured_orders[0].ladder_end.find("reference"), std::string::npos)
+      << study.measured_orders[0].ladder_end;
+}
+
+TEST(ConvergenceStudy, ATimeLimitEndsTheLadders) {
+  StudyOptions options;
+  options.repeats = 1;
+  options.time_limit = 0.05;
+  options.rtols = {1e-4, 1e-6, 1e-8, 1e-10};
+  const Study study = study_of("kepler_e06", options);
+  for (const MeasuredOrder& m : study.measured_orders)
+    EXPECT_NE(m.ladder_end.find("share of the time"), std::string::npos) << m.ladder_end;
+  EXPECT_LT(std::ranges::count_if(study.rows, &StudyRow::is_baseline), 8) << "both baselines end early";
 }
 
 class SceneStudy : public testing::TestWithParam<std::string> {};
@@ -145,6 +202,7 @@ TEST(ConvergenceStudy, BudgetEndsTheLadderAndSaysSo) {
 TEST(ConvergenceStudy, RowsOfTheBaselinesCarryTheirOwnErrorEstimate) {
   StudyOptions options = short_study("knife_edge");
   options.rtols = {1e-8, 1e-5};
+  options.ida_formulation = DaeFormulation::rates;
   const Study study = study_of("knife_edge", options);
   std::vector<StudyRow> baselines;
   for (const StudyRow& row : study.rows)
@@ -162,14 +220,52 @@ TEST(ConvergenceStudy, RowsOfTheBaselinesCarryTheirOwnErrorEstimate) {
   }
 }
 
-TEST(ConvergenceStudy, WithoutReferenceIdaAtATightToleranceTakesItsPlace) {
+TEST(ConvergenceStudy, WithoutReferenceAConvergedOneOfOurOwnTakesItsPlace) {
   CatalogueScene entry = make_scene("knife_edge");
   entry.reference = {};
   const Registry registry = Registry::with_built_ins();
   const Study study = convergence_study(entry, registry, kinsol(), short_study("knife_edge"));
-  EXPECT_EQ(study.reference_kind, "ida");
-  EXPECT_LT(study.reference_error, 1e-9);  // IDA's error is up to some hundred times its tolerance 1e-12
+  EXPECT_EQ(study.reference_kind, "converged");
+  EXPECT_LT(study.reference_error, 1e-13);
   EXPECT_TRUE(confirms_order(study.measured_orders[0])) << study_table(study);
+}
+
+TEST(ConvergenceStudy, IdaIsTheLastResortWhereOurOwnReferenceGetsNoTime) {
+  CatalogueScene entry = make_scene("knife_edge");
+  entry.reference = {};
+  StudyOptions options = short_study("knife_edge");
+  options.reference_budget = 0.0;
+  EXPECT_EQ(convergence_study(entry, Registry::with_built_ins(), kinsol(), options).reference_kind, "ida");
+}
+
+TEST(ConvergedReference, LiesWithinItsOwnErrorOfAClosedForm) {
+  const Registry registry = Registry::with_built_ins();
+  for (const char* name :
+       {"knife_edge", "pendulum_cartesian", "kepler_e06", "mass_spring_torn", "lc_circuit"}) {
+    const CatalogueScene entry = make_scene(name);
+    const double end = 0.1 * entry.t_end;
+    const ReferenceEnd found = converged_reference(entry, registry, kinsol(), end, 10.0);
+    const ReferenceEnd known = *known_point(entry, end);
+    ASSERT_EQ(found.missing, "") << name;
+    Sample at;
+    at.q = known.q;
+    at.p = known.p;
+    EXPECT_LT(found.self_error, 1e-11) << name << ": " << found.how;
+    // The stated error is a difference of two runs; the closed form has its own rounding.
+    EXPECT_LT(found.distance(at), 3.0 * found.self_error + 10.0 * known.self_error)
+        << name << ": " << found.how;
+  }
+}
+
+TEST(ConvergedReference, SaysSoWhereItIsNotConverged) {
+  const CatalogueScene entry = make_scene("chaotic_quartic");
+  const Registry registry = Registry::with_built_ins();
+  const ReferenceEnd hurried = converged_reference(entry, registry, kinsol(), entry.t_end, 0.02);
+  if (hurried.missing.empty()) {
+    EXPECT_GT(hurried.self_error, 1e-9) << hurried.how;
+  }
+  const ReferenceEnd none = converged_reference(entry, registry, kinsol(), entry.t_end, 0.0);
+  EXPECT_NE(none.missing.find("two methods"), std::string::npos) << none.missing;
 }
 
 TEST(ConvergenceStudy, FailedRunIsARowThatSaysWhy) {

@@ -1,0 +1,153 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/runs/run.hpp>
+#include <diracstep/core/runs/step_loop.hpp>
+#include <diracstep/validation/studies/converged_reference.hpp>
+#include <diracstep/validation/studies/work_precision.hpp>
+
+namespace diracstep {
+
+namespace {
+
+struct Candidate {
+  const char* method;
+  int order;
+};
+constexpr std::array<Candidate, 4> candidates{
+    {{"type1/gl:6", 12}, {"type1/gl:4", 8}, {"type1/midpoint", 8}, {"type1/trapezoidal", 8}}};
+
+constexpr double converged = 1e-6;  ///< a change above it is never taken for round-off
+constexpr double still_falling = 0.5;
+constexpr double first_step = 8.0;  ///< times the scene's own
+constexpr long steps_between_looks = 256;
+constexpr int most_halvings = 30;
+
+double distance(const Sample& a, const Sample& b) {
+  return std::max(relative_error(a.q, b.q), relative_error(a.p, b.p));
+}
+
+/// Where one method comes to.
+struct Refined {
+  std::string method, failure;
+  int order = 0;
+  double step = 0.0;
+  double change = StudyRow::none;  ///< of the end by the last halving of the step
+  Sample end;
+
+  bool ok() const { return std::isfinite(change); }
+};
+
+class Refinement {
+ public:
+  Refinement(const CatalogueScene& scene, const Registry& registry, const SolverFactory& solvers,
+             double t_end, const Look& look)
+      : scene_(scene), registry_(registry), solvers_(solvers), t_end_(t_end), look_(look) {}
+
+  Refined refined(const Candidate& by, double seconds) const {
+    Refined best;
+    best.method = by.method;
+    best.order = by.order;
+    const double begin = thread_seconds(), start = scene_.scene->start.time;
+    const double length = t_end_ - start;
+    double step = std::copysign(std::min(first_step * scene_.natural_step, 0.5 * std::abs(length)), length),
+           last = 0.0;
+    Sample before;
+    bool any = false;
+    for (int k = 0; k < most_halvings && (k == 0 || thread_seconds() - begin + 2.0 * last < seconds);
+         ++k, step *= 0.5) {
+      const double run_begin = thread_seconds();
+      Sample end;
+      best.failure = run(by, step, end);
+      last = thread_seconds() - run_begin;
+      if (!best.failure.empty()) continue;  // a shorter step may be solved
+      if (any) {
+        const double change = distance(before, end);
+        const bool falls = std::isnan(best.change) || change < still_falling * best.change;
+        if (!falls && best.change < converged) break;
+        if (falls) {
+          best.change = change;
+          best.step = step;
+          best.end = end;
+        }
+        if (change == 0.0) break;
+      }
+      any = true;
+      before = std::move(end);
+    }
+    return best;
+  }
+
+ private:
+  std::string run(const Candidate& by, double step, Sample& end) const {
+    const StepGrid grid = fit_steps(scene_.scene->start.time, t_end_, step);
+    Integrator integrator = made(by, grid.step);
+    const StepReport last = step_while(
+        integrator, [&](long k) { return k < grid.steps; },
+        [&](long k) {
+          if (look_ && k % steps_between_looks == 0) look_();
+          return true;
+        });
+    if (!last.ok()) return last.failure;
+    const SolveReport reading = integrator.sample(Momentum::projected, end);
+    return reading.ok() ? "" : describe(reading.status);
+  }
+
+  Integrator made(const Candidate& by, double step) const {
+    IntegratorOptions options{.method = by.method, .order = by.order, .step = step};
+    options.compensated_sums = true;
+    try {
+      return {scene_.scene, registry_, solvers_, options};
+    } catch (const Misuse&) {  // this step has no compensated sums, or the scene does not take the method
+      options.compensated_sums = false;
+      return {scene_.scene, registry_, solvers_, options};
+    }
+  }
+
+  const CatalogueScene& scene_;
+  const Registry& registry_;
+  const SolverFactory& solvers_;
+  double t_end_;
+  const Look& look_;
+};
+
+}  // namespace
+
+ReferenceEnd converged_reference(const CatalogueScene& scene, const Registry& registry,
+                                 const SolverFactory& solvers, double t_end, double seconds,
+                                 const Look& look) {
+  const Refinement refinement(scene, registry, solvers, t_end, look);
+  std::vector<Refined> found;
+  ReferenceEnd reference{.kind = "converged", .how = {}, .missing = {}, .q = {}, .p = {}};
+  for (const Candidate& candidate : candidates) {
+    if (found.size() == 2) break;
+    try {
+      Refined one = refinement.refined(candidate, 0.5 * seconds);
+      if (one.ok())
+        found.push_back(std::move(one));
+      else
+        reference.missing = fmt::format("{} of order {}: {}", one.method, one.order,
+                                        one.failure.empty() ? "out of time" : one.failure);
+    } catch (const Misuse& misuse) {
+      reference.missing = misuse.what();
+    }
+  }
+  if (found.size() < 2) {
+    reference.missing = "no reference: two methods are needed that come to the end; " + reference.missing;
+    return reference;
+  }
+  if (found[1].change < found[0].change) std::swap(found[0], found[1]);
+  reference.missing.clear();
+  reference.q = found[0].end.q;
+  reference.p = found[0].end.p;
+  reference.self_error = std::max({found[0].change, found[1].change, distance(found[1].end, found[0].end)});
+  reference.how = fmt::format("{} of order {} at step {:.3g} and its double, beside {} of order {} at {:.3g}",
+                              found[0].method, found[0].order, found[0].step, found[1].method, found[1].order,
+                              found[1].step);
+  return reference;
+}
+
+}  // namespace diracstep
