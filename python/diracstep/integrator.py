@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 _OK = c.OK
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class State:
     """A point of a motion.  The arrays are copies and own their memory."""
 

@@ -48,7 +48,7 @@ class Search:
     runs: TextTable
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, repr=False, eq=False)
 class Run:
     """Points of a motion: row k of each array is point k.  Units are those of the scene.
 
@@ -162,7 +162,7 @@ class Run:
         return f"<run of {self.scene.name}: {len(self)} points{span}{how}{state}>"
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, repr=False, eq=False)
 class Ensemble:
     """Ends of many motions of one scene: row k is that of start k.  Arrays as those of a Run.
 

@@ -117,6 +117,7 @@ class Scene:
         self.start_time: float = facts.start_time
         self.start_q = np.ctypeslib.as_array(facts.start_q, (n,)).copy()
         self.start_v = np.ctypeslib.as_array(facts.start_v, (n,)).copy()
+        self.start_q.flags.writeable = self.start_v.flags.writeable = False
         self.until: float = facts.end_time  #: where a run ends that is given no other end
         self.step: float = facts.step  #: a coarse but sensible step
 

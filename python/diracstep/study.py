@@ -90,6 +90,7 @@ def run_study(scene: Scene, *, methods: Sequence[str], orders: Sequence[int], st
         for name, value in scene._changes.items():
             call += ["--set", f"{name}={value!r}"]
         call += ["--end", repr(float(until))] if until is not None else []
+        call += ["--drop-redundant"] if scene._again["drop_redundant"] else []
         call += [] if ida else ["--without-ida"]
         call += [] if erk else ["--without-erk"]
         for plugin in scene._again["plugins"]:
