@@ -197,8 +197,8 @@ TEST_F(CInterface, TheUnitOfLengthDoesNotCount) {
     scene.step = 0.05;
     diracstep_options options{};
     options.method = "type1/gl:3";
-    ASSERT_EQ(create(&scene, &options), DIRACSTEP_OK) << diracstep_message(made_);
-    ASSERT_EQ(diracstep_step(made_, 100), DIRACSTEP_OK) << diracstep_message(made_);
+    ASSERT_EQ(create(&scene, options), DIRACSTEP_OK) << diracstep_message();
+    ASSERT_EQ(diracstep_step(made_, 100), DIRACSTEP_OK) << diracstep_message();
     Vector q(2);
     diracstep_state state{};
     state.q = q.data();
