@@ -138,7 +138,10 @@ class KinsolSolver final : public NonlinearSolver {
       if (!improve(code, norm)) break;
     const bool converged = strategy != KIN_FP && (code == KIN_SUCCESS || code == KIN_INITIAL_GUESS_OK);
     // Other codes, KIN_STEP_LT_STPTOL above all, come at the round-off floor as well as far from a solution.
-    if (converged || norm <= options_.accept)
+    // Where Newton's method no longer gets on, light rows may be at the round-off of functions that lose more than
+    // their own terms say, as differences do: the terms of the block then decide.
+    const bool stagnant = strategy != KIN_FP && norm < HUGE_VAL && block_norm() <= options_.accept;
+    if (converged || norm <= options_.accept || stagnant)
       report_.status = SolveStatus::ok;
     else if (singular_)
       report_.status = SolveStatus::singular_jacobian;
@@ -224,6 +227,18 @@ class KinsolSolver final : public NonlinearSolver {
       if (std::isnan(norm)) return HUGE_VAL;
       largest = std::max(largest, block.each != nullptr ? scaled_norm(block, row) : norm / block.scale);
       row += block.rows;
+    }
+    return largest;
+  }
+
+  /// The same in units of whole blocks.
+  double block_norm() const {
+    double largest = 0.0;
+    std::size_t b = 0;
+    for (const ResidualBlock& block : problem_.blocks()) {
+      const double norm = norms_.at(b++);
+      if (std::isnan(norm)) return HUGE_VAL;
+      largest = std::max(largest, norm / block.scale);
     }
     return largest;
   }

@@ -264,7 +264,9 @@ class GaussLobattoStep final : public StepProblem {
   /// Sizes at x, for the next step.
   void measure(ConstVectorRef x, StepMemory& memory) {
     StageSizes& sizes = sizes_of_end_;
-    sizes = sizes_;
+    sizes.known = sizes_.known;
+    sizes.curvature = sizes_.curvature;
+    sizes.row_curvature = sizes_.row_curvature;
     sizes.force = largest_entry(momentum_.forces().data(), momentum_.forces().size());
     if (!sizes.known && sizes.curvature == 0.0) {  // solved without a Jacobian
       (void)momentum_.second_derivatives(points_, last_x_);
