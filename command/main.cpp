@@ -1,4 +1,3 @@
-#include <cxxabi.h>
 #include <unistd.h>
 
 #include <cstdlib>
@@ -7,15 +6,20 @@
 #include <exception>
 #include <new>
 #include <string_view>
-#include <typeinfo>
 
 namespace {
 
-/// Where memory is short, destructors of the JSON and TOML libraries take some and throw, and nobody can
-/// catch that.
+bool memory_was_short = false;
+
+void note_short_memory() {
+  memory_was_short = true;
+  throw std::bad_alloc();
+}
+
+/// Where memory is short, destructors and functions of the JSON and TOML libraries that may not throw do so,
+/// and nobody can catch that.
 [[noreturn]] void end_without_memory() {
-  const std::type_info* const thrown = abi::__cxa_current_exception_type();
-  if (thrown == nullptr || *thrown != typeid(std::bad_alloc)) std::abort();
+  if (!memory_was_short) std::abort();
   constexpr std::string_view message =
       "diracstep: there is not enough memory; the files stand as they were last written\n";
   static_cast<void>(!write(STDERR_FILENO, message.data(), message.size()));
@@ -25,6 +29,7 @@ namespace {
 }  // namespace
 
 int main(int count, char** arguments) {
+  std::set_new_handler(note_short_memory);
   std::set_terminate(end_without_memory);
   diracstep::command::prepare_standard_streams();
   return diracstep::command::execute(count, arguments);

@@ -395,7 +395,8 @@ std::vector<const SceneFunction*> SceneProgram::functions() const {
 
 std::unique_ptr<SceneProgram> compile_scene(const std::string& file, const std::string& text,
                                             bool as_written) {
-  const SizeLimits limits = size_limits();
+  SizeLimits limits = size_limits();
+  limits.graph_nodes += text.size();  // a long file may take its time, a short one of a large system may not
   auto program = std::make_unique<SceneProgram>(read_document(file, text), as_written, limits);
   try {
     SceneCompiler(*program).compile();

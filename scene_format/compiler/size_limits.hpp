@@ -8,8 +8,8 @@ namespace diracstep::scene_compiler {
 /// holds.  More is refused with a SceneError before memory is taken for it.
 struct SizeLimits {
   std::size_t file_bytes = 16'000'000;
-  std::size_t key_parts = 16;           ///< of a dotted key, a.b.c
-  std::size_t graph_nodes = 1'500'000;  ///< of all formulas and their derivatives
+  std::size_t key_parts = 16;         ///< of a dotted key, a.b.c
+  std::size_t graph_nodes = 300'000;  ///< of all formulas and their derivatives; one more for each byte read
   std::size_t graph_visits =
       300'000'000;                  ///< of their nodes, in searches and differentiation: the time it takes
   std::size_t sum_terms = 100'000;  ///< addends that one function is taken apart into
