@@ -46,7 +46,7 @@ void write_quoted(std::string& text, std::string_view content) {
 void begin_line(std::string& text, int indent, int depth) {
   if (indent < 0) return;
   text += '\n';
-  text.append(static_cast<std::size_t>(indent * depth), ' ');
+  text.append(static_cast<std::size_t>(indent) * static_cast<std::size_t>(depth), ' ');
 }
 
 }  // namespace

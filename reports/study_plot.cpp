@@ -86,7 +86,7 @@ std::string reference_line(const Study& study, const std::vector<Curve>& curves)
   return fmt::format(
       "set arrow from graph 0, first {0:.3e} to graph 1, first {0:.3e} nohead linewidth 1 dashtype (4,4) "
       "linecolor '#808080'\nset label 'own error of the reference' at graph 0.01, first {0:.3e} offset "
-      "0,-0.55 "
+      "0,0.5 "
       "textcolor '#606060'\n",
       own);
 }

@@ -22,7 +22,8 @@ constexpr std::array<Candidate, 4> candidates{
 
 constexpr double converged = 1e-6;  ///< a change above it is never taken for round-off
 constexpr double still_falling = 0.5;
-constexpr double first_step = 8.0;  ///< times the scene's own
+constexpr double smallest_claim = 1e-15;  ///< the rounding of the reference itself
+constexpr double first_step = 8.0;        ///< times the scene's own
 constexpr long steps_between_looks = 256;
 constexpr int most_halvings = 30;
 
@@ -143,7 +144,8 @@ ReferenceEnd converged_reference(const CatalogueScene& scene, const Registry& re
   reference.missing.clear();
   reference.q = found[0].end.q;
   reference.p = found[0].end.p;
-  reference.self_error = std::max({found[0].change, found[1].change, distance(found[1].end, found[0].end)});
+  reference.self_error =
+      std::max({found[0].change, found[1].change, distance(found[1].end, found[0].end), smallest_claim});
   reference.how = fmt::format("{} of order {} at step {:.3g} and its double, beside {} of order {} at {:.3g}",
                               found[0].method, found[0].order, found[0].step, found[1].method, found[1].order,
                               found[1].step);
