@@ -17,8 +17,8 @@ constexpr double round_off = 4.0 * std::numeric_limits<double>::epsilon();
 constexpr double divisor = 16.0;  // of the increment where they do not agree
 constexpr int most_divisions = 8;
 constexpr double scale_over_increment = 512.0;
-constexpr double known_to = 1e-5;     // relative error of derivatives from which they are doubted
-constexpr int most_rungs = 12;        // from a guess of a scale
+constexpr double known_to = 1e-5;  // relative error of derivatives from which they are doubted
+constexpr int most_rungs = 12;          // from a guess of a scale
 constexpr double worth_a_rung = 0.5;  // of the error: less is gained at this point alone
 
 /// The increment for a variable of this scale: a power of two, so that x + kδ is exact for most x.

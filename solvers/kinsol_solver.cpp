@@ -138,10 +138,7 @@ class KinsolSolver final : public NonlinearSolver {
       if (!improve(code, norm)) break;
     const bool converged = strategy != KIN_FP && (code == KIN_SUCCESS || code == KIN_INITIAL_GUESS_OK);
     // Other codes, KIN_STEP_LT_STPTOL above all, come at the round-off floor as well as far from a solution.
-    // Where Newton's method no longer gets on, light rows may be at the round-off of functions that lose more than
-    // their own terms say, as differences do: the terms of the block then decide.
-    const bool stagnant = strategy != KIN_FP && norm < HUGE_VAL && block_norm() <= options_.accept;
-    if (converged || norm <= options_.accept || stagnant)
+    if (converged || norm <= options_.accept)
       report_.status = SolveStatus::ok;
     else if (singular_)
       report_.status = SolveStatus::singular_jacobian;
@@ -205,34 +202,14 @@ class KinsolSolver final : public NonlinearSolver {
   /// The largest scaled entry of the last residual.
   double scaled_norm() const {
     double largest = 0.0;
-    const double* row = residual_;
-    std::size_t b = 0;
-    for (const ResidualBlock& block : problem_.blocks()) {
-      const double norm = norms_.at(b) * inverse_scales_.at(b);
-      largest = std::max(largest, block.each != nullptr ? scaled_norm(block, row) : norm);
-      row += block.rows;
-      ++b;
-    }
+    for (std::size_t b = 0; b < norms_.size(); ++b)
+      largest = std::max(largest, norms_[b] * inverse_scales_[b]);
     return largest;
   }
 
   /// The last norms into the report; the largest one in units of its block back.
   double report_residual() {
     report_.residual_norms = norms_;
-    double largest = 0.0;
-    const double* row = residual_;
-    std::size_t b = 0;
-    for (const ResidualBlock& block : problem_.blocks()) {
-      const double norm = norms_.at(b++);
-      if (std::isnan(norm)) return HUGE_VAL;
-      largest = std::max(largest, block.each != nullptr ? scaled_norm(block, row) : norm / block.scale);
-      row += block.rows;
-    }
-    return largest;
-  }
-
-  /// The same in units of whole blocks.
-  double block_norm() const {
     double largest = 0.0;
     std::size_t b = 0;
     for (const ResidualBlock& block : problem_.blocks()) {
@@ -243,11 +220,6 @@ class KinsolSolver final : public NonlinearSolver {
     return largest;
   }
 
-  /// The largest entry of a block, each in units of its own.
-  static double scaled_norm(const ResidualBlock& block, const double* row) {
-    return largest_of(block.rows, [&](Eigen::Index i) { return row[i] / block.each[i]; });
-  }
-
   void set_scales() {
     const double size = largest_entry(guess_.data(), guess_.size());
     const double unit = size > 0.0 && std::isfinite(size) ? 1.0 / size : 1.0;
@@ -256,7 +228,7 @@ class KinsolSolver final : public NonlinearSolver {
     std::size_t b = 0;
     for (const ResidualBlock& block : problem_.blocks()) {
       inverse_scales_.at(b) = 1.0 / block.scale;
-      runs.at(b) = {block.rows, inverse_scales_.at(b), block.each};
+      runs.at(b) = {block.rows, inverse_scales_.at(b)};
       ++b;
     }
     detail::set_weights(residual_scale_.get(), std::span(runs).first(b));

@@ -20,18 +20,15 @@ class DiscreteForce {
 
   const SparsityPattern& pattern() const { return force_->pattern(); }
 
-  /// `increment` is q1 − q0, given apart since it is known to more digits than the difference has.
-  void evaluate(Interval step, ConstVectorRef q0, ConstVectorRef q1, ConstVectorRef increment);
+  void evaluate(Interval step, ConstVectorRef q0, ConstVectorRef q1);
   const Vector& minus() const { return minus_; }  ///< F⁻ where it was last evaluated
   const Vector& plus() const { return plus_; }    ///< F⁺
 
   /// d = ∂F⁻/∂q1 on pattern().
-  void minus_by_end(Interval step, ConstVectorRef q0, ConstVectorRef q1, ConstVectorRef increment,
-                    VectorRef d);
+  void minus_by_end(Interval step, ConstVectorRef q0, ConstVectorRef q1, VectorRef d);
 
  private:
-  void move_to(const StepNode& node, Interval step, ConstVectorRef q0, ConstVectorRef q1,
-               ConstVectorRef increment);
+  void move_to(const StepNode& node, Interval step, ConstVectorRef q0, ConstVectorRef q1);
 
   std::shared_ptr<const Force> force_;
   StepRule rule_;

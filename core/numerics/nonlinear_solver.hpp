@@ -16,9 +16,6 @@ struct ResidualBlock {
   const char* name;  ///< "momentum", "constraint", …
   int rows;
   double scale = 1.0;  ///< size of the terms that cancel in these rows at a solution; round-off is ε·scale
-  const double* each = nullptr;  ///< such sizes row by row where they are very different, else null
-
-  double scale_of_row(int row) const { return each != nullptr ? each[row] : scale; }
 };
 
 /// F(x) = 0, square, with an exact Jacobian on a fixed pattern: all that a solver sees of a step.

@@ -90,15 +90,7 @@ inline double largest_if_finite(const double* x, int count) {
   return largest;
 }
 
-/// A size to divide by: 1 where it is none.
-inline double size_or_one(double size) { return size > 0.0 && std::isfinite(size) ? size : 1.0; }
-
-/// Residuals are measured by the size of their terms, but by none below this: where all terms vanish, as at
-/// rest without a force, so does the residual.
-constexpr double smallest_scale = 1e-100;
-inline double scale_of(double terms) {
-  if (!(terms > smallest_scale)) return smallest_scale;
-  return std::isfinite(terms) ? terms : 1.0;  // the residual is not finite either
-}
+/// A size of terms to measure residuals by: positive and finite, 1 where none is known.
+inline double usable_scale(double scale) { return scale > 0.0 && std::isfinite(scale) ? scale : 1.0; }
 
 }  // namespace diracstep

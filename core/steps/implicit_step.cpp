@@ -2,7 +2,6 @@
 #include <cmath>
 #include <diracstep/core/dirac/discrete_force.hpp>
 #include <diracstep/core/numerics/errors.hpp>
-#include <diracstep/core/numerics/row_scales.hpp>
 #include <diracstep/core/steps/implicit_jacobian.hpp>
 #include <diracstep/core/steps/implicit_step.hpp>
 #include <diracstep/core/steps/step_data.hpp>
@@ -39,11 +38,7 @@ class ImplicitStep final : public StepProblem {
     hessian_.setZero(s_->pattern().nonzeros(), s_->pairs());
     last_x_.setZero(size());
     q1_.setZero(n_);
-    terms_.setZero(s_->columns() + n_);
-    row_scales_ = RowScales(n_);
-    impulse_sizes_.setZero(n_);
-    increment_.setZero(n_);
-    by_increment_ = s_->type() == GeneratingType::one && s_->take_increments();
+    terms_.setZero(s_->columns());
     multipliers_.setZero(m_);
     if (force_) force_by_end_.setZero(force_->pattern().nonzeros());
     blocks_.push_back({"momentum", n_});
@@ -56,11 +51,10 @@ class ImplicitStep final : public StepProblem {
   std::span<const ResidualBlock> blocks() const override { return blocks_; }
 
   StepTraits traits() const override {
-    const char* const end = by_increment_ ? "q1 - q0 (" : graph_.ends_at_position ? "q1 (" : "p1 (";
-    std::string text = end + std::to_string(n_) + ")";
+    std::string text = (graph_.ends_at_position ? "q1 (" : "p1 (") + std::to_string(n_) + ")";
     if (m_ > 0) text += ", multipliers (" + std::to_string(m_) + ")";
     if (inner_ > 0) text += ", inner columns (" + std::to_string(inner_) + ")";
-    return {text, n_, s_->columns() + n_, m_};
+    return {text, n_, s_->columns(), m_};
   }
 
   void begin(Interval step, const State& start, const StepMemory& memory) override {
@@ -79,9 +73,7 @@ class ImplicitStep final : public StepProblem {
 
   void guess(ConstVectorRef v0, VectorRef x) override {
     const double h = data_.step.size;
-    if (by_increment_)
-      x.head(n_) = h * v0;
-    else if (graph_.ends_at_position)
+    if (graph_.ends_at_position)
       x.head(n_) = data_.q0 + h * v0;
     else
       x.head(n_) = h * data_.p0;
@@ -101,7 +93,7 @@ class ImplicitStep final : public StepProblem {
     if (force_ && graph_.starts_from_position) graph += row_factor() * force_->minus();
     if (m_ > 0) {
       if (graph_.starts_from_position) data_.start_rows.add_annihilator(x.segment(n_, m_), graph);
-      data_.discrete_constraint.residual(data_.step, data_.q0, q1_, increment_, f.segment(n_, m_));
+      data_.discrete_constraint.residual(data_.step, data_.q0, q1_, f.segment(n_, m_));
     }
     if (inner_ > 0) f.tail(inner_) = gradient_.rightCols(s_->inner_columns()).reshaped();
   }
@@ -110,7 +102,7 @@ class ImplicitStep final : public StepProblem {
     evaluate(x);
     s_->hessian(data_.step, y_, hessian_);
     hessian_known_ = true;
-    if (force_) force_->minus_by_end(data_.step, data_.q0, q1_, increment_, force_by_end_);
+    if (force_) force_->minus_by_end(data_.step, data_.q0, q1_, force_by_end_);
     if (m_ > 0) data_.discrete_constraint.end_derivative(data_.step, data_.q0, q1_, data_.end_derivative);
     jacobian_.assemble(
         {data_.step.size, hessian_, data_.start_rows.coefficients(), data_.end_derivative, force_by_end_},
@@ -125,7 +117,7 @@ class ImplicitStep final : public StepProblem {
     else
       end.at.p = y_.col(1);
     if (force_) end.at.p += force_->plus();
-    end.at.v = increment_ / data_.step.size;
+    end.at.v = (q1_ - data_.q0) / data_.step.size;
     end.impulse = x.segment(n_, m_) / data_.step.size;
     end.memory.known = true;
     end.memory.scales = terms_;
@@ -147,81 +139,45 @@ class ImplicitStep final : public StepProblem {
     if (!graph_.starts_from_position && m_ > 0)
       data_.start_rows.add_annihilator(x.segment(n_, m_), y_.col(0), 1.0 / h);
     y_.col(1) = end_factor() * x.head(n_);
-    if (graph_.ends_at_position) {
-      if (by_increment_) {
-        increment_ = x.head(n_);
-        q1_ = data_.q0 + increment_;
-      } else {
-        q1_ = x.head(n_);
-        increment_ = q1_ - data_.q0;
-      }
-    }
     if (force_ && graph_.ends_at_position) {
-      force_->evaluate(data_.step, data_.q0, q1_, increment_);
+      force_->evaluate(data_.step, data_.q0, y_.col(1));
       if (!graph_.starts_from_position) y_.col(0) += force_->minus();
     }
     if (inner_ > 0) y_.rightCols(s_->inner_columns()) = x.tail(inner_).reshaped(n_, s_->inner_columns());
     s_->gradient(data_.step, y_, gradient_);
-    if (!graph_.ends_at_position) {
+    if (graph_.ends_at_position)
+      q1_ = y_.col(1);
+    else
       q1_ = graph_.end_sign * gradient_.col(1);
-      increment_ = q1_ - data_.q0;
-      if (force_) force_->evaluate(data_.step, data_.q0, q1_, increment_);
-    }
-    if (blocks_[0].each != nullptr) raise_rows(x);
-    if (m_ > 0 && blocks_[1].each != nullptr) data_.raise_rows(increment_);
-  }
-
-  /// Terms at x that are larger than those that the scales of the rows were taken from.
-  void raise_rows(ConstVectorRef x) {
-    impulse_sizes_ = std::abs(row_factor()) * gradient_.col(0).cwiseAbs();
-    if (force_ && graph_.starts_from_position)
-      impulse_sizes_ += std::abs(row_factor()) * force_->minus().cwiseAbs();
-    if (m_ > 0 && graph_.starts_from_position) data_.add_impulse_sizes(x.segment(n_, m_), impulse_sizes_);
-    for (int i = 0; i < n_; ++i) row_scales_.raise(i, impulse_sizes_[i]);
+    if (force_ && !graph_.ends_at_position) force_->evaluate(data_.step, data_.q0, q1_);
   }
 
   /// Where nothing is known of an earlier step: the Hessian at a plausible point, for the round-off scales.
   void sample_terms() {
     y_.col(0) = graph_.starts_from_position ? data_.q0 : data_.p0;
     y_.col(1) = graph_.ends_at_position ? data_.q0 : data_.p0;
-    if (by_increment_) y_.col(1) = data_.step.size * data_.v0;
     if (inner_ > 0)
       s_->guess_inner(data_.step, data_.q0, data_.p0, Vector::Zero(n_), y_.rightCols(s_->inner_columns()));
     s_->hessian(data_.step, y_, hessian_);
-    s_->gradient(data_.step, y_, gradient_);
     measure_terms(terms_);
   }
 
   void measure_terms(Vector& terms) const {
     for (int i = 0; i < s_->columns(); ++i)
       if (i != 1) terms[i] = cancelling_terms(i);  // the end is no row
-    auto of_rows = terms.tail(n_);
-    of_rows = gradient_.col(0).cwiseAbs();
-    const Columns& h = hessian_;
-    s_->pattern().for_each([&](Eigen::Index e, int r, int c) {
-      double sum = by_increment_ ? std::abs((h(e, 0) + h(e, 1)) * y_(c, 0)) : std::abs(h(e, 0) * y_(c, 0));
-      for (int j = 1; j < s_->columns(); ++j) sum += std::abs(h(e, s_->pair(0, j)) * y_(c, j));
-      of_rows[r] = std::max(of_rows[r], sum);
-    });
-    if (by_increment_) terms[0] = max_norm(of_rows);
   }
 
   void update_scales() {
     const double own =
         graph_.starts_from_position ? std::abs(data_.step.size) * max_norm(data_.p0) : max_norm(data_.q0);
     // The impulse, as large as it was in the last step.
-    const bool impulses = graph_.starts_from_position && m_ > 0;
-    const double impulse = impulses ? data_.impulse_scale(multipliers_) : 0.0;
-    blocks_[0].scale = scale_of(std::max({own, impulse, std::abs(row_factor()) * terms_[0]}));
-    row_scales_.terms = graph_.starts_from_position ? data_.p0.cwiseAbs() : data_.q0.cwiseAbs();
-    row_scales_.terms = std::abs(row_factor()) * row_scales_.terms.cwiseMax(terms_.tail(n_));
-    if (impulses) data_.add_impulse_sizes(multipliers_, row_scales_.terms);
-    row_scales_.give_to(blocks_[0]);
-    if (m_ > 0) data_.scale_rows(blocks_[1]);
+    const double impulse = graph_.starts_from_position && m_ > 0 ? data_.impulse_scale(multipliers_) : 0.0;
+    blocks_[0].scale = usable_scale(std::max({own, impulse, std::abs(row_factor()) * terms_[0]}));
+    if (m_ > 0) blocks_[1].scale = data_.constraint_scale();
     if (inner_ == 0) return;
     double largest = 0.0;
     for (int i = 2; i < s_->columns(); ++i) largest = std::max(largest, terms_[i]);
-    blocks_.back().scale = scale_of(largest);
+    blocks_.back().scale = usable_scale(largest);
   }
 
   /// Size of the terms that make up column i of the gradient: second derivatives times what they multiply.
@@ -242,14 +198,10 @@ class ImplicitStep final : public StepProblem {
   ImplicitJacobian jacobian_;
   Vector force_by_end_;
   std::vector<ResidualBlock> blocks_;
-  RowScales row_scales_;
-  bool by_increment_ = false;  ///< the unknown is q1 − q0 instead of q1
-  Vector last_x_, q1_, increment_, impulse_sizes_;
+  Vector last_x_, q1_;
   Columns y_, gradient_, hessian_;
-  /// Size of the terms of each column of the gradient, and of each entry of the first, as the last step knew
-  /// it.
-  Vector terms_;
-  Vector multipliers_;          ///< of the last step
+  Vector terms_;        ///< size of the terms of each column of the gradient, as the last step knew it
+  Vector multipliers_;  ///< of the last step
   bool hessian_known_ = false;  ///< hessian_ was taken in this step
 };
 

@@ -38,7 +38,7 @@ class MultiplierStep final : public StepProblem {
     data_.freeze(step, start);
     if (size() == 0) return;
     last_x_[0] = std::nan("");
-    data_.scale_rows(blocks_[0]);
+    blocks_[0].scale = data_.constraint_scale();
   }
 
   void guess(ConstVectorRef, VectorRef x) override { x.setZero(); }
@@ -75,7 +75,6 @@ class MultiplierStep final : public StepProblem {
     p_hat_ = data_.p0;
     if (size() > 0) data_.start_rows.add_annihilator(x, p_hat_, 1.0 / data_.step.size);
     graph_.map(data_.step, data_.q0, p_hat_, q1_, p1_);
-    if (size() > 0 && blocks_[0].each != nullptr) data_.raise_rows(q1_ - data_.q0);
   }
 
   std::unique_ptr<GeneratingFunction> s_;

@@ -59,7 +59,7 @@ class StepProblem : public NonlinearProblem {
 /// where F⁻ and F⁺ are the impulses of a force, absent where the scene has none (discrete_force.hpp).
 ///
 ///   type   unknowns     residual
-///   one    q1,   hλ     h (p̂0 + D1S(q0,q1)),     c(q0, q1)     q1 − q0 where S takes it
+///   one    q1,   hλ     h (p̂0 + D1S(q0,q1)),     c(q0, q1)
 ///   two    h p1, hλ     h (p̂0 − D1S(q0,p1)),     c(q0, D2S)
 ///   three  q1,   hλ     q0 + D1S(p̂0,q1),         c(q0, q1)
 ///   four   h p1, hλ     q0 − D1S(p̂0,p1),         c(q0, −D2S)

@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <cmath>
 #include <diracstep/core/numerics/errors.hpp>
-#include <diracstep/core/numerics/row_scales.hpp>
 #include <diracstep/core/system/consistent_start.hpp>
 #include <diracstep/core/system/constraint_distribution.hpp>
 #include <diracstep/core/system/hidden_rows.hpp>
@@ -28,8 +27,7 @@ class NearestPointProblem final : public NonlinearProblem {
         n_(static_cast<int>(given.size())),
         m_(rows_.rows()),
         pattern_(SparsityPattern::dense(n_ + m_, n_ + m_)),
-        residual_blocks_{{"distance", n_, scale_of(max_norm(given))}, {"constraint", m_, smallest_scale}},
-        row_scales_(m_) {}
+        residual_blocks_{{"distance", n_, 1.0 + given.lpNorm<Eigen::Infinity>()}, {"constraint", m_, 1.0}} {}
 
   int size() const override { return n_ + m_; }
   const SparsityPattern& pattern() const override { return pattern_; }
@@ -40,7 +38,6 @@ class NearestPointProblem final : public NonlinearProblem {
     f.head(n_) = x.head(n_) - given_;
     rows_.add_annihilator(x.tail(m_), f.head(n_));
     for (const int i : held_) f[i] = x[i] - given_[i];
-    raise_scales(x);
     int row = n_;
     for (const auto& block : blocks_) {
       block->position(t_, x.head(n_), f.segment(row, block->rows()));
@@ -73,22 +70,6 @@ class NearestPointProblem final : public NonlinearProblem {
   }
 
  private:
-  /// The scales cover the terms at x: positions, and rows times positions.
-  void raise_scales(ConstVectorRef x) {
-    ResidualBlock &distance = residual_blocks_[0], &constraint = residual_blocks_[1];
-    const double size = max_norm(x.head(n_));
-    if (std::isfinite(size)) distance.scale = std::max(distance.scale, scale_of(size));
-    Vector forms = Vector::Zero(m_), sizes = forms;
-    rows_.pattern().for_each([&](Eigen::Index e, int r, int c) {
-      forms[r] = std::max(forms[r], std::abs(rows_.coefficients()[e]));
-      sizes[r] = std::max({sizes[r], std::abs(x[c]), std::abs(given_[c])});
-    });
-    row_scales_.terms = row_scales_.terms.cwiseMax(forms.cwiseProduct(sizes));
-    const double largest = max_norm(row_scales_.terms);
-    if (std::isfinite(largest)) constraint.scale = std::max(constraint.scale, scale_of(largest));
-    row_scales_.give_to(constraint);
-  }
-
   ConstraintBlocks blocks_;
   std::vector<int> held_;
   ConstraintsAtPoint rows_;
@@ -97,7 +78,6 @@ class NearestPointProblem final : public NonlinearProblem {
   int n_, m_;
   SparsityPattern pattern_;
   std::vector<ResidualBlock> residual_blocks_;
-  RowScales row_scales_;
 };
 
 [[noreturn]] void throw_not_found(const Scene& scene, const char* what, const SolveReport& report) {

@@ -22,9 +22,7 @@ void PhaseSpaceVelocityProblem::begin(double t, ConstVectorRef q) {
   lagrangian_->hessian(t, q, zero, lqq_, lqv_, lvv_);
   lagrangian_->gradient(t, q, zero, lq_, lv_);
   lagrangian_->gradient_rate(t, q, zero, lvt_);
-  blocks_[0].scale = scale_of(std::max(max_norm(lq_), max_norm(lvt_)));
-  scales_.terms = lq_.cwiseAbs().cwiseMax(lvt_.cwiseAbs());
-  scales_.give_to(blocks_[0]);
+  blocks_[0].scale = usable_scale(std::max(max_norm(lq_), max_norm(lvt_)));
 }
 
 void PhaseSpaceVelocityProblem::residual(ConstVectorRef v, VectorRef f) {

@@ -1,6 +1,6 @@
 #pragma once
 
-#include <diracstep/core/numerics/row_scales.hpp>
+#include <diracstep/core/numerics/nonlinear_solver.hpp>
 #include <diracstep/core/system/scene.hpp>
 #include <memory>
 #include <vector>
@@ -27,7 +27,6 @@ class PhaseSpaceVelocityProblem final : public NonlinearProblem {
   SparsityPattern pattern_;
   BlockPattern layout_;
   std::vector<ResidualBlock> blocks_;
-  RowScales scales_{lagrangian_->dimension()};
   double t_ = 0.0;
   Vector q_, lq_, lv_, lvt_, lqq_, lqv_, lvv_;
 };

@@ -163,19 +163,6 @@ std::vector<int> dependent_in_parts(const Eigen::SparseMatrix<double>& one_forms
 /// much.
 constexpr double pose_tolerance = 1e-7;
 
-/// Where motions cross at the start, poses around it are farther than this from being singular; where rows
-/// touch, poses are found to the square root of round-off only, and seem regular by so much.
-constexpr double crossing = 1e-3;
-
-/// A start moved by this part of its size in all coordinates.
-Vector moved(const Start& start, double distance) {
-  const double size = std::max(start.q.lpNorm<Eigen::Infinity>(), 1e-2);
-  Vector q = start.q;
-  for (Eigen::Index i = 0; i < q.size(); ++i)
-    q[i] += distance * size * std::sin(1.0 + 1.7 * static_cast<double>(i));
-  return q;
-}
-
 /// One-forms at the start, and at poses around it that the rows allow.
 std::vector<Columns> one_forms_around(const Scene& scene, const Start& start) {
   ConstraintsAtPoint rows(scene.constraints, scene.dimension());
@@ -185,8 +172,12 @@ std::vector<Columns> one_forms_around(const Scene& scene, const Start& start) {
   };
   std::vector<Columns> all{at(start.q)};
   const ConstraintBlocks holonomic = only_holonomic(scene.constraints);
+  const double size = std::max(start.q.lpNorm<Eigen::Infinity>(), 1e-2);
   for (const double distance : {-0.3, -0.1, 0.1, 0.3}) {
-    const auto pose = pose_near(holonomic, start.time, moved(start, distance), {});
+    Vector q = start.q;
+    for (Eigen::Index i = 0; i < q.size(); ++i)
+      q[i] += distance * size * std::sin(1.0 + 1.7 * static_cast<double>(i));
+    const auto pose = pose_near(holonomic, start.time, q, {});
     if (!pose) continue;
     if (Columns there = at(*pose); there.allFinite()) all.push_back(std::move(there));
   }
@@ -220,38 +211,6 @@ std::vector<int> best_choice(std::vector<int> at_start, const std::vector<Column
     at_start = std::move(other);
   }
   return at_start;
-}
-
-/// How far the rows of these blocks are from zero, in parts of their one-forms times the size of the pose.
-double distance_from(const ConstraintBlocks& holonomic, double t, const Vector& q) {
-  double largest = 0.0;
-  for (const auto& block : holonomic) {
-    Vector phi(block->rows()), a(block->pattern().nonzeros()), b(block->rows());
-    block->position(t, q, phi);
-    block->coefficients(t, q, a, b);
-    const double size = a.lpNorm<Eigen::Infinity>() * q.lpNorm<Eigen::Infinity>();
-    largest = std::max(largest, phi.lpNorm<Eigen::Infinity>() / size);
-  }
-  return largest;
-}
-
-/// Whether all poses found around the start that the other rows allow break the holonomic ones of these
-/// names.
-bool broken_by_the_others(const Scene& scene, const Start& start, const std::vector<std::string>& dependent) {
-  constexpr double met = 1e-7;
-  const ConstraintBlocks others = only_holonomic(without_rows(scene, dependent)->constraints);
-  std::vector<std::string> kept = scene.row_names();
-  std::erase_if(
-      kept, [&](const std::string& name) { return std::ranges::find(dependent, name) != dependent.end(); });
-  const ConstraintBlocks these = only_holonomic(without_rows(scene, kept)->constraints);
-  bool any = false;
-  for (const double distance : {-0.1, -0.03, -0.01, 0.01, 0.03, 0.1}) {
-    const auto pose = pose_near(others, start.time, moved(start, distance), {});
-    if (!pose) continue;
-    if (distance_from(these, start.time, *pose) <= met) return false;
-    any = true;
-  }
-  return any;
 }
 
 }  // namespace
@@ -315,32 +274,14 @@ std::vector<std::string> redundant_rows(const Scene& scene, const Start& start, 
   return dependent;
 }
 
-RowDependence row_dependence(const Scene& scene, const Start& start,
-                             const std::vector<std::string>& dependent, double tolerance) {
-  if (scene.rows() == 0 || scene.rows() > max_rows_in_full) return RowDependence::lasting;
+bool singular_at_start_only(const Scene& scene, const Start& start, double tolerance) {
+  if (scene.rows() == 0 || scene.rows() > max_rows_in_full) return false;
   const std::vector<Columns> poses = one_forms_around(scene, start);
   const std::size_t here = dependent_columns(poses[0], tolerance).size();
   // All poses: one that was found from afar may lie on another branch of the rows, of another rank.
-  const bool crosses =
-      poses.size() > 1 && std::all_of(poses.begin() + 1, poses.end(), [&](const Columns& there) {
-        return dependent_columns(there, std::max(tolerance, crossing)).size() < here;
-      });
-  if (crosses) return RowDependence::at_start_only;
-  return broken_by_the_others(scene, start, dependent) ? RowDependence::touching : RowDependence::lasting;
-}
-
-const char* why_not_left_out(RowDependence dependence) {
-  switch (dependence) {
-    case RowDependence::at_start_only:
-      return "not so at poses near it: the start is singular, move it";
-    case RowDependence::touching:
-      return "they only touch the others there, and without them other motions are possible: say what they "
-             "mean "
-             "by rows of another form";
-    case RowDependence::lasting:
-      break;
-  }
-  return "";
+  return poses.size() > 1 && std::all_of(poses.begin() + 1, poses.end(), [&](const Columns& there) {
+           return dependent_columns(there, std::max(tolerance, pose_tolerance)).size() < here;
+         });
 }
 
 std::shared_ptr<const Scene> without_rows(const Scene& scene, const std::vector<std::string>& names) {

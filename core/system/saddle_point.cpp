@@ -13,9 +13,7 @@ SaddlePointProblem::SaddlePointProblem(const Scene& scene, bool dense)
       rows_(scene.constraints, n_),
       lq_(Vector::Zero(n_)),
       lv_(Vector::Zero(n_)),
-      layout_(n_ + m_, n_ + m_),
-      momentum_scales_(n_),
-      velocity_scales_(m_) {
+      layout_(n_ + m_, n_ + m_) {
   const SparsityPattern& mass = scene.lagrangian->pattern();
   for (Vector* values : {&lqq_, &lqv_, &lvv_}) values->setZero(mass.nonzeros());
   layout_.add(mass, 0, 0);
@@ -39,51 +37,32 @@ void SaddlePointProblem::assemble(VectorRef& values) const {
   layout_.add_to(values.data(), 2, 1.0, rows_.coefficients().data());
 }
 
-void SaddlePointProblem::set_scales(ConstVectorRef momentum, ConstVectorRef velocity) {
-  momentum_scales_.terms = momentum.cwiseAbs();
-  velocity_scales_.terms = velocity.cwiseAbs();
-  blocks_[0].scale = scale_of(max_norm(momentum_scales_.terms));
-  momentum_scales_.give_to(blocks_[0]);
+void SaddlePointProblem::set_scales(double momentum, double velocity) {
+  blocks_[0].scale = usable_scale(momentum);
   if (m_ == 0) return;
-  blocks_[1].scale = scale_of(max_norm(velocity_scales_.terms));
-  velocity_scales_.give_to(blocks_[1]);
+  blocks_[1].scale = usable_scale(max_norm(rows_.coefficients()) * velocity);
 }
 
-void SaddlePointProblem::raise_scales(ConstVectorRef momentum, ConstVectorRef x, bool mass) {
-  Vector& of_momentum = momentum_scales_.terms;
-  of_momentum = of_momentum.cwiseMax(momentum.cwiseAbs());
-  if (mass)
-    scene_.lagrangian->pattern().for_each([&](Eigen::Index e, int r, int c) {
-      of_momentum[r] = std::max(of_momentum[r], std::abs(lvv_[e] * x[c]));
-    });
-  Vector& of_velocity = velocity_scales_.terms;
-  if (m_ > 0)
-    rows_.pattern().for_each([&](Eigen::Index e, int r, int c) {
-      const double a = std::abs(rows_.coefficients()[e]);
-      of_momentum[c] = std::max(of_momentum[c], a * std::abs(x[n_ + r]));
-      of_velocity[r] = std::max(of_velocity[r], a * std::abs(x[c]));
-    });
-  const auto raise = [](ResidualBlock& block, RowScales& scales) {
-    const double largest = max_norm(scales.terms);
-    if (std::isfinite(largest)) block.scale = std::max(block.scale, scale_of(largest));
-    scales.give_to(block);
-  };
-  raise(blocks_[0], momentum_scales_);
-  if (m_ > 0) raise(blocks_[1], velocity_scales_);
+void SaddlePointProblem::raise_scales(double momentum, ConstVectorRef x) {
+  const double a = m_ > 0 ? rows_.coefficients().lpNorm<Eigen::Infinity>() : 0.0;
+  if (m_ > 0) momentum = std::max(momentum, a * x.tail(m_).lpNorm<Eigen::Infinity>());
+  if (std::isfinite(momentum)) blocks_[0].scale = std::max(blocks_[0].scale, momentum);
+  if (m_ == 0) return;
+  const double velocity = a * x.head(n_).lpNorm<Eigen::Infinity>();
+  if (std::isfinite(velocity)) blocks_[1].scale = std::max(blocks_[1].scale, velocity);
 }
 
 void VelocityProblem::begin(double t, ConstVectorRef q, ConstVectorRef p) {
   move_to(t, q);
   p_ = p;
-  mass_taken_ = false;
-  set_scales(p, rows_.offsets());
+  set_scales(p.lpNorm<Eigen::Infinity>(), 1.0);
 }
 
 void VelocityProblem::residual(ConstVectorRef x, VectorRef f) {
   const auto v = x.head(n_);
   scene_.lagrangian->gradient(t_, q_, v, lq_, lv_);
   f.head(n_) = lv_ - p_;
-  raise_scales(lv_, x, mass_taken_);
+  raise_scales(lv_.lpNorm<Eigen::Infinity>(), x);
   if (m_ == 0) return;
   rows_.add_annihilator(x.tail(m_), f.head(n_), -1.0);
   rows_.velocity_residual(v, f.tail(m_));
@@ -92,7 +71,6 @@ void VelocityProblem::residual(ConstVectorRef x, VectorRef f) {
 void VelocityProblem::jacobian(ConstVectorRef x, VectorRef values) {
   if (!mass_known_) scene_.lagrangian->hessian(t_, q_, x.head(n_), lqq_, lqv_, lvv_);
   mass_known_ = scene_.lagrangian->structure().y_hessian_constant;
-  mass_taken_ = true;
   assemble(values);
 }
 
@@ -119,13 +97,13 @@ void AccelerationProblem::begin(double t, ConstVectorRef q, ConstVectorRef v) {
     rows_.distribution().derivative(t, q, v, 1.0, row_derivative_);
     rows_.pattern().multiply_add(row_derivative_.data(), v_.data(), known_rate_.data());
   }
-  set_scales(known_force_, known_rate_);
+  set_scales(known_force_.lpNorm<Eigen::Infinity>(), 1.0);
 }
 
 void AccelerationProblem::residual(ConstVectorRef x, VectorRef f) {
   f.head(n_).setZero();
   scene_.lagrangian->pattern().multiply_add(lvv_.data(), x.data(), f.data());
-  raise_scales(f.head(n_), x, true);
+  raise_scales(f.head(n_).lpNorm<Eigen::Infinity>(), x);
   f.head(n_) -= known_force_;
   if (m_ == 0) return;
   rows_.add_annihilator(x.tail(m_), f.head(n_), -1.0);

@@ -1,6 +1,6 @@
 #pragma once
 
-#include <diracstep/core/numerics/row_scales.hpp>
+#include <diracstep/core/numerics/nonlinear_solver.hpp>
 #include <diracstep/core/system/constraint_distribution.hpp>
 #include <diracstep/core/system/scene.hpp>
 #include <vector>
@@ -26,11 +26,10 @@ class SaddlePointProblem : public NonlinearProblem {
   void move_to(double t, ConstVectorRef q);
   /// The saddle-point matrix with ∂²L/∂v² as it stands in lvv_.
   void assemble(VectorRef& values) const;
-  /// Scales by the right-hand sides alone.
-  void set_scales(ConstVectorRef momentum, ConstVectorRef velocity);
-  /// From now on the scales cover the terms at x as well: momenta of these sizes, ∂²L/∂v² times x where
-  /// `mass` says that it was taken since move_to(), and A times both parts of x.
-  void raise_scales(ConstVectorRef momentum, ConstVectorRef x, bool mass);
+  void set_scales(double momentum, double velocity);
+  /// The scales cover the terms at x as well: ∂²L/∂v² or ∂L/∂v of size `momentum`, and A times both parts of
+  /// x.
+  void raise_scales(double momentum, ConstVectorRef x);
 
   const Scene& scene_;
   int n_;
@@ -44,7 +43,6 @@ class SaddlePointProblem : public NonlinearProblem {
   SparsityPattern pattern_;
   BlockPattern layout_;
   std::vector<ResidualBlock> blocks_;
-  RowScales momentum_scales_, velocity_scales_;
 };
 
 /// Unknowns (v, μ):   ∂L/∂v(q,v) − A(q)ᵀμ = p,   A(q) v + b(q) = 0.
@@ -59,7 +57,6 @@ class VelocityProblem final : public SaddlePointProblem {
  private:
   Vector p_;
   bool mass_known_ = false;  ///< ∂²L/∂v² is constant and was taken
-  bool mass_taken_ = false;  ///< since begin()
 };
 
 /// Unknowns (a, Λ), linear:   d/dt(∂L/∂v) − ∂L/∂q − f = A(q)ᵀΛ,   d/dt(A(q) v + b(q)) = 0,   a = dv/dt.

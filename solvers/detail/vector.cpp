@@ -4,7 +4,6 @@
 #include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/solvers/detail/vector.hpp>
 #include <utility>
-#include <vector>
 
 namespace diracstep::detail {
 
@@ -99,7 +98,6 @@ constexpr std::size_t longest_fixed = 16;
 struct Weights {
   std::array<Run, 4> runs{};
   std::size_t count = 0;
-  std::vector<double> each;  ///< of runs with scales, one behind the other
 
   static Weights &of(N_Vector w) { return *static_cast<Weights *>(w->content); }
   static bool are(N_Vector w) { return w->ops->nvmin == minimum; }
@@ -108,14 +106,9 @@ struct Weights {
   template <class Visit>
   static void for_each(N_Vector w, Visit visit) {
     long first = 0;
-    const double *own = of(w).each.data();
     for (const Run &run : std::span(of(w).runs).first(of(w).count)) {
-      const long end = first + run.length;
-      if (run.scales == nullptr)
-        visit(first, end, run.value);
-      else
-        for (long i = first; i < end; ++i) visit(i, i + 1, *own++);
-      first = end;
+      visit(first, first + run.length, run.value);
+      first += run.length;
     }
   }
 
@@ -194,21 +187,12 @@ VectorHandle make_weights(N_Vector vector) {
 
 void set_weights(N_Vector weights, std::span<const Run> runs) {
   if (Weights::are(weights)) {
-    Weights &of = Weights::of(weights);
-    of.count = runs.size();
-    std::ranges::copy(runs, of.runs.begin());
-    of.each.clear();
-    for (const Run &run : runs)
-      for (long i = 0; run.scales != nullptr && i < run.length; ++i) of.each.push_back(1.0 / run.scales[i]);
+    Weights::of(weights).count = runs.size();
+    std::ranges::copy(runs, Weights::of(weights).runs.begin());
     return;
   }
   double *to = data_of(weights);
-  for (const Run &run : runs) {
-    if (run.scales == nullptr)
-      to = std::fill_n(to, run.length, run.value);
-    else
-      to = std::transform(run.scales, run.scales + run.length, to, [](double scale) { return 1.0 / scale; });
-  }
+  for (const Run &run : runs) to = std::fill_n(to, run.length, run.value);
 }
 
 }  // namespace diracstep::detail

@@ -13,15 +13,14 @@ VectorHandle make_view(int size, SUNContext context);
 
 inline double*& data_of(N_Vector x) { return static_cast<N_VectorContent_Serial>(x->content)->data; }
 
-/// So many entries, equal ones or, where `scales` is given, their inverses.
+/// So many equal entries.
 struct Run {
   long length;
   double value;
-  const double* scales = nullptr;
 };
 
-/// Scales for vectors like this one, the only weights that KINSOL then takes with them.  They are mostly
-/// equal over long runs, at most four: of a long vector only these are kept.
+/// Scales for vectors like this one, the only weights that KINSOL then takes with them.  They are equal over
+/// long runs, at most four: of a long vector only these are kept.
 VectorHandle make_weights(N_Vector vector);
 void set_weights(N_Vector weights, std::span<const Run> runs);
 

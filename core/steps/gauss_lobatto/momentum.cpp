@@ -1,5 +1,3 @@
-#include <algorithm>
-#include <cmath>
 #include <diracstep/core/numerics/combination.hpp>
 #include <diracstep/core/steps/gauss_lobatto/momentum.hpp>
 #include <utility>
@@ -15,7 +13,6 @@ StageMomentum::StageMomentum(std::shared_ptr<const Lagrangian> lagrangian, std::
       separable_(lagrangian_->structure().separable),
       same_jacobian_(lagrangian_->structure().quadratic && !force_ && dense) {
   for (Columns* columns : {&lq_, &lv_}) columns->setZero(n_, s_);
-  for (Vector* terms : {&momentum_terms_, &force_terms_}) terms->setZero(n_);
   const int nonzeros = lagrangian_->pattern().nonzeros();
   for (Columns* blocks : {&lqq_, &lqv_, &lvv_}) blocks->setZero(nonzeros, s_);
   if (!separable_) {
@@ -110,34 +107,6 @@ void StageMomentum::evaluate_start(const StagePoints& at, ConstVectorRef v0) {
   const auto q0 = at.lobatto.col(0);
   lagrangian_->gradient(t, q0, v0, lq_.col(0), lv_.col(0));
   lagrangian_->hessian(t, q0, v0, lqq_.col(0), lqv_.col(0), lvv_.col(0));
-  if (!force_) return;
-  force_->value(t, q0, v0, f_);
-  force_->derivatives(t, q0, v0, fq_.col(0), fv_.col(0));
-}
-
-void StageMomentum::size_forces(int stages, Vector& forces) const {
-  const double* const all = lq_.data();
-  for (int i = 0; i < n_; ++i) forces[i] = std::abs(all[i]);
-  for (int j = 1; j < stages; ++j)
-    for (int i = 0; i < n_; ++i) forces[i] = std::max(forces[i], std::abs(all[n_ * j + i]));
-}
-
-void StageMomentum::raise_by_terms(ConstVectorRef q, ConstVectorRef v, double h, Vector& momenta,
-                                   Vector& forces) {
-  const auto way = [&](int i) { return std::abs(q[i]) + h * std::abs(v[i]); };
-  momentum_terms_.setZero();
-  force_terms_.setZero();
-  lagrangian_->pattern().for_each([&](Eigen::Index e, int r, int c) {
-    momentum_terms_[r] += std::abs(lvv_(e, 0) * v[c]);
-    momentum_terms_[c] += std::abs(lqv_(e, 0)) * way(r);
-    force_terms_[r] += std::abs(lqq_(e, 0)) * way(c) + std::abs(lqv_(e, 0) * v[c]);
-  });
-  if (force_)
-    force_->pattern().for_each([&](Eigen::Index e, int r, int c) {
-      force_terms_[r] += std::abs(fq_(e, 0)) * way(c) + std::abs(fv_(e, 0) * v[c]);
-    });
-  momenta = momenta.cwiseMax(momentum_terms_);
-  forces = forces.cwiseMax(force_terms_);
 }
 
 }  // namespace diracstep

@@ -38,16 +38,8 @@ class StageMomentum {
   const SparsityPattern& pattern() const { return lagrangian_->pattern(); }  ///< of second derivatives
   auto mass(int stage) const { return lvv_.col(stage); }                     ///< ∂²L/∂v², values
 
-  /// ∂L/∂q + f, ∂L/∂v and the second derivatives at the start of the step in place of the first node, to know
-  /// their size.
+  /// ∂L/∂q and ∂²L/∂q² at the start of the step in place of the first node, to know their size.
   void evaluate_start(const StagePoints& at, ConstVectorRef v0);
-
-  /// The largest of ∂L/∂q + f over so many stages, coordinate by coordinate.
-  void size_forces(int stages, Vector& forces) const;
-  /// Sizes of the terms that make up ∂L/∂v and ∂L/∂q + f and may cancel there: raised by the second
-  /// derivatives of the first node times positions and velocities.  L's Hessian must have been taken.
-  void raise_by_terms(ConstVectorRef q, ConstVectorRef v, double h, Vector& momenta, Vector& forces);
-  bool quadratic() const { return lagrangian_->structure().quadratic; }
 
  private:
   bool all_finite() const;
@@ -61,7 +53,7 @@ class StageMomentum {
   std::vector<int> mirror_;  ///< places of ∂²L/∂v∂q in ∂²L/∂q∂v, where that is not zero
   Columns lq_, lv_;
   Columns lqq_, lqv_, lvv_, fq_, fv_;
-  Vector f_, block_, force_block_, momentum_terms_, force_terms_;
+  Vector f_, block_, force_block_;
   Vector jacobian_;  ///< the values of the last one, of a quadratic L without force
   double jacobian_step_ = 0.0;
   bool same_jacobian_, hessians_known_ = false;

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/numerics/lu.hpp>
-#include <diracstep/core/numerics/row_scales.hpp>
+#include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/core/steps/gauss_lobatto/phase_space_step.hpp>
 #include <diracstep/core/steps/gauss_lobatto/tableau.hpp>
 #include <diracstep/core/system/lagrangian_derivatives.hpp>
@@ -78,16 +78,7 @@ class PhaseSpaceStep final : public StepProblem {
     start_.take_second(*lagrangian_, step.start, q0_, zero_);
     start_.take_first(*lagrangian_, step.start, q0_, zero_);
     const double size = std::max(max_norm(p0_), max_norm(start_.qv) * max_norm(q0_));
-    blocks_[0].scale = blocks_[1].scale = scale_of(size + std::abs(step.size) * max_norm(start_.q));
-    for (Vector* terms : {&stage_scales_.terms, &end_scales_.terms}) {
-      *terms = p0_.cwiseAbs();
-      lagrangian_->pattern().for_each([&](Eigen::Index e, int r, int c) {
-        (*terms)[c] = std::max((*terms)[c], std::abs(start_.qv[e] * q0_[r]));
-      });
-      *terms += std::abs(step.size) * start_.q.cwiseAbs();
-    }
-    stage_scales_.give_to(blocks_[0]);
-    end_scales_.give_to(blocks_[1]);
+    blocks_[0].scale = blocks_[1].scale = usable_scale(size + std::abs(step.size) * max_norm(start_.q));
   }
 
   void guess(ConstVectorRef v0, VectorRef x) override {
@@ -219,7 +210,6 @@ class PhaseSpaceStep final : public StepProblem {
   SparsityPattern pattern_;
   BlockPattern layout_{0, 0};
   std::vector<ResidualBlock> blocks_;
-  RowScales stage_scales_{n_, s_}, end_scales_{n_};
 
   Interval step_{0.0, 1.0};
   Vector zero_;

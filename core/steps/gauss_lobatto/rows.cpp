@@ -16,7 +16,6 @@ StageRows::StageRows(std::shared_ptr<const ConstraintRows> rows, int stages, int
   derivative_.setZero(nonzeros);
   sum_.setZero(curved);
   offset_.setZero(rows_->rows());
-  start_offset_ = forms_ = speeds_ = offset_;
 }
 
 const SparsityPattern& StageRows::curvature_pattern() const {
@@ -103,24 +102,6 @@ void StageRows::add_constraint(const StagePoints& at, const BlockPattern& layout
 }
 
 double StageRows::form_size() const { return largest_entry(at_lobatto_.col(0).data(), at_lobatto_.rows()); }
-
-void StageRows::size_terms(ConstVectorRef v, Vector& terms) {
-  forms_.setZero();
-  speeds_.setZero();
-  rows_->pattern().for_each([&](Eigen::Index e, int r, int c) {
-    forms_[r] = std::max(forms_[r], std::abs(at_lobatto_(e, 0)));
-    speeds_[r] = std::max(speeds_[r], std::abs(v[c]));
-  });
-  terms.segment(first(), rows_->rows()) = forms_.cwiseProduct(speeds_) + start_offset_.cwiseAbs();
-}
-
-void StageRows::add_impulse_sizes(ConstVectorRef multipliers, Vector& sizes) const {
-  for (int j = 0; j < s_; ++j) {
-    const double* const lambda = multipliers.data() + first() + stride_ * j;
-    rows_->pattern().for_each(
-        [&](Eigen::Index e, int r, int c) { sizes[c] += std::abs(at_lobatto_(e, 0) * lambda[r]); });
-  }
-}
 
 double StageRows::impulse_size(ConstVectorRef multipliers) const {
   const auto places = rows_->pattern().row_indices();

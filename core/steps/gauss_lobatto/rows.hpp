@@ -20,10 +20,7 @@ class StageRows {
   void plan(BlockPattern& layout);
 
   /// The rows at the start of the step.
-  void begin(const StagePoints& at) {
-    evaluate_lobatto(at, 0);
-    start_offset_ = offset_;
-  }
+  void begin(const StagePoints& at) { evaluate_lobatto(at, 0); }
   /// impulses += A(Q~_j)ᵀ λ_j, column j, with the multipliers in x.
   void add_impulses(const StagePoints& at, ConstVectorRef x, Columns& impulses);
   /// Their rows of f.
@@ -40,11 +37,6 @@ class StageRows {
 
   /// Size of A(q0).
   double form_size() const;
-  /// Sizes of the terms A(q0) v + b of each row, those of all rows of the scene in `terms`, where coordinate
-  /// i has a velocity of size v[i].
-  void size_terms(ConstVectorRef v, Vector& terms);
-  /// sizes += |A(q0)ᵀλ| of these multipliers, those of all rows of the scene.
-  void add_impulse_sizes(ConstVectorRef multipliers, Vector& sizes) const;
   /// Size of the impulses of these multipliers, those of all rows of the scene.
   double impulse_size(ConstVectorRef multipliers) const;
   /// Size of the curvature when the Jacobian was last taken.
@@ -62,8 +54,7 @@ class StageRows {
   int s_, n_, first_, stride_;
   Columns at_lobatto_, at_gauss_;  ///< A at the nodes; at the Gauss nodes nonholonomic rows only
   Columns curvature_;              ///< ∂(Aᵀλ_j)/∂q at the Lobatto nodes
-  Vector derivative_, offset_, start_offset_, sum_;
-  Vector forms_, speeds_;  ///< workspaces
+  Vector derivative_, offset_, sum_;
   bool gauss_known_ = false;
   int first_layout_ = -1;  ///< three for each pair of stages: impulses, curvature, rows
 };

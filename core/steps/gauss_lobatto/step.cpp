@@ -2,7 +2,6 @@
 #include <cmath>
 #include <cstring>
 #include <diracstep/core/numerics/combination.hpp>
-#include <diracstep/core/numerics/row_scales.hpp>
 #include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/core/steps/gauss_lobatto/compensated_sums.hpp>
 #include <diracstep/core/steps/gauss_lobatto/momentum.hpp>
@@ -38,10 +37,6 @@ class GaussLobattoStep final : public StepProblem {
         points_(s, n_),
         momentum_(scene.lagrangian, scene.force, s, dense),
         layout_(size(), size()),
-        momentum_scales_(n_, s_),
-        row_scales_(m_, s_),
-        sizes_(n_),
-        sizes_of_end_(n_),
         affine_(affine(scene)) {
     int row = n_ * s_;
     for (const auto& block : scene.constraints) {
@@ -50,7 +45,7 @@ class GaussLobattoStep final : public StepProblem {
     }
     last_x_.setZero(size());
     impulses_.setZero(n_, s_);
-    for (Vector* column : {&p0_, &v0_, &speeds_}) column->setZero(n_);
+    p0_.setZero(n_);
     const auto holonomic = [](const auto& block) { return block->holonomic(); };
     const auto kinds = std::ranges::count_if(scene.constraints, holonomic);
     if (n_ + m_ <= largest_split && (kinds == 0 || kinds == std::ssize(scene.constraints)))
@@ -67,7 +62,7 @@ class GaussLobattoStep final : public StepProblem {
   std::span<const ResidualBlock> blocks() const override { return blocks_; }
 
   StepTraits traits() const override {
-    StepTraits traits{"stage velocities (" + std::to_string(s_ * n_) + ")", s_ * n_, StageSizes::stored(n_),
+    StepTraits traits{"stage velocities (" + std::to_string(s_ * n_) + ")", s_ * n_, StageSizes::stored,
                       m_ * s_};
     if (m_ > 0) traits.unknowns += ", multipliers (" + std::to_string(s_ * m_) + ")";
     if (s_ == 1) return traits;  // one stage is no polynomial
@@ -96,15 +91,12 @@ class GaussLobattoStep final : public StepProblem {
     points_.weights.scale_to(step.size);
     if (sums_) sums_->begin(start.rest);
     p0_ = start.p;
-    v0_ = start.v;
     points_.lobatto.col(0) = start.q;
     splitting_known_ = false;
-    curvature_taken_ = false;
     sizes_.begin(memory, largest_entry(start.q.data(), start.q.size()));
     for (StageRows& rows : rows_) rows.begin(points_);
     last_impulse_ = memory.known && m_ > 0 ? impulse_scale(memory.multipliers) : 0.0;
     update_scales();
-    update_row_scales(memory.known ? &memory.multipliers : nullptr);
     evaluated_ = false;
   }
 
@@ -136,7 +128,6 @@ class GaussLobattoStep final : public StepProblem {
   void jacobian(ConstVectorRef x, VectorRef values) override {
     evaluate(x);
     if (momentum_.second_derivatives(points_, x)) sizes_.curvature = curvature_size();
-    curvature_taken_ = true;
     momentum_.set_jacobian(points_, layout_, values);
     sizes_.row_curvature = 0.0;
     for (StageRows& rows : rows_) {
@@ -183,50 +174,11 @@ class GaussLobattoStep final : public StepProblem {
     evaluated_ = true;
     move_points(x);
     momentum_.evaluate(points_, x);
-    if (m_ > 0) {
-      impulses_.setZero();
-      for (StageRows& rows : rows_) rows.add_impulses(points_, x, impulses_);
-      blocks_[0].scale = std::max(blocks_[0].scale, part() * impulse_scale(x.tail(m_ * s_)));
-    }
-    if (blocks_[0].each != nullptr || (m_ > 0 && blocks_[1].each != nullptr)) raise_row_scales(x);
-  }
-
-  /// Terms at x that are larger than those that the scales of the rows were taken from.
-  void raise_row_scales(ConstVectorRef x) {
-    const double h = std::abs(step_size());
-    if (blocks_[0].each != nullptr)
-      for (int j = 0; j < s_; ++j)
-        for (int i = 0; i < n_; ++i) {
-          const double impulse = m_ > 0 ? std::abs(impulses_(i, j)) : 0.0;
-          momentum_scales_.raise(i, part() * std::max({std::abs(momentum_.momenta()(i, j)),
-                                                       h * std::abs(momentum_.forces()(i, j)), impulse}));
-        }
-    if (m_ == 0 || blocks_[1].each == nullptr) return;
-    speeds_ = velocities(x).cwiseAbs().rowwise().maxCoeff();
-    for (StageRows& rows : rows_) rows.size_terms(speeds_, row_scales_.terms);
-    for (int r = 0; r < m_; ++r) row_scales_.raise(r, part() * row_scales_.terms[r]);
-  }
-
-  /// Scales of rows whose terms are far smaller than the largest; multipliers of the last step, if any.
-  void update_row_scales(const Vector* multipliers) {
-    const double h = std::abs(step_size());
-    if (n_ > 1 || blocks_[0].scale <= smallest_scale) {
-      for (int i = 0; i < n_; ++i)
-        momentum_scales_.terms[i] = std::max(std::abs(p0_[i]), sizes_.momenta[i]) + h * sizes_.forces[i];
-      if (multipliers != nullptr && m_ > 0 && !momentum_scales_.alike(blocks_[0].scale / part()))
-        for (const StageRows& rows : rows_) rows.add_impulse_sizes(*multipliers, momentum_scales_.terms);
-      momentum_scales_.give_to(blocks_[0], part());
-    }
     if (m_ == 0) return;
-    for (int i = 0; i < n_; ++i) speeds_[i] = std::max(std::abs(points_.lobatto(i, 0)) / h, std::abs(v0_[i]));
-    for (StageRows& rows : rows_) rows.size_terms(speeds_, row_scales_.terms);
-    if (blocks_[1].scale <= smallest_scale) blocks_[1].scale = scale_of(part() * max_norm(row_scales_.terms));
-    row_scales_.give_to(blocks_[1], part());
+    impulses_.setZero();
+    for (StageRows& rows : rows_) rows.add_impulses(points_, x, impulses_);
+    blocks_[0].scale = std::max(blocks_[0].scale, (sums_ ? last_bit : 1.0) * impulse_scale(x.tail(m_ * s_)));
   }
-
-  /// What an iteration leaves of the residual is no random error: it is a smooth function of the state and
-  /// drives the energy one way.  So compensated sums are solved for to the last bit.
-  double part() const { return sums_ ? last_bit : 1.0; }
 
   /// to = base + Σ_j force_j ∂L/∂q_j + Σ_j impulse_j Aᵀλ_j in these rows.
   void add_forces_and_impulses(int first, int rows, const double* force, const double* impulse,
@@ -263,34 +215,14 @@ class GaussLobattoStep final : public StepProblem {
 
   /// Sizes at x, for the next step.
   void measure(ConstVectorRef x, StepMemory& memory) {
-    StageSizes& sizes = sizes_of_end_;
-    sizes.known = sizes_.known;
-    sizes.curvature = sizes_.curvature;
-    sizes.row_curvature = sizes_.row_curvature;
+    StageSizes sizes = sizes_;
     sizes.force = largest_entry(momentum_.forces().data(), momentum_.forces().size());
     if (!sizes.known && sizes.curvature == 0.0) {  // solved without a Jacobian
       (void)momentum_.second_derivatives(points_, last_x_);
       sizes.curvature = curvature_size();
     }
-    momentum_.size_forces(s_, sizes.forces);
-    for (int i = 0; i < n_; ++i) sizes.momenta[i] = std::abs(momentum_.momenta()(i, 0));
-    if (n_ > 1) measure_rows(x, sizes);
     sizes.store(memory);
     memory.multipliers = x.tail(m_ * s_);
-  }
-
-  /// Where momenta and forces of some coordinate are far smaller than others they may have cancelled.
-  void measure_rows(ConstVectorRef x, StageSizes& sizes) {
-    momentum_scales_.terms = sizes.momenta + std::abs(step_size()) * sizes.forces;
-    if (momentum_scales_.alike(blocks_[0].scale / part())) return;
-    if (!curvature_taken_ && momentum_.quadratic()) (void)momentum_.second_derivatives(points_, x);
-    if (curvature_taken_ || momentum_.quadratic()) {
-      momentum_.raise_by_terms(points_.gauss.col(0), x.head(n_), std::abs(step_size()), sizes.momenta,
-                               sizes.forces);
-    } else {  // those of the last step that took a Jacobian
-      sizes.momenta = sizes.momenta.cwiseMax(sizes_.momenta);
-      sizes.forces = sizes.forces.cwiseMax(sizes_.forces);
-    }
   }
 
   double curvature_size() const {
@@ -310,24 +242,21 @@ class GaussLobattoStep final : public StepProblem {
     const double before = blocks_[0].scale;  // of impulses nothing is known yet
     sizes_.force = largest_entry(momentum_.forces().data(), n_);
     sizes_.curvature = largest_entry(momentum_.curvatures().data(), momentum_.curvatures().rows());
-    momentum_.size_forces(1, sizes_.forces);
-    momentum_.raise_by_terms(points_.lobatto.col(0), v0, std::abs(step_size()), sizes_.momenta,
-                             sizes_.forces);
-    v0_ = v0;
     evaluated_ = false;
     update_scales();
     blocks_[0].scale = std::max(blocks_[0].scale, before);
-    update_row_scales(nullptr);
   }
 
   /// Terms of the momentum rows are momenta, those of the last step where this one is not solved yet; a
   /// velocity of size |q|/h loses ε|q|/h to round-off.
   void update_scales() {
     const double h = std::abs(step_size()), velocity = sizes_.position / h;
-    blocks_[0].scale = scale_of(sizes_.momentum(h, largest_entry(p0_.data(), n_)) + last_impulse_);
+    blocks_[0].scale = usable_scale(sizes_.momentum(h, largest_entry(p0_.data(), n_)) + last_impulse_);
     double one_forms = 0.0;
     for (const StageRows& rows : rows_) one_forms = std::max(one_forms, rows.form_size());
-    if (m_ > 0) blocks_[1].scale = scale_of(one_forms * velocity);
+    if (m_ > 0) blocks_[1].scale = usable_scale(one_forms * velocity);
+    // What an iteration leaves of the residual is no random error: it is a smooth function of the state and
+    // drives the energy one way.  So solve to the last bit.
     if (sums_)
       for (ResidualBlock& block : blocks_) block.scale *= last_bit;
   }
@@ -342,17 +271,14 @@ class GaussLobattoStep final : public StepProblem {
 
   std::optional<CompensatedSums> sums_;
 
-  RowScales momentum_scales_, row_scales_;
-
-  Vector p0_, v0_, speeds_, last_x_;
+  Vector p0_, last_x_;
   Columns impulses_;  ///< A(Q~_j)ᵀ λ_j
-  StageSizes sizes_, sizes_of_end_;
+  StageSizes sizes_;
   double last_impulse_ = 0.0;  ///< size of it with the multipliers of the step before, at this start
   std::optional<StageSplitting> splitting_;  ///< small scenes with rows of one kind
   bool splitting_known_ = false;
-  bool affine_;                   ///< the residual is affine in the unknowns
-  bool evaluated_ = false;        ///< at last_x_
-  bool curvature_taken_ = false;  ///< in this step
+  bool affine_;             ///< the residual is affine in the unknowns
+  bool evaluated_ = false;  ///< at last_x_
 };
 
 }  // namespace
