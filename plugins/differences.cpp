@@ -17,9 +17,10 @@ constexpr double round_off = 4.0 * std::numeric_limits<double>::epsilon();
 constexpr double divisor = 16.0;  // of the increment where they do not agree
 constexpr int most_divisions = 8;
 constexpr double scale_over_increment = 512.0;
-constexpr double known_to = 1e-5;  // relative error of derivatives from which they are doubted
-constexpr int most_rungs = 12;          // from a guess of a scale
-constexpr double worth_a_rung = 0.5;  // of the error: less is gained at this point alone
+constexpr double known_to = 1e-5;         // relative error of derivatives from which they are doubted
+constexpr int most_rungs = 12;            // from a guess of a scale
+constexpr double slope_known_to = 1e-10;  // relative, from where a straight line asks for no larger scale
+constexpr double worth_a_rung = 0.5;      // of the error: less is gained at this point alone
 
 /// The increment for a variable of this scale: a power of two, so that x + kδ is exact for most x.
 double increment(double scale) { return std::exp2(std::ceil(std::log2(scale))) / scale_over_increment; }
@@ -69,6 +70,11 @@ struct Sums {
   bool resolved(Eigen::Index r) const {
     const double apart = disagreement(r) + std::abs(bend[r] - bend_near[r]);
     return apart <= resolution * (std::abs(sixth[r]) + std::abs(bend[r])) + 8.0 * loss(r);
+  }
+  /// Whether f is a straight line over some δ, of a slope that is known: it says nothing of how far it stays
+  /// one.
+  bool known_straight(Eigen::Index r) const {
+    return std::abs(bend[r]) <= 8.0 * loss(r) && loss(r) <= slope_known_to * std::abs(sixth[r]);
   }
   bool agree(double factor) const { return misfit(factor) <= agreement; }
 };
@@ -241,6 +247,7 @@ DifferenceScales find_scales(const std::function<double(ConstVectorRef)>& f, Con
     for (const double factor : {divisor, 1.0 / divisor}) {
       terms = terms_at_first;
       for (int rung = 0; rung < most_rungs; ++rung) {
+        if (factor > 1.0 && sums.known_straight(0)) break;
         const double next = error(scales[i] * factor);
         if (!(next < worth_a_rung * best)) break;
         best = next;
