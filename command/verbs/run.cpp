@@ -150,7 +150,9 @@ void run_fixed(const Options& options, const CatalogueScene& entry, const Sessio
   Keeping keeping{.momentum = result.momentum, .every = options.every};
   keeping.checkpoint = checkpoint_path(options);
   keeping.checkpoint_every = options.checkpoint_every;
-  keeping.identity = run_identity(entry, session, options.method, integrator, keeping, !options.out.empty());
+  if (!keeping.checkpoint.empty())  // else nothing is saved or compared, and no plugin has to be read for it
+    keeping.identity =
+        run_identity(entry, session, options.method, integrator, keeping, !options.out.empty());
   std::optional<Checkpoint> saved;
   if (!options.resume.empty()) {
     saved = read_checkpoint(options.resume);
