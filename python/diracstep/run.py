@@ -49,12 +49,12 @@ class Search:
 
 
 @dataclass(frozen=True, repr=False, eq=False)
-class Run:
-    """Points of a motion: row k of each array is point k.  Units are those of the scene.
+class Points:
+    """Points of one scene: row k of each array is point k.
 
     ``t``, ``energy``: N numbers.  ``q``, ``v``, ``p``: N × n, a column for each coordinate; v lies in the distribution, p is the
     representative asked for.  ``lambda_``: N × m, the forces of the rows.  ``invariants``: N × i, what the scene declares as
-    kept.  The arrays own their memory.
+    kept.  Units are those of the scene.  The arrays own their memory.
     """
 
     scene: Scene
@@ -65,6 +65,16 @@ class Run:
     lambda_: np.ndarray
     energy: np.ndarray
     invariants: np.ndarray
+
+    def __len__(self) -> int:
+        """The number of points."""
+        return len(self.t)
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class Run(Points):
+    """Points of a motion, with the arrays of ``Points``, and how they came about."""
+
     statistics: Statistics | None = None
     search: Search | None = None  #: where an error was asked for
     doubt: str = ""  #: empty, or why the points are not to be believed
@@ -81,10 +91,6 @@ class Run:
             places["v_" + name] = (self.v, index)
             places["p_" + name] = (self.p, index)
             places[name] = (self.q, index)
-
-    def __len__(self) -> int:
-        """The number of points."""
-        return len(self.t)
 
     def __getitem__(self, name: str) -> np.ndarray:
         """One quantity along the run: ``"x"``, ``"v_x"``, ``"p_x"``, the name of a row for its force, of an invariant, or
@@ -163,23 +169,13 @@ class Run:
 
 
 @dataclass(frozen=True, repr=False, eq=False)
-class Ensemble:
-    """Ends of many motions of one scene: row k is that of start k.  Arrays as those of a Run.
+class Ensemble(Points):
+    """Ends of many motions of one scene: row k is that of start k.
 
     ``failures`` says why some stopped early; their rows are the last points that could be read.
     """
 
-    scene: Scene
-    t: np.ndarray
-    q: np.ndarray
-    v: np.ndarray
-    p: np.ndarray
-    lambda_: np.ndarray
-    energy: np.ndarray
-    invariants: np.ndarray
     failures: dict[int, str]
-
-    __len__ = Run.__len__
 
     def __repr__(self) -> str:
         return f"<ensemble of {self.scene.name}: {len(self)} ends, {len(self.failures)} failed>"
