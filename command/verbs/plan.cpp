@@ -3,8 +3,8 @@
 #include <CLI/App.hpp>
 #include <cmath>
 #include <diracstep/command/arguments.hpp>
-#include <diracstep/command/variable_steps.hpp>
 #include <diracstep/command/verbs.hpp>
+#include <diracstep/core/adaptive/rate_survey.hpp>
 #include <diracstep/core/integrator/integrator.hpp>
 #include <diracstep/reports/json.hpp>
 #include <diracstep/reports/report.hpp>
@@ -59,7 +59,7 @@ void plan(const PlanArguments& options, Session& session) {
   for (const std::string& change : entry.changes) lines.push_back({"scene", "changed", change});
   if (choice.name != options.method.name)
     lines.push_back({"method", choice.name, "the scene's file recommends it"});
-  lines.push_back(rate_line(*entry.scene, session.solvers, entry.t_end, entry.natural_step));
+  lines.push_back(variable_steps_line(entry.scene, session.solvers, entry.t_end, entry.natural_step, "--adaptive"));
   print(options.json ? as_json(integrator, lines) : as_text(integrator, lines));
 }
 

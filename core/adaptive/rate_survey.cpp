@@ -6,6 +6,7 @@
 #include <diracstep/core/adaptive/pointwise_motion.hpp>
 #include <diracstep/core/adaptive/rate_survey.hpp>
 #include <diracstep/core/numerics/errors.hpp>
+#include <sstream>
 #include <vector>
 
 namespace diracstep {
@@ -15,6 +16,7 @@ namespace {
 constexpr double short_part = 1e-3;     // of the span: a survey of less says little of the motion
 constexpr double largest_power = 20.0;  // of the time, by which ω is taken to fall like m/(t − t0)
 constexpr long longer_survey = 8;       // times the steps, once, where ω falls so
+constexpr double most_of_fixed = 20.0;  // times the fixed steps that variable ones may take
 constexpr long most_steps = 5000;       // of a survey that is made longer
 
 /// The motion over one step of the survey: mean squares of v and a, and of ȧ from their difference.
@@ -174,6 +176,33 @@ RateSurvey survey_rate(const Scene& scene, const SolverFactory& solvers, double 
     survey.fastest = std::max(survey.fastest, rate);
   }
   return survey;
+}
+
+PlanLine variable_steps_line(const std::shared_ptr<const Scene>& given, const SolverFactory& solvers,
+                             double end, double step, const std::string& how) {
+  const auto scene = completed(given);
+  if (!has_accelerations(*scene))
+    return {"variable steps", "not offered", "L is linear in v: no accelerations to choose them by"};
+  const RateSurvey survey = survey_rate(*scene, solvers, end);
+  if (!survey.failure.empty()) return {"variable steps", "not known", survey.failure};
+  const double span = std::abs(end - scene->start.time);
+  std::ostringstream reason;
+  reason.precision(2);
+  reason << "max ω / min ω = " << survey.ratio() << " over the first ";
+  reason.precision(3);
+  reason << survey.covered << " of " << span << " units of time";
+  // The survey takes four accelerations a step, and larger steps than a run.
+  const double wanted = 1.5 * static_cast<double>(survey.accelerations) / 4.0 * span / survey.covered;
+  const double fixed = span / std::abs(step);
+  if (wanted > most_of_fixed * fixed) {
+    std::ostringstream text;
+    text.precision(1);
+    text << "they would take about " << wanted << " steps, " << fixed
+         << " of the scene's own size lead to the end; " << reason.str();
+    return {"variable steps", "left out", text.str()};
+  }
+  if (survey.variable_steps_pay()) return {"variable steps", "pay: " + how, reason.str()};
+  return {"variable steps", "left out", reason.str() + ", they pay above 5"};
 }
 
 }  // namespace diracstep
