@@ -507,7 +507,7 @@ TEST_F(CInterface, ThePlanTellsWhetherVariableStepsPay) {
     return std::string("no line");
   };
   EXPECT_EQ(decision("kepler_e099"), "pay: eps");
-  EXPECT_EQ(decision("pendulum"), "left out");
+  EXPECT_EQ(decision("pendulum_cartesian"), "left out");
 }
 
 }  // namespace
