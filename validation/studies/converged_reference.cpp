@@ -17,7 +17,7 @@ struct Ladder {
   const char* method;
   int order;
 };
-constexpr std::array<Ladder, 4> ladders{
+constexpr std::array<Ladder, 4> reference_ladders{
     {{"type1/gl:6", 12}, {"type1/gl:4", 8}, {"type1/midpoint", 8}, {"type1/trapezoidal", 8}}};
 
 constexpr double converged = 1e-6;  ///< a change above it is never taken for round-off
@@ -123,7 +123,7 @@ ReferenceEnd converged_reference(const CatalogueScene& scene, const Registry& re
   const Refinement refinement(scene, registry, solvers, t_end, look);
   std::vector<Refined> found;
   ReferenceEnd reference{.kind = "converged", .how = {}, .missing = {}, .q = {}, .p = {}};
-  for (const Ladder& candidate : ladders) {
+  for (const Ladder& candidate : reference_ladders) {
     if (found.size() == 2) break;
     try {
       Refined one = refinement.refined(candidate, 0.5 * seconds);
