@@ -199,7 +199,7 @@ double pendulum_angle(double angle, double end) {
   double rate = 0.0;
   const int verlet_steps = 20000;
   const double h = end / verlet_steps;
-  for (int k = 0; k < verlet_steps; ++k) {  // Stoermer and Verlet's verlet_steps, far below the error looked for
+  for (int k = 0; k < verlet_steps; ++k) {  // Stoermer and Verlet's steps, far below the error looked for
     rate -= h / 2.0 * 9.81 * std::sin(angle);
     angle += h * rate;
     rate -= h / 2.0 * 9.81 * std::sin(angle);
