@@ -1,0 +1,224 @@
+#include <algorithm>
+#include <cmath>
+#include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/numerics/scales.hpp>
+#include <diracstep/solvers/detail/jacobian_factors.hpp>
+#include <diracstep/solvers/direct_solver.hpp>
+#include <limits>
+
+namespace diracstep {
+
+namespace {
+
+/// A residual of so many tolerances is round-off.
+constexpr double round_off = 16.0;
+/// With a Jacobian of another point the last correction has to be this small beside the unknowns.
+constexpr double linear_step_tolerance = 1e-14;
+/// The fixed-point iteration is judged by its first solves, once there is a history to guess from: without
+/// KINSOL around them so many iterations cost what Newton's method does.
+constexpr int quick = 10, solves_to_judge = 12;
+/// A solve gives it up where its rate promises more iterations than these; a single rate says little.
+constexpr int max_fixed_point = 30, iterations_to_judge = 2;
+
+class DirectSolver final : public NonlinearSolver {
+ public:
+  DirectSolver(NonlinearProblem& problem, KinsolOptions options)
+      : problem_(problem),
+        options_(options),
+        factors_(problem, options.jacobian),
+        fixed_point_(options.iteration != Iteration::newton && problem.has_splitting()) {
+    if (problem.blocks().size() > report_.residual_norms.size())
+      throw Misuse("a problem with " + std::to_string(problem.blocks().size()) +
+                   " residual blocks; at most 4 are reported");
+    for (Vector* column : {&guess_, &f_, &last_}) column->setZero(problem.size());
+  }
+
+  SolveReport solve(VectorRef x) override {
+    report_ = {};
+    report_.status = SolveStatus::no_convergence;
+    guess_ = x;
+    if (fixed_point_ && !given_up_) contract(x);
+    if (!report_.ok()) newton(x);
+    return report_.ok() ? report_ : by_kinsol(x);
+  }
+
+  void reset() override {
+    factors_.reset();
+    judged_solves_ = judged_iterations_ = 0;
+    given_up_ = false;
+  }
+  void save(Snapshot& to) const override {
+    factors_.save(to);
+    to.put("judged solves", judged_solves_);
+    to.put("judged iterations", judged_iterations_);
+    to.put("fixed-point iteration given up", given_up_);
+  }
+  void restore(SnapshotReader& from) override {
+    factors_.restore(from);
+    judged_solves_ = static_cast<int>(from.whole_number("judged solves", solves_to_judge));
+    judged_iterations_ =
+        static_cast<int>(from.whole_number("judged iterations", std::numeric_limits<int>::max()));
+    given_up_ = from.flag("fixed-point iteration given up");
+  }
+
+  std::string description() const override {
+    return std::string("direct, ") + factors_.name() + "; KINSOL where it does not converge";
+  }
+  std::string strategy() const override {
+    std::string newton = "Newton's method, " + factors_.policy();
+    if (!fixed_point_) return newton;
+    const bool measured = options_.iteration == Iteration::automatic;
+    return (measured ? "fixed-point iteration while it is quick; otherwise "
+                     : "fixed-point iteration; where it fails ") +
+           newton;
+  }
+
+ private:
+  /// The residual at x, and its largest entry in units of its block; infinite where one is no number.
+  double evaluate(ConstVectorRef x) {
+    ++report_.residual_evaluations;
+    problem_.residual(x, f_);
+    const double* row = f_.data();
+    double largest = 0.0;
+    std::size_t b = 0;
+    for (const ResidualBlock& block : problem_.blocks()) {
+      const double norm = report_.residual_norms[b++] = largest_if_finite(row, block.rows);
+      largest = std::isnan(norm) ? HUGE_VAL : std::max(largest, norm / block.scale);
+      row += block.rows;
+    }
+    return largest;
+  }
+
+  /// Whether the residual is as small as it gets: below the tolerance, or round-off that no longer falls.
+  bool solved(double norm, double before) const {
+    return norm <= options_.tolerance || (norm > before / 2.0 && norm <= round_off * options_.tolerance);
+  }
+
+  /// x ← x − P⁻¹F(x) until F is round-off; where that is slow, x is left where F is smaller than at the
+  /// guess.
+  void contract(VectorRef x) {
+    const double first = evaluate(x);
+    double norm = first, before = HUGE_VAL;
+    int count = 0;
+    while (!solved(norm, before) && !too_slow(norm, before, count)) {
+      problem_.solve_splitting(f_);
+      x -= f_;
+      ++count;
+      before = norm;
+      norm = evaluate(x);
+    }
+    report_.iterations += count;
+    if (solved(norm, before)) report_.status = SolveStatus::ok;
+    if (!(norm <= first)) x = guess_;
+    if (options_.iteration == Iteration::automatic) judge(count);
+  }
+
+  /// Whether the iteration diverges, or at its rate takes too many iterations.
+  bool too_slow(double norm, double before, int count) const {
+    if (!std::isfinite(norm)) return true;
+    if (count < iterations_to_judge) return norm > 2.0 * before;
+    const double rate = norm / before;
+    return rate >= 1.0 || norm * std::pow(rate, max_fixed_point - count) > options_.tolerance;
+  }
+
+  /// Newton's method from now on, where the fixed-point iteration has turned out to be slow.
+  void judge(int iterations) {
+    if (judged_solves_ == solves_to_judge) return;
+    judged_iterations_ += report_.ok() ? iterations : max_fixed_point;
+    given_up_ = ++judged_solves_ == solves_to_judge && judged_iterations_ > quick * solves_to_judge;
+  }
+
+  /// Newton's method with full steps, as KINSOL takes them: until F is below the tolerance, and where the
+  /// corrections are small for as long as it still halves.
+  void newton(VectorRef x) {
+    factors_.begin();
+    report_.status = SolveStatus::no_convergence;
+    double norm = evaluate(x);
+    for (int k = 0; k < options_.max_iterations && std::isfinite(norm) && norm > options_.tolerance; ++k) {
+      if (!factor(x, norm)) break;
+      const double before = norm;
+      last_ = x;
+      factors_.solve(f_.data());
+      const bool small = small_correction();
+      x -= f_;
+      ++report_.iterations;
+      norm = evaluate(x);
+      if (norm <= options_.tolerance || !small || norm < before / 2.0) continue;
+      if (norm > before) {
+        x = last_;
+        norm = evaluate(x);
+      }
+      break;
+    }
+    report_.jacobian_evaluations += factors_.evaluations();
+    if (!std::isfinite(norm)) report_.status = SolveStatus::not_finite;
+    if (norm <= options_.accept) report_.status = SolveStatus::ok;
+    if (report_.ok() && report_.iterations > 0 && !factors_.exact() && !factors_.current()) correct_again(x);
+  }
+
+  /// Where the convergence is linear, what is left of the error has the same sign in one step after the
+  /// other; a last correction, which is not evaluated any more, makes it small beside round-off.
+  void correct_again(VectorRef x) {
+    factors_.solve(f_.data());
+    x -= f_;
+  }
+
+  bool small_correction() const {
+    const double size = largest_entry(guess_.data(), guess_.size());
+    const double unit = size > 0.0 && std::isfinite(size) ? size : 1.0;
+    const double tolerance =
+        factors_.exact() ? options_.step_tolerance : std::min(options_.step_tolerance, linear_step_tolerance);
+    return largest_entry(f_.data(), f_.size()) <= tolerance * unit;
+  }
+
+  bool factor(ConstVectorRef x, double norm) {
+    using Outcome = detail::JacobianFactors::Outcome;
+    const Outcome outcome = factors_.prepare(x, factors_.exact() ? 0.0 : norm);
+    if (outcome == Outcome::singular) report_.status = SolveStatus::singular_jacobian;
+    if (outcome == Outcome::not_finite) report_.status = SolveStatus::not_finite;
+    return outcome == Outcome::ready;
+  }
+
+  SolveReport by_kinsol(VectorRef x) {
+    x = guess_;
+    if (!kinsol_) {
+      KinsolOptions options = options_;
+      options.iteration = Iteration::newton;
+      kinsol_ = kinsol(options)(problem_);
+    }
+    kinsol_->reset();
+    report_.add(kinsol_->solve(x));
+    return report_;
+  }
+
+  NonlinearProblem& problem_;
+  KinsolOptions options_;
+  detail::JacobianFactors factors_;
+  bool fixed_point_;
+  std::unique_ptr<NonlinearSolver> kinsol_;  ///< made where it is needed first
+  Vector guess_, f_, last_;
+  SolveReport report_;
+  int judged_solves_ = 0, judged_iterations_ = 0;
+  bool given_up_ = false;  ///< the fixed-point iteration was slow
+};
+
+}  // namespace
+
+SolverFactory direct(KinsolOptions options) {
+  return [options](NonlinearProblem& problem) -> std::unique_ptr<NonlinearSolver> {
+    return std::make_unique<DirectSolver>(problem, options);
+  };
+}
+
+SolverFactory named_solver(const std::string& name, KinsolOptions options) {
+  options.iteration = Iteration::automatic;
+  if (name == "direct") return direct(options);
+  try {
+    options.iteration = iteration(name);
+  } catch (const Misuse& misuse) {
+    throw Misuse(std::string(misuse.what()) + ", and direct, which does without KINSOL");
+  }
+  return kinsol(options);
+}
+
+}  // namespace diracstep
