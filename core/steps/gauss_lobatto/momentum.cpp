@@ -35,18 +35,16 @@ void StageMomentum::plan(BlockPattern& layout) const {
 }
 
 void StageMomentum::evaluate(const StagePoints& at, ConstVectorRef x) {
-  for (int i = 0; i < s_; ++i) {
-    const auto v = x.segment(n_ * i, n_);
-    lagrangian_->gradient(at.gauss_time(i), at.gauss.col(i), v, lq_.col(i), lv_.col(i));
-    if (!force_) continue;
-    force_->value(at.gauss_time(i), at.gauss.col(i), v, f_);
+  lagrangian_->gradients(at.at_gauss(x.data()), lq_.data(), lv_.data());
+  for (int i = 0; force_ && i < s_; ++i) {
+    force_->value(at.gauss_time(i), at.gauss.col(i), x.segment(n_ * i, n_), f_);
     lq_.col(i) += f_;
   }
 }
 
 bool StageMomentum::second_derivatives(const StagePoints& at, ConstVectorRef x) {
   const bool taken = !hessians_known_;
-  for (int i = 0; taken && i < s_; ++i) second_derivatives(at, x, i);
+  if (taken) lagrangian_->hessians(at.at_gauss(x.data()), lqq_.data(), lqv_.data(), lvv_.data());
   for (int i = 0; force_ && i < s_; ++i)
     force_->derivatives(at.gauss_time(i), at.gauss.col(i), x.segment(n_ * i, n_), fq_.col(i), fv_.col(i));
   if (taken) hessians_known_ = lagrangian_->structure().quadratic && all_finite();

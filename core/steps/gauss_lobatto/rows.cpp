@@ -13,9 +13,9 @@ StageRows::StageRows(std::shared_ptr<const ConstraintRows> rows, int stages, int
   at_lobatto_.setZero(nonzeros, s_ + 1);
   at_gauss_.setZero(nonzeros, s_);
   curvature_.setZero(curved, s_);
-  derivative_.setZero(nonzeros);
+  derivative_.setZero(nonzeros, s_);
   sum_.setZero(curved);
-  offset_.setZero(rows_->rows());
+  for (Columns* at_nodes : {&offset_, &positions_, &multipliers_}) at_nodes->setZero(rows_->rows(), s_);
 }
 
 const SparsityPattern& StageRows::curvature_pattern() const {
@@ -34,44 +34,41 @@ void StageRows::plan(BlockPattern& layout) {
     }
 }
 
-void StageRows::evaluate_lobatto(const StagePoints& at, int j) {
-  rows_->coefficients(at.lobatto_time(j), at.lobatto.col(j), at_lobatto_.col(j), offset_);
-}
-
-void StageRows::evaluate_gauss(const StagePoints& at, int j) {
-  rows_->coefficients(at.gauss_time(j), at.gauss.col(j), at_gauss_.col(j), offset_);
+void StageRows::evaluate_lobatto(const StagePoints& at, int first, int count) {
+  rows_->coefficients_at(at.at_lobatto(first, count), at_lobatto_.col(first).data(), offset_.data());
 }
 
 void StageRows::add_impulses(const StagePoints& at, ConstVectorRef x, Columns& impulses) {
   gauss_known_ = false;
+  if (s_ > 1) evaluate_lobatto(at, 1, s_ - 1);
   for (int j = 0; j < s_; ++j) {
-    if (j > 0) evaluate_lobatto(at, j);
     rows_->pattern().transposed_multiply_add(at_lobatto_.col(j).data(), x.data() + first_ + stride_ * j,
                                              impulses.col(j).data());
   }
 }
 
 void StageRows::residual(const StagePoints& at, ConstVectorRef x, VectorRef& f) {
-  const double per_step = 1.0 / at.step.size;
-  for (int j = 0; j < s_; ++j) {
-    auto out = f.segment(first_ + stride_ * j, rows_->rows());
-    if (rows_->holonomic()) {
-      rows_->position(at.lobatto_time(j + 1), at.lobatto.col(j + 1), out);
-      out *= per_step;
-      continue;
-    }
-    evaluate_gauss(at, j);
-    out = offset_;
-    rows_->pattern().multiply_add(at_gauss_.col(j).data(), x.data() + n_ * j, out.data());
+  const int m = rows_->rows();
+  if (rows_->holonomic()) {
+    rows_->positions(at.at_lobatto(1, s_), positions_.data());
+    const double per_step = 1.0 / at.step.size;
+    for (int j = 0; j < s_; ++j)
+      for (int r = 0; r < m; ++r) f[first_ + stride_ * j + r] = per_step * positions_(r, j);
+    return;
   }
+  rows_->coefficients_at(at.at_gauss(), at_gauss_.data(), offset_.data());
   gauss_known_ = true;
+  for (int j = 0; j < s_; ++j) {
+    double* const out = f.data() + first_ + stride_ * j;
+    std::copy_n(offset_.data() + m * j, m, out);
+    rows_->pattern().multiply_add(at_gauss_.col(j).data(), x.data() + n_ * j, out);
+  }
 }
 
 void StageRows::add_to_jacobian(const StagePoints& at, const BlockPattern& layout, ConstVectorRef x,
                                 VectorRef& values) {
-  for (int j = 1; j < s_; ++j)
-    rows_->annihilator_derivative(at.lobatto_time(j), at.lobatto.col(j),
-                                  x.segment(first_ + stride_ * j, rows_->rows()), curvature_.col(j));
+  if (s_ > 1) take_curvature(at, x);
+  take_constraint(at, x);
   for (int i = 0; i < s_; ++i)
     for (int k = 0; k < s_; ++k) {
       const int place = first_layout_ + 3 * (i * s_ + k);
@@ -81,24 +78,33 @@ void StageRows::add_to_jacobian(const StagePoints& at, const BlockPattern& layou
               curvature_.col(1).data(), nullptr, sum_.data());
       layout.add_to(values.data(), place + 1, 1.0, sum_.data());
     }
-  for (int j = 0; j < s_; ++j) add_constraint(at, layout, j, x, values);
+  for (int j = 0; j < s_; ++j) add_constraint(at, layout, j, values);
 }
 
-void StageRows::add_constraint(const StagePoints& at, const BlockPattern& layout, int j, ConstVectorRef x,
-                               VectorRef& values) {
+void StageRows::take_curvature(const StagePoints& at, ConstVectorRef x) {
+  for (int j = 1; j < s_; ++j) multipliers_.col(j) = x.segment(first_ + stride_ * j, rows_->rows());
+  rows_->annihilator_derivatives(at.at_lobatto(1, s_ - 1), multipliers_.col(1).data(),
+                                 curvature_.col(1).data());
+}
+
+/// What of the rows the residual has not looked at.
+void StageRows::take_constraint(const StagePoints& at, ConstVectorRef x) {
+  if (rows_->holonomic()) return evaluate_lobatto(at, s_, 1);  // no impulse enters there
+  if (!gauss_known_) rows_->coefficients_at(at.at_gauss(), at_gauss_.data(), offset_.data());
+  rows_->derivatives(at.at_gauss(x.data()), derivative_.data());
+}
+
+void StageRows::add_constraint(const StagePoints& at, const BlockPattern& layout, int j, VectorRef& values) {
   const auto place = [&](int k) { return first_layout_ + 3 * (j * s_ + k) + 2; };
   if (rows_->holonomic()) {
-    if (j + 1 == s_) evaluate_lobatto(at, s_);  // no impulse enters there
     for (int k = 0; k < s_; ++k)
       layout.add_to(values.data(), place(k), at.weights.table.lobatto_a(j + 1, k),
                     at_lobatto_.col(j + 1).data());
     return;
   }
-  if (!gauss_known_) evaluate_gauss(at, j);
   layout.add_to(values.data(), place(j), 1.0, at_gauss_.col(j).data());
-  rows_->derivative(at.gauss_time(j), at.gauss.col(j), x.segment(n_ * j, n_), 1.0, derivative_);
   for (int k = 0; k < s_; ++k)
-    layout.add_to(values.data(), place(k), at.weights.position(k, j), derivative_.data());
+    layout.add_to(values.data(), place(k), at.weights.position(k, j), derivative_.col(j).data());
 }
 
 double StageRows::form_size() const { return largest_entry(at_lobatto_.col(0).data(), at_lobatto_.rows()); }

@@ -20,7 +20,7 @@ class StageRows {
   void plan(BlockPattern& layout);
 
   /// The rows at the start of the step.
-  void begin(const StagePoints& at) { evaluate_lobatto(at, 0); }
+  void begin(const StagePoints& at) { evaluate_lobatto(at, 0, 1); }
   /// impulses += A(Q~_j)ᵀ λ_j, column j, with the multipliers in x.
   void add_impulses(const StagePoints& at, ConstVectorRef x, Columns& impulses);
   /// Their rows of f.
@@ -45,16 +45,18 @@ class StageRows {
  private:
   /// Of the curvature; empty for one stage, whose only impulse enters at the start and so has none.
   const SparsityPattern& curvature_pattern() const;
-  void evaluate_lobatto(const StagePoints& at, int j);
-  void evaluate_gauss(const StagePoints& at, int j);
-  void add_constraint(const StagePoints& at, const BlockPattern& layout, int j, ConstVectorRef x,
-                      VectorRef& values);
+  void evaluate_lobatto(const StagePoints& at, int first, int count);
+  void take_curvature(const StagePoints& at, ConstVectorRef x);
+  void take_constraint(const StagePoints& at, ConstVectorRef x);
+  void add_constraint(const StagePoints& at, const BlockPattern& layout, int j, VectorRef& values);
 
   std::shared_ptr<const ConstraintRows> rows_;
   int s_, n_, first_, stride_;
   Columns at_lobatto_, at_gauss_;  ///< A at the nodes; at the Gauss nodes nonholonomic rows only
   Columns curvature_;              ///< ∂(Aᵀλ_j)/∂q at the Lobatto nodes
-  Vector derivative_, offset_, sum_;
+  Columns derivative_;             ///< ∂(A V + b)/∂q at the Gauss nodes
+  Columns offset_, positions_, multipliers_;
+  Vector sum_;
   bool gauss_known_ = false;
   int first_layout_ = -1;  ///< three for each pair of stages: impulses, curvature, rows
 };

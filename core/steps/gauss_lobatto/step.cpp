@@ -9,6 +9,7 @@
 #include <diracstep/core/steps/gauss_lobatto/rows.hpp>
 #include <diracstep/core/steps/gauss_lobatto/sizes.hpp>
 #include <diracstep/core/steps/gauss_lobatto/splitting.hpp>
+#include <diracstep/core/steps/gauss_lobatto/stage_sums.hpp>
 #include <diracstep/core/steps/gauss_lobatto/step.hpp>
 #include <optional>
 
@@ -34,6 +35,7 @@ class GaussLobattoStep final : public StepProblem {
       : s_(s),
         n_(scene.dimension()),
         m_(scene.rows()),
+        sum_(stage_sum(n_, s)),
         points_(s, n_),
         momentum_(scene.lagrangian, scene.force, s, dense),
         layout_(size(), size()),
@@ -87,8 +89,7 @@ class GaussLobattoStep final : public StepProblem {
     splitting_->solve(f);
   }
   void begin(Interval step, const State& start, const StepMemory& memory) override {
-    points_.step = step;
-    points_.weights.scale_to(step.size);
+    points_.begin(step);
     if (sums_) sums_->begin(start.rest);
     p0_ = start.p;
     points_.lobatto.col(0) = start.q;
@@ -108,20 +109,12 @@ class GaussLobattoStep final : public StepProblem {
 
   void residual(ConstVectorRef x, VectorRef f) override {
     evaluate(x);
-    const Columns& lv = momentum_.momenta();
-    for (int i = 0; i < s_; ++i) {
-      double* const momentum = f.data() + n_ * i;
-      if (sums_) {
-        sums_->momentum_row(i, step_size(), lv.col(i), p0_, momentum_.forces(), impulses_,
-                            f.segment(n_ * i, n_));
-        continue;
-      }
-      for_each_piece(n_, [&](int first, int rows) {
-        for (int k = first; k < first + rows; ++k) momentum[k] = lv(k, i) - p0_[k];
-        add_forces_and_impulses(first, rows, &points_.weights.force(0, i), &points_.weights.impulse(0, i),
-                                momentum, momentum);
-      });
-    }
+    if (sums_)
+      residual_in_extended_precision(f);
+    else if (sum_ != nullptr)
+      momentum_rows(f.data());
+    else
+      for (int i = 0; i < s_; ++i) long_momentum_row(i, f.data() + n_ * i);
     for (StageRows& rows : rows_) rows.residual(points_, x, f);
   }
 
@@ -180,6 +173,27 @@ class GaussLobattoStep final : public StepProblem {
     blocks_[0].scale = std::max(blocks_[0].scale, (sums_ ? last_bit : 1.0) * impulse_scale(x.tail(m_ * s_)));
   }
 
+  void momentum_rows(double* f) const {
+    const double* lv = momentum_.momenta().data();
+    for (int i = 0; i < s_; ++i)
+      for (int k = 0; k < n_; ++k) f[n_ * i + k] = *lv++ - p0_[k];
+    sum_(momentum_.forces().data(), points_.weights.force.data(), f, n_, f);
+    if (m_ > 0) sum_(impulses_.data(), points_.weights.impulse.data(), f, n_, f);
+  }
+  void long_momentum_row(int i, double* momentum) const {
+    const auto lv = momentum_.momenta().col(i);
+    for_each_piece(n_, [&](int first, int rows) {
+      for (int k = first; k < first + rows; ++k) momentum[k] = lv[k] - p0_[k];
+      add_forces_and_impulses(first, rows, &points_.weights.force(0, i), &points_.weights.impulse(0, i),
+                              momentum, momentum);
+    });
+  }
+  void residual_in_extended_precision(VectorRef& f) {
+    for (int i = 0; i < s_; ++i)
+      sums_->momentum_row(i, step_size(), momentum_.momenta().col(i), p0_, momentum_.forces(), impulses_,
+                          f.segment(n_ * i, n_));
+  }
+
   /// to = base + Σ_j force_j ∂L/∂q_j + Σ_j impulse_j Aᵀλ_j in these rows.
   void add_forces_and_impulses(int first, int rows, const double* force, const double* impulse,
                                const double* base, double* to) const {
@@ -202,6 +216,12 @@ class GaussLobattoStep final : public StepProblem {
     }
     const StageWeights& weights = points_.weights;
     const double* const q0 = points_.lobatto.data();
+    if (sum_ != nullptr) {
+      std::copy_n(x.data(), size(), last_x_.data());
+      sum_(x.data(), weights.position.data(), q0, 0, points_.gauss.data());
+      if (m_ > 0) sum_(x.data(), &weights.lobatto(0, 1), q0, 0, &points_.lobatto(0, 1));
+      return;
+    }
     for_each_piece(n_, [&](int first, int rows) {
       for (int i = 0; i < s_; ++i) {
         std::copy_n(x.data() + n_ * i + first, rows, last_x_.data() + n_ * i + first);
@@ -262,6 +282,7 @@ class GaussLobattoStep final : public StepProblem {
   }
 
   int s_, n_, m_;
+  StageSum sum_;  ///< null for long columns
   StagePoints points_;
   StageMomentum momentum_;
   std::vector<StageRows> rows_;
