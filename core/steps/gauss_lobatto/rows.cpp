@@ -87,11 +87,15 @@ void StageRows::take_curvature(const StagePoints& at, ConstVectorRef x) {
                                  curvature_.col(1).data());
 }
 
-/// What of the rows the residual has not looked at.
-void StageRows::take_constraint(const StagePoints& at, ConstVectorRef x) {
+void StageRows::evaluate_constraint(const StagePoints& at) {
   if (rows_->holonomic()) return evaluate_lobatto(at, s_, 1);  // no impulse enters there
   if (!gauss_known_) rows_->coefficients_at(at.at_gauss(), at_gauss_.data(), offset_.data());
-  rows_->derivatives(at.at_gauss(x.data()), derivative_.data());
+  gauss_known_ = true;
+}
+
+void StageRows::take_constraint(const StagePoints& at, ConstVectorRef x) {
+  evaluate_constraint(at);
+  if (!rows_->holonomic()) rows_->derivatives(at.at_gauss(x.data()), derivative_.data());
 }
 
 void StageRows::add_constraint(const StagePoints& at, const BlockPattern& layout, int j, VectorRef& values) {

@@ -30,6 +30,10 @@ class StageRows {
   void add_to_jacobian(const StagePoints& at, const BlockPattern& layout, ConstVectorRef x,
                        VectorRef& values);
 
+  /// Evaluates A where the constraint stands, as far as the residual at the same x has not.
+  void evaluate_constraint(const StagePoints& at);
+  /// A where row j of the constraint stands, values: at Gauss node j, or at Lobatto node j + 1.
+  auto constraint(int j) const { return rows_->holonomic() ? at_lobatto_.col(j + 1) : at_gauss_.col(j); }
   /// A at Lobatto node j, values.
   auto lobatto(int j) const { return at_lobatto_.col(j); }
   const ConstraintRows& rows() const { return *rows_; }

@@ -48,10 +48,7 @@ class GaussLobattoStep final : public StepProblem {
     last_x_.setZero(size());
     impulses_.setZero(n_, s_);
     p0_.setZero(n_);
-    const auto holonomic = [](const auto& block) { return block->holonomic(); };
-    const auto kinds = std::ranges::count_if(scene.constraints, holonomic);
-    if (n_ + m_ <= largest_split && (kinds == 0 || kinds == std::ssize(scene.constraints)))
-      splitting_.emplace(points_.weights.table, m_, kinds > 0, *scene.lagrangian);
+    if (n_ + m_ <= largest_split) splitting_.emplace(points_.weights.table, rows_, *scene.lagrangian);
     momentum_.plan(layout_);
     for (StageRows& rows : rows_) rows.plan(layout_);
     pattern_ = layout_.assemble(dense);
@@ -296,7 +293,7 @@ class GaussLobattoStep final : public StepProblem {
   Columns impulses_;  ///< A(Q~_j)ᵀ λ_j
   StageSizes sizes_;
   double last_impulse_ = 0.0;  ///< size of it with the multipliers of the step before, at this start
-  std::optional<StageSplitting> splitting_;  ///< small scenes with rows of one kind
+  std::optional<StageSplitting> splitting_;  ///< of small scenes
   bool splitting_known_ = false;
   bool affine_;             ///< the residual is affine in the unknowns
   bool evaluated_ = false;  ///< at last_x_
