@@ -76,6 +76,21 @@ void StageMomentum::set_jacobian(const StagePoints& at, const BlockPattern& layo
   jacobian_step_ = at.step.size;
 }
 
+void StageMomentum::place(StageArrays& arrays) {
+  arrays.lagrangian = lagrangian_.get();
+  arrays.lq = lq_.data();
+  arrays.lv = lv_.data();
+  arrays.lqq = lqq_.data();
+  arrays.lqv = lqv_.data();
+  arrays.lvv = lvv_.data();
+}
+
+bool StageMomentum::jacobian_known(const StagePoints& at) {
+  const bool known = hessians_known_ && jacobian_step_ == at.step.size;
+  jacobian_step_ = hessians_known_ ? at.step.size : 0.0;
+  return known;
+}
+
 void StageMomentum::add_block(const StagePoints& at, const BlockPattern& layout, int i, int k,
                               VectorRef& values) {
   const StageWeights& weights = at.weights;

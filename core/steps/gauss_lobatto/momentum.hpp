@@ -1,5 +1,6 @@
 #pragma once
 
+#include <diracstep/core/steps/gauss_lobatto/fixed_stages.hpp>
 #include <diracstep/core/steps/gauss_lobatto/points.hpp>
 #include <diracstep/core/system/force.hpp>
 #include <diracstep/core/system/phase_function.hpp>
@@ -37,6 +38,11 @@ class StageMomentum {
   const Columns& curvatures() const { return lqq_; }                         ///< ∂²L/∂q², values
   const SparsityPattern& pattern() const { return lagrangian_->pattern(); }  ///< of second derivatives
   auto mass(int stage) const { return lvv_.col(stage); }                     ///< ∂²L/∂v², values
+
+  /// Where its derivatives stand.
+  void place(StageArrays& arrays);
+  /// Whether the part of L in the Jacobian is the one of the last Jacobian.
+  bool jacobian_known(const StagePoints& at);
 
   /// ∂L/∂q and ∂²L/∂q² at the start of the step in place of the first node, to know their size.
   void evaluate_start(const StagePoints& at, ConstVectorRef v0);

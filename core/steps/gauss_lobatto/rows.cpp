@@ -67,8 +67,7 @@ void StageRows::residual(const StagePoints& at, ConstVectorRef x, VectorRef& f) 
 
 void StageRows::add_to_jacobian(const StagePoints& at, const BlockPattern& layout, ConstVectorRef x,
                                 VectorRef& values) {
-  if (s_ > 1) take_curvature(at, x);
-  take_constraint(at, x);
+  second_derivatives(at, x);
   for (int i = 0; i < s_; ++i)
     for (int k = 0; k < s_; ++k) {
       const int place = first_layout_ + 3 * (i * s_ + k);
@@ -81,21 +80,28 @@ void StageRows::add_to_jacobian(const StagePoints& at, const BlockPattern& layou
   for (int j = 0; j < s_; ++j) add_constraint(at, layout, j, values);
 }
 
-void StageRows::take_curvature(const StagePoints& at, ConstVectorRef x) {
-  for (int j = 1; j < s_; ++j) multipliers_.col(j) = x.segment(first_ + stride_ * j, rows_->rows());
-  rows_->annihilator_derivatives(at.at_lobatto(1, s_ - 1), multipliers_.col(1).data(),
-                                 curvature_.col(1).data());
-}
-
 void StageRows::evaluate_constraint(const StagePoints& at) {
   if (rows_->holonomic()) return evaluate_lobatto(at, s_, 1);  // no impulse enters there
   if (!gauss_known_) rows_->coefficients_at(at.at_gauss(), at_gauss_.data(), offset_.data());
   gauss_known_ = true;
 }
 
-void StageRows::take_constraint(const StagePoints& at, ConstVectorRef x) {
+void StageRows::second_derivatives(const StagePoints& at, ConstVectorRef x) {
   evaluate_constraint(at);
   if (!rows_->holonomic()) rows_->derivatives(at.at_gauss(x.data()), derivative_.data());
+  if (s_ == 1) return;
+  for (int j = 1; j < s_; ++j) multipliers_.col(j) = x.segment(first_ + stride_ * j, rows_->rows());
+  rows_->annihilator_derivatives(at.at_lobatto(1, s_ - 1), multipliers_.col(1).data(),
+                                 curvature_.col(1).data());
+}
+
+void StageRows::place(StageArrays& arrays) {
+  arrays.rows = rows_.get();
+  arrays.at_lobatto = at_lobatto_.data();
+  arrays.at_gauss = at_gauss_.data();
+  arrays.offset = offset_.data();
+  arrays.curvature = curvature_.data();
+  arrays.derivative = derivative_.data();
 }
 
 void StageRows::add_constraint(const StagePoints& at, const BlockPattern& layout, int j, VectorRef& values) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <diracstep/core/steps/gauss_lobatto/fixed_stages.hpp>
 #include <diracstep/core/steps/gauss_lobatto/points.hpp>
 #include <diracstep/core/system/constraint_rows.hpp>
 #include <memory>
@@ -30,6 +31,12 @@ class StageRows {
   void add_to_jacobian(const StagePoints& at, const BlockPattern& layout, ConstVectorRef x,
                        VectorRef& values);
 
+  /// Where it keeps what it evaluates.
+  void place(StageArrays& arrays);
+  /// Whether A at the Gauss nodes was evaluated for the last point, by whoever works on those arrays.
+  void set_gauss_known(bool known) { gauss_known_ = known; }
+  /// All that the Jacobian takes beside what the residual at the same x has evaluated.
+  void second_derivatives(const StagePoints& at, ConstVectorRef x);
   /// Evaluates A where the constraint stands, as far as the residual at the same x has not.
   void evaluate_constraint(const StagePoints& at);
   /// A where row j of the constraint stands, values: at Gauss node j, or at Lobatto node j + 1.
@@ -50,8 +57,6 @@ class StageRows {
   /// Of the curvature; empty for one stage, whose only impulse enters at the start and so has none.
   const SparsityPattern& curvature_pattern() const;
   void evaluate_lobatto(const StagePoints& at, int first, int count);
-  void take_curvature(const StagePoints& at, ConstVectorRef x);
-  void take_constraint(const StagePoints& at, ConstVectorRef x);
   void add_constraint(const StagePoints& at, const BlockPattern& layout, int j, VectorRef& values);
 
   std::shared_ptr<const ConstraintRows> rows_;

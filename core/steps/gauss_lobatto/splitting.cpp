@@ -41,21 +41,33 @@ StageSplitting::StageSplitting(const GaussLobattoTableau& table, const std::vect
     if (holonomic) response = table.lobatto_a.bottomRows(s_) * table.e.leftCols(s_);
     blocks_.push_back({block.first(), block.rows().rows(), holonomic, response});
   }
-  mass_.setZero(n_, n_);
+  for (Columns* square : {&mass_, &inverse_}) square->setZero(n_, n_);
   solution_.setZero(n_);
   for (Columns* columns : {&forms_, &through_mass_}) columns->setZero(n_, s_ * m_);
   response_.setZero(s_ * m_, s_ * m_);
   for (Columns* stages : {&mixed_, &impulses_}) stages->setZero(n_, s_);
 }
 
+void StageSplitting::take_mass(const StagePoints& at, StageMomentum& momentum, ConstVectorRef x) {
+  if (mass_known_) return;
+  const int middle = s_ / 2;
+  momentum.second_derivatives(at, x, middle);
+  set_mass(momentum.pattern(), momentum.mass(middle));
+  mass_known_ = mass_constant_ && momentum.mass(middle).allFinite();
+}
+
+const Columns& StageSplitting::inverse_mass(const StagePoints& at, StageMomentum& momentum,
+                                            ConstVectorRef x) {
+  if (mass_known_) return inverse_;
+  take_mass(at, momentum, x);
+  inverse_.setIdentity();
+  for (int k = 0; k < n_; ++k) solve_mass(inverse_.col(k).data());
+  return inverse_;
+}
+
 void StageSplitting::move_to(const StagePoints& at, StageMomentum& momentum, std::vector<StageRows>& rows,
                              ConstVectorRef x) {
-  const int middle = s_ / 2;
-  if (!mass_known_) {
-    momentum.second_derivatives(at, x, middle);
-    set_mass(momentum.pattern(), momentum.mass(middle));
-    mass_known_ = mass_constant_ && momentum.mass(middle).allFinite();
-  }
+  take_mass(at, momentum, x);
   if (m_ == 0) return;
   for (StageRows& block : rows) {
     block.evaluate_constraint(at);

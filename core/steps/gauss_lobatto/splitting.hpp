@@ -28,6 +28,10 @@ class StageSplitting {
   StageSplitting(const GaussLobattoTableau& table, const std::vector<StageRows>& rows,
                  const Lagrangian& lagrangian);
 
+  /// Takes M in the middle of the step, at the stages that were evaluated last, with the unknowns x, and
+  /// gives M⁻¹.
+  const Columns& inverse_mass(const StagePoints& at, StageMomentum& momentum, ConstVectorRef x);
+
   /// Takes M in the middle of the step and A at its nodes, where they were evaluated last, with the unknowns
   /// x.
   void move_to(const StagePoints& at, StageMomentum& momentum, std::vector<StageRows>& rows,
@@ -44,6 +48,7 @@ class StageSplitting {
     Columns response;  ///< C e
   };
 
+  void take_mass(const StagePoints& at, StageMomentum& momentum, ConstVectorRef x);
   void set_mass(const SparsityPattern& pattern, ConstVectorRef values);
   void factor_rows();
   void solve_mass(double* column);
@@ -56,7 +61,7 @@ class StageSplitting {
   Columns impulse_weights_;     ///< e_il, column i
   Columns constraint_weights_;  ///< a~_{j+1,k}, column j
   std::vector<Block> blocks_;
-  Columns mass_;
+  Columns mass_, inverse_;
   bool diagonal_ = false;
   Vector inverse_mass_;  ///< where M is diagonal
   Vector solution_;

@@ -52,6 +52,7 @@ class GaussLobattoStep final : public StepProblem {
     momentum_.plan(layout_);
     for (StageRows& rows : rows_) rows.plan(layout_);
     pattern_ = layout_.assemble(dense);
+    if (dense && !scene.force && rows_.size() <= 1) fixed_ = fixed_stages(arrays());
     blocks_.push_back({"momentum", n_ * s_});
     if (m_ > 0) blocks_.push_back({"constraint", m_ * s_});
   }
@@ -74,6 +75,7 @@ class GaussLobattoStep final : public StepProblem {
 
   bool compensate() override {
     sums_.emplace(s_, n_);
+    fixed_.reset();
     return true;
   }
 
@@ -81,9 +83,12 @@ class GaussLobattoStep final : public StepProblem {
 
   bool has_splitting() const override { return splitting_.has_value(); }
   void solve_splitting(VectorRef f) override {
-    if (!splitting_known_) splitting_->move_to(points_, momentum_, rows_, last_x_);
+    if (!splitting_known_) take_splitting();
     splitting_known_ = true;
-    splitting_->solve(f);
+    if (fixed_)
+      fixed_->solve_splitting(f.data());
+    else
+      splitting_->solve(f);
   }
   void begin(Interval step, const State& start, const StepMemory& memory) override {
     points_.begin(step);
@@ -106,6 +111,11 @@ class GaussLobattoStep final : public StepProblem {
 
   void residual(ConstVectorRef x, VectorRef f) override {
     evaluate(x);
+    if (fixed_) {
+      fixed_->residual(x.data(), f.data());
+      if (m_ > 0) rows_.front().set_gauss_known(true);
+      return;
+    }
     if (sums_)
       residual_in_extended_precision(f);
     else if (sum_ != nullptr)
@@ -118,10 +128,15 @@ class GaussLobattoStep final : public StepProblem {
   void jacobian(ConstVectorRef x, VectorRef values) override {
     evaluate(x);
     if (momentum_.second_derivatives(points_, x)) sizes_.curvature = curvature_size();
-    momentum_.set_jacobian(points_, layout_, values);
+    if (fixed_) {
+      for (StageRows& rows : rows_) rows.second_derivatives(points_, x);
+      fixed_->jacobian(momentum_.jacobian_known(points_), values.data());
+    } else {
+      momentum_.set_jacobian(points_, layout_, values);
+      for (StageRows& rows : rows_) rows.add_to_jacobian(points_, layout_, x, values);
+    }
     sizes_.row_curvature = 0.0;
-    for (StageRows& rows : rows_) {
-      rows.add_to_jacobian(points_, layout_, x, values);
+    for (const StageRows& rows : rows_) {
       sizes_.row_curvature = std::max(sizes_.row_curvature, rows.curvature_size());
     }
   }
@@ -151,6 +166,21 @@ class GaussLobattoStep final : public StepProblem {
   }
 
  private:
+  StageArrays arrays() {
+    StageArrays arrays{};
+    arrays.points = &points_;
+    arrays.p0 = p0_.data();
+    arrays.impulses = impulses_.data();
+    momentum_.place(arrays);
+    for (StageRows& rows : rows_) rows.place(arrays);
+    return arrays;
+  }
+  void take_splitting() {
+    if (!fixed_) return splitting_->move_to(points_, momentum_, rows_, last_x_);
+    for (StageRows& rows : rows_) rows.evaluate_constraint(points_);
+    fixed_->take_splitting(splitting_->inverse_mass(points_, momentum_, last_x_).data());
+  }
+
   double step_size() const { return points_.step.size; }
   int row_of(int j) const { return n_ * s_ + m_ * j; }
 
@@ -162,11 +192,14 @@ class GaussLobattoStep final : public StepProblem {
         std::memcmp(x.data(), last_x_.data(), sizeof(double) * static_cast<std::size_t>(size())) == 0)
       return;
     evaluated_ = true;
-    move_points(x);
-    momentum_.evaluate(points_, x);
+    if (fixed_) {
+      std::copy_n(x.data(), size(), last_x_.data());
+      fixed_->evaluate(x.data());
+      if (m_ > 0) rows_.front().set_gauss_known(false);
+    } else {
+      evaluate_any(x);
+    }
     if (m_ == 0) return;
-    impulses_.setZero();
-    for (StageRows& rows : rows_) rows.add_impulses(points_, x, impulses_);
     blocks_[0].scale = std::max(blocks_[0].scale, (sums_ ? last_bit : 1.0) * impulse_scale(x.tail(m_ * s_)));
   }
 
@@ -189,6 +222,13 @@ class GaussLobattoStep final : public StepProblem {
     for (int i = 0; i < s_; ++i)
       sums_->momentum_row(i, step_size(), momentum_.momenta().col(i), p0_, momentum_.forces(), impulses_,
                           f.segment(n_ * i, n_));
+  }
+
+  void evaluate_any(ConstVectorRef x) {
+    move_points(x);
+    momentum_.evaluate(points_, x);
+    impulses_.setZero();
+    for (StageRows& rows : rows_) rows.add_impulses(points_, x, impulses_);
   }
 
   /// to = base + Σ_j force_j ∂L/∂q_j + Σ_j impulse_j Aᵀλ_j in these rows.
@@ -288,6 +328,7 @@ class GaussLobattoStep final : public StepProblem {
   std::vector<ResidualBlock> blocks_;
 
   std::optional<CompensatedSums> sums_;
+  std::unique_ptr<FixedStages> fixed_;  ///< of few coordinates, rows and stages, without a force
 
   Vector p0_, last_x_;
   Columns impulses_;  ///< A(Q~_j)ᵀ λ_j
