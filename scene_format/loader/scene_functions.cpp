@@ -36,6 +36,12 @@ void clear(VectorRef& x) {  // by reference: copies of references are not free
   clear_few(x.data(), x.size(), std::make_integer_sequence<int, few>());
 }
 
+/// The same for a few columns: two at a time and no call, which is quicker up to some dozens.
+void clear(double* x, int size) {
+  for (int i = 0; i + 1 < size; i += 2) x[i] = x[i + 1] = 0.0;
+  if (size % 2 == 1) x[size - 1] = 0.0;
+}
+
 template <class Base>
 class FilePhaseFunction final : public Base {
  public:
@@ -77,9 +83,8 @@ class FilePhaseFunction final : public Base {
 
   void gradients(const PointColumns& at, double* fx, double* fy) const override {
     if (!at_once(at)) return Base::gradients(at, fx, fy);
-    const Eigen::Index size = static_cast<Eigen::Index>(this->dimension()) * at.count;
-    std::fill_n(fx, size, 0.0);
-    std::fill_n(fy, size, 0.0);
+    clear(fx, this->dimension() * at.count);
+    clear(fy, this->dimension() * at.count);
     KernelCall call = call_at(at.times[0], at.x, at.y);
     call.out[0] = fx;
     call.out[1] = fy;
@@ -88,8 +93,7 @@ class FilePhaseFunction final : public Base {
 
   void hessians(const PointColumns& at, double* fxx, double* fxy, double* fyy) const override {
     if (!at_once(at)) return Base::hessians(at, fxx, fxy, fyy);
-    const Eigen::Index size = static_cast<Eigen::Index>(this->pattern().nonzeros()) * at.count;
-    for (double* const of : {fxx, fxy, fyy}) std::fill_n(of, size, 0.0);
+    for (double* const of : {fxx, fxy, fyy}) clear(of, this->pattern().nonzeros() * at.count);
     KernelCall call = call_at(at.times[0], at.x, at.y);
     call.out[0] = fxx;
     call.out[1] = fxy;
@@ -191,12 +195,13 @@ class FileRows final : public ConstraintRows {
 
   void positions(const PointColumns& at, double* phi) const override {
     if (!holonomic() || !at_once(at)) return ConstraintRows::positions(at, phi);
-    run(0, at, call_at(at.times[0], at.x), phi, rows());
+    KernelCall call = call_at(at.times[0], at.x);
+    run(0, at, call, phi, rows());
   }
 
   void coefficients_at(const PointColumns& at, double* a, double* b) const override {
     if (!at_once(at)) return ConstraintRows::coefficients_at(at, a, b);
-    std::fill_n(b, static_cast<Eigen::Index>(rows()) * at.count, 0.0);
+    clear(b, rows() * at.count);
     KernelCall call = call_at(at.times[0], at.x);
     call.out[1] = b;
     run(1, at, call, a, pattern().nonzeros());
@@ -222,8 +227,8 @@ class FileRows final : public ConstraintRows {
   bool at_once(const PointColumns& at) const { return at.count <= function_.points_at_once() && workless(); }
 
   /// Kernel `number` into columns of so many entries.
-  void run(std::size_t number, const PointColumns& at, KernelCall call, double* out, int entries) const {
-    std::fill_n(out, static_cast<Eigen::Index>(entries) * at.count, 0.0);
+  void run(std::size_t number, const PointColumns& at, KernelCall& call, double* out, int entries) const {
+    clear(out, entries * at.count);
     call.out[0] = out;
     function_.run(number, call, at.count);
   }

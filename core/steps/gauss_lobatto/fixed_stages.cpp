@@ -1,25 +1,23 @@
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
+#include <cstdint>
+#include <cstring>
 #include <diracstep/core/numerics/small_lu.hpp>
 #include <diracstep/core/steps/gauss_lobatto/fixed_stages.hpp>
-#include <utility>
+#include <diracstep/core/steps/gauss_lobatto/stage_sums.hpp>
 
 namespace diracstep {
 
 namespace {
 
-/// y_i = base_i + Σ_k weights[s i + k] x_k, for s columns of n numbers.
-template <int n, int s>
-inline void sum_stages(const double* x, const double* weights, const double* base, int stride, double* y) {
-  std::array<double, n * s> columns;  // y may stand where x does, for all the compiler knows
-  std::copy_n(x, n * s, columns.data());
-  for (int i = 0; i < s; ++i) {
-    std::array<double, n> sum{};
-    for (int k = 0; k < s; ++k)
-      for (int r = 0; r < n; ++r) sum[r] += weights[s * i + k] * columns[k * n + r];
-    for (int r = 0; r < n; ++r) y[i * n + r] = base[i * stride + r] + sum[r];
-  }
+using detail::sum_stages;
+
+/// Columns that do not overlap, of a length known here.
+template <int count>
+inline void copy(const double* from, double* to) {
+  std::memcpy(to, from, count * sizeof(double));
 }
 
 /// Values on a pattern as full columns.
@@ -32,6 +30,10 @@ class FullBlocks {
   int entries() const { return entries_; }
   /// to = the values, zero elsewhere.
   void expand(const double* values, double* to) const {
+    if (entries_ == rows * columns) {
+      copy<rows * columns>(values, to);
+      return;
+    }
     for (int e = 0; e < rows * columns; ++e) to[e] = 0.0;
     for (int e = 0; e < entries_; ++e) to[places_[e]] = values[e];
   }
@@ -55,6 +57,7 @@ class Stages final : public FixedStages {
         forms_pattern_(m > 0 ? arrays.rows->pattern() : SparsityPattern::dense(1, n)),
         curvature_pattern_(m > 0 ? arrays.rows->curvature_pattern() : SparsityPattern::dense(n, n)),
         separable_(arrays.lagrangian->structure().separable),
+        diagonal_mass_(arrays.lagrangian->structure().y_hessian_diagonal),
         holonomic_(m > 0 && arrays.rows->holonomic()),
         response_(s * m) {
     const GaussLobattoTableau& table = weights_.table;
@@ -68,7 +71,8 @@ class Stages final : public FixedStages {
         for (int k = 0; k < s; ++k) mix_[j * s + l] += by_constraint_[j * s + k] * by_impulse_[k * s + l];
   }
 
-  void evaluate(const double* x) override {
+  double evaluate(const double* x) override {
+    std::uint64_t largest = 0;
     StagePoints& at = *a_.points;
     const double* const q0 = at.lobatto.data();
     sum_stages<n, s>(x, weights_.position.data(), q0, 0, at.gauss.data());
@@ -79,9 +83,10 @@ class Stages final : public FixedStages {
       if (s > 1) a_.rows->coefficients_at(at.at_lobatto(1, s - 1), a_.at_lobatto + entries, a_.offset);
       for (int j = 0; j < s; ++j) {
         forms_pattern_.expand(a_.at_lobatto + entries * j, lobatto_forms_[j].data());
-        impulse(lobatto_forms_[j], x + velocities + m * j, a_.impulses + n * j);
+        impulse(lobatto_forms_[j], x + velocities + m * j, a_.impulses + n * j, largest);
       }
     }
+    return std::bit_cast<double>(largest);
   }
 
   void residual(const double* x, double* f) override {
@@ -90,15 +95,14 @@ class Stages final : public FixedStages {
       for (int r = 0; r < n; ++r) row[i * n + r] = a_.lv[i * n + r] - a_.p0[r];
     sum_stages<n, s>(a_.lq, weights_.force.data(), row.data(), n, row.data());
     if constexpr (m > 0) sum_stages<n, s>(a_.impulses, weights_.impulse.data(), row.data(), n, row.data());
-    std::copy_n(row.data(), velocities, f);
+    copy<velocities>(row.data(), f);
     if constexpr (m > 0) constraint(x, f + velocities);
   }
 
   void jacobian(bool same, double* values) override {
     if (!same) take_block_of_lagrangian();
     const double* from = block_.data();
-    for (int k = 0; k < velocities; ++k, from += velocities)
-      std::copy_n(from, velocities, values + unknowns * k);
+    for (int k = 0; k < velocities; ++k, from += velocities) copy<velocities>(from, values + unknowns * k);
     if constexpr (m > 0) {
       if (s > 1) add_curvature(values);
       add_multipliers(values);
@@ -107,7 +111,7 @@ class Stages final : public FixedStages {
   }
 
   void take_splitting(const double* inverse_mass) override {
-    std::copy_n(inverse_mass, n * n, inverse_mass_.data());
+    copy<n * n>(inverse_mass, inverse_mass_.data());
     if constexpr (m > 0) {
       expand_constraint(constraint_forms_);
       for (int l = 0; l < s; ++l)
@@ -133,12 +137,17 @@ class Stages final : public FixedStages {
 
   void solve_splitting(double* f) override {
     std::array<double, velocities> v;
-    for (int i = 0; i < s; ++i)
-      for (int r = 0; r < n; ++r) {
-        double sum = 0.0;
-        for (int c = 0; c < n; ++c) sum += inverse_mass_[r + n * c] * f[i * n + c];
-        v[i * n + r] = sum;
-      }
+    if (diagonal_mass_) {
+      for (int i = 0; i < s; ++i)
+        for (int r = 0; r < n; ++r) v[i * n + r] = inverse_mass_[r + n * r] * f[i * n + r];
+    } else {
+      for (int i = 0; i < s; ++i)
+        for (int r = 0; r < n; ++r) {
+          double sum = 0.0;
+          for (int c = 0; c < n; ++c) sum += inverse_mass_[r + n * c] * f[i * n + c];
+          v[i * n + r] = sum;
+        }
+    }
     if constexpr (m > 0) {
       double* const multipliers = f + velocities;
       constexpr std::array<double, velocities> zero{};
@@ -158,15 +167,19 @@ class Stages final : public FixedStages {
         }
       sum_stages<n, s>(mixed.data(), by_impulse_.data(), v.data(), n, v.data());
     }
-    std::copy_n(v.data(), velocities, f);
+    copy<velocities>(v.data(), f);
   }
 
  private:
-  /// Aᵀλ.
-  static void impulse(const Forms& forms, const double* lambda, double* to) {
+  /// Aᵀλ, and the bits of its largest term, which have the order of positive doubles.
+  static void impulse(const Forms& forms, const double* lambda, double* to, std::uint64_t& largest) {
     for (int r = 0; r < n; ++r) {
       double sum = 0.0;
-      for (int a = 0; a < m; ++a) sum += forms[a + m * r] * lambda[a];
+      for (int a = 0; a < m; ++a) {
+        const double term = forms[a + m * r] * lambda[a];
+        largest = std::max(largest, std::bit_cast<std::uint64_t>(term) & ~(std::uint64_t{1} << 63U));
+        sum += term;
+      }
       to[r] = sum;
     }
   }
@@ -270,7 +283,7 @@ class Stages final : public FixedStages {
   FullBlocks<n, n> second_;
   FullBlocks<rows, n> forms_pattern_;
   FullBlocks<n, n> curvature_pattern_;
-  bool separable_, holonomic_, regular_ = true;
+  bool separable_, diagonal_mass_, holonomic_, regular_ = true;
   std::array<double, s * s> by_constraint_{}, by_impulse_{}, mix_{};  ///< C, e and C e, by rows
   std::array<Forms, s> lobatto_forms_{}, constraint_forms_now_{};     ///< at the last point
   std::array<Forms, s> constraint_forms_{};                           ///< of the splitting

@@ -31,8 +31,8 @@ struct StageArrays {
 class FixedStages {
  public:
   virtual ~FixedStages() = default;
-  /// Nodes, first derivatives of L and impulses at x.
-  virtual void evaluate(const double* x) = 0;
+  /// Nodes, first derivatives of L and impulses at x; gives the largest term of an impulse.
+  virtual double evaluate(const double* x) = 0;
   /// f at x, after evaluate().
   virtual void residual(const double* x, double* f) = 0;
   /// The full Jacobian, by columns, from all second derivatives; `same` where those of L and the step size

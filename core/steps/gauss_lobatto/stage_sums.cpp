@@ -8,27 +8,9 @@ namespace {
 
 constexpr int most_rows = 8, most_stages = 6;
 
-template <int n, int s>
-void sum(const double* x, const double* weights, const double* base, int stride, double* y) {
-  double columns[s * n];  // y may stand where x or the weights do, for all the compiler knows
-  for (int k = 0; k < s * n; ++k) columns[k] = x[k];
-#pragma GCC unroll 8
-  for (int i = 0; i < s; ++i) {
-    double of[n];
-#pragma GCC unroll 8
-    for (int r = 0; r < n; ++r) of[r] = weights[s * i] * columns[r];
-#pragma GCC unroll 8
-    for (int k = 1; k < s; ++k)
-#pragma GCC unroll 8
-      for (int r = 0; r < n; ++r) of[r] += weights[s * i + k] * columns[k * n + r];
-#pragma GCC unroll 8
-    for (int r = 0; r < n; ++r) y[i * n + r] = base[i * stride + r] + of[r];
-  }
-}
-
 template <int n, std::size_t... S>
 constexpr std::array<StageSum, most_stages> for_stages(std::index_sequence<S...>) {
-  return {&sum<n, static_cast<int>(S) + 1>...};
+  return {&detail::sum_stages<n, static_cast<int>(S) + 1>...};
 }
 
 template <std::size_t... N>

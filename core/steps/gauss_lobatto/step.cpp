@@ -98,7 +98,7 @@ class GaussLobattoStep final : public StepProblem {
     splitting_known_ = false;
     sizes_.begin(memory, largest_entry(start.q.data(), start.q.size()));
     for (StageRows& rows : rows_) rows.begin(points_);
-    last_impulse_ = memory.known && m_ > 0 ? impulse_scale(memory.multipliers) : 0.0;
+    last_impulse_ = memory.known && m_ > 0 ? impulse_scale(impulse_size(memory.multipliers)) : 0.0;
     update_scales();
     evaluated_ = false;
   }
@@ -192,15 +192,9 @@ class GaussLobattoStep final : public StepProblem {
         std::memcmp(x.data(), last_x_.data(), sizeof(double) * static_cast<std::size_t>(size())) == 0)
       return;
     evaluated_ = true;
-    if (fixed_) {
-      std::copy_n(x.data(), size(), last_x_.data());
-      fixed_->evaluate(x.data());
-      if (m_ > 0) rows_.front().set_gauss_known(false);
-    } else {
-      evaluate_any(x);
-    }
+    const double impulse = evaluate_points(x);
     if (m_ == 0) return;
-    blocks_[0].scale = std::max(blocks_[0].scale, (sums_ ? last_bit : 1.0) * impulse_scale(x.tail(m_ * s_)));
+    blocks_[0].scale = std::max(blocks_[0].scale, (sums_ ? last_bit : 1.0) * impulse_scale(impulse));
   }
 
   void momentum_rows(double* f) const {
@@ -224,11 +218,19 @@ class GaussLobattoStep final : public StepProblem {
                           f.segment(n_ * i, n_));
   }
 
-  void evaluate_any(ConstVectorRef x) {
+  /// Gives the largest term of an impulse.
+  double evaluate_points(ConstVectorRef x) {
+    if (fixed_) {
+      std::copy_n(x.data(), size(), last_x_.data());
+      if (m_ > 0) rows_.front().set_gauss_known(false);
+      return fixed_->evaluate(x.data());
+    }
     move_points(x);
     momentum_.evaluate(points_, x);
+    if (m_ == 0) return 0.0;
     impulses_.setZero();
     for (StageRows& rows : rows_) rows.add_impulses(points_, x, impulses_);
+    return impulse_size(x.tail(m_ * s_));
   }
 
   /// to = base + Σ_j force_j ∂L/∂q_j + Σ_j impulse_j Aᵀλ_j in these rows.
@@ -287,10 +289,13 @@ class GaussLobattoStep final : public StepProblem {
   }
 
   /// Size of the impulses of such multipliers, and of what they lose to the round-off of positions.
-  double impulse_scale(ConstVectorRef multipliers) const {
+  double impulse_scale(double size_of_impulses) const {
+    return size_of_impulses + sizes_.row_curvature * sizes_.position;
+  }
+  double impulse_size(ConstVectorRef multipliers) const {
     double largest = 0.0;
     for (const StageRows& rows : rows_) largest = std::max(largest, rows.impulse_size(multipliers));
-    return largest + sizes_.row_curvature * sizes_.position;
+    return largest;
   }
 
   /// Before the first solve: the derivatives at the start, for the round-off scales.
