@@ -1,7 +1,5 @@
 #include <algorithm>
-#include <bit>
 #include <cmath>
-#include <cstdint>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/solvers/detail/jacobian_factors.hpp>
@@ -21,14 +19,24 @@ constexpr double linear_step_tolerance = 1e-14;
 constexpr int quick = 10, solves_to_judge = 12;
 /// A solve gives it up where its rate promises more iterations than these; a single rate says little.
 constexpr int max_fixed_point = 30, iterations_to_judge = 2;
+constexpr double quick_rate = 0.2;  ///< reaches round-off in that many
 
-/// Largest absolute entry; NaN where one is no number, and infinite where one is.  As whole numbers the bits
-/// of positive doubles have their order, with those of infinity and NaN above all others.
-inline double largest_entry_or_nan(const double* x, int count) {
-  std::uint64_t largest = 0;
-  for (int i = 0; i < count; ++i)
-    largest = std::max(largest, std::bit_cast<std::uint64_t>(x[i]) & ~(std::uint64_t{1} << 63U));
-  return std::bit_cast<double>(largest);
+/// Largest absolute entry; infinite where one is no number.  In two strands: in a single one each entry waits
+/// for the last.
+inline double largest_or_infinite(const double* x, int count) {
+  double largest = 0.0, other = 0.0, sum = 0.0, other_sum = 0.0;  // a sum is finite where its terms are
+  for (int i = 0; i + 1 < count; i += 2) {
+    const double a = std::abs(x[i]), b = std::abs(x[i + 1]);
+    largest = a > largest ? a : largest;
+    other = b > other ? b : other;
+    sum += a;
+    other_sum += b;
+  }
+  if (count % 2 == 1) {
+    sum += std::abs(x[count - 1]);
+    largest = std::max(largest, std::abs(x[count - 1]));
+  }
+  return std::isfinite(sum + other_sum) ? std::max(largest, other) : HUGE_VAL;
 }
 
 class DirectSolver final : public NonlinearSolver {
@@ -48,8 +56,9 @@ class DirectSolver final : public NonlinearSolver {
     report_ = {};
     report_.status = SolveStatus::no_convergence;
     guess_ = x;
-    if (fixed_point_ && !given_up_) contract(x);
-    if (!report_.ok()) newton(x);
+    const Eigen::Ref<const Vector> at(x);  // made once: it costs as much as the norm of a small residual
+    if (fixed_point_ && !given_up_) contract(at, x);
+    if (!report_.ok()) newton(at, x);
     return report_.ok() ? report_ : by_kinsol(x);
   }
 
@@ -93,8 +102,8 @@ class DirectSolver final : public NonlinearSolver {
     double largest = 0.0;
     std::size_t b = 0;
     for (const ResidualBlock& block : problem_.blocks()) {
-      const double norm = report_.residual_norms[b++] = largest_entry_or_nan(row, block.rows);
-      largest = !std::isfinite(norm) ? HUGE_VAL : std::max(largest, norm / block.scale);
+      const double norm = report_.residual_norms[b++] = largest_or_infinite(row, block.rows);
+      largest = std::max(largest, norm / block.scale);
       row += block.rows;
     }
     return largest;
@@ -114,8 +123,8 @@ class DirectSolver final : public NonlinearSolver {
 
   /// x ← x − P⁻¹F(x) until F is round-off; where that is slow, x is left where F is smaller than at the
   /// guess.
-  void contract(VectorRef x) {
-    const double first = evaluate(x);
+  void contract(ConstVectorRef at, VectorRef& x) {
+    const double first = evaluate(at);
     double norm = first, before = HUGE_VAL;
     int count = 0;
     while (!solved(norm, before) && !too_slow(norm, before, count)) {
@@ -123,7 +132,7 @@ class DirectSolver final : public NonlinearSolver {
       subtract(x);
       ++count;
       before = norm;
-      norm = evaluate(x);
+      norm = evaluate(at);
     }
     report_.iterations += count;
     if (solved(norm, before)) report_.status = SolveStatus::ok;
@@ -136,6 +145,7 @@ class DirectSolver final : public NonlinearSolver {
     if (!std::isfinite(norm)) return true;
     if (count < iterations_to_judge) return norm > 2.0 * before;
     const double rate = norm / before;
+    if (rate < quick_rate && count < max_fixed_point) return false;
     if (rate >= 1.0) return true;
     double expected = norm;
     for (int k = count; k < max_fixed_point && expected > options_.tolerance; ++k) expected *= rate;
@@ -151,23 +161,23 @@ class DirectSolver final : public NonlinearSolver {
 
   /// Newton's method with full steps, as KINSOL takes them: until F is below the tolerance, and where the
   /// corrections are small for as long as it still halves.
-  void newton(VectorRef x) {
+  void newton(ConstVectorRef at, VectorRef& x) {
     factors_.begin();
     report_.status = SolveStatus::no_convergence;
-    double norm = evaluate(x);
+    double norm = evaluate(at);
     for (int k = 0; k < options_.max_iterations && std::isfinite(norm) && norm > options_.tolerance; ++k) {
-      if (!factor(x, norm)) break;
+      if (!factor(at, norm)) break;
       const double before = norm;
       last_ = x;
       factors_.solve(f_.data());
       const bool small = small_correction();
-      x -= f_;
+      subtract(x);
       ++report_.iterations;
-      norm = evaluate(x);
+      norm = evaluate(at);
       if (norm <= options_.tolerance || !small || norm < before / 2.0) continue;
       if (norm > before) {
         x = last_;
-        norm = evaluate(x);
+        norm = evaluate(at);
       }
       break;
     }
@@ -179,7 +189,7 @@ class DirectSolver final : public NonlinearSolver {
 
   /// Where the convergence is linear, what is left of the error has the same sign in one step after the
   /// other; a last correction, which is not evaluated any more, makes it small beside round-off.
-  void correct_again(VectorRef x) {
+  void correct_again(VectorRef& x) {
     factors_.solve(f_.data());
     x -= f_;
   }
