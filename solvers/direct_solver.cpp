@@ -14,9 +14,12 @@ namespace {
 constexpr double round_off = 16.0;
 /// With a Jacobian of another point the last correction has to be this small beside the unknowns.
 constexpr double linear_step_tolerance = 1e-14;
-/// The fixed-point iteration is judged by its first solves, once there is a history to guess from: without
-/// KINSOL around them so many iterations cost what Newton's method does.
-constexpr int quick = 10, solves_to_judge = 12;
+/// Without KINSOL around them so many fixed-point iterations cost what Newton's method does; they are judged
+/// by so many solves at a time.
+constexpr int quick = 8, solves_to_judge = 12;
+/// Of a matrix of so many entries, a step takes one Jacobian and its factors cost what two or three residuals
+/// do.
+constexpr int few_entries = 600;
 /// A solve gives it up where its rate promises more iterations than these; a single rate says little.
 constexpr int max_fixed_point = 30, iterations_to_judge = 2;
 constexpr double quick_rate = 0.2;  ///< reaches round-off in that many
@@ -44,7 +47,7 @@ class DirectSolver final : public NonlinearSolver {
   DirectSolver(NonlinearProblem& problem, KinsolOptions options)
       : problem_(problem),
         options_(options),
-        factors_(problem, options.jacobian),
+        factors_(problem, resolved(options.jacobian, problem.pattern())),
         fixed_point_(options.iteration != Iteration::newton && problem.has_splitting()) {
     if (problem.blocks().size() > report_.residual_norms.size())
       throw Misuse("a problem with " + std::to_string(problem.blocks().size()) +
@@ -94,6 +97,11 @@ class DirectSolver final : public NonlinearSolver {
   }
 
  private:
+  static JacobianPolicy resolved(JacobianPolicy policy, const SparsityPattern& pattern) {
+    const bool few = policy == JacobianPolicy::automatic && pattern.nonzeros() <= few_entries;
+    return few ? JacobianPolicy::per_step : policy;
+  }
+
   /// The residual at x, and its largest entry in units of its block; infinite where one is no number.
   double evaluate(ConstVectorRef x) {
     ++report_.residual_evaluations;
@@ -154,9 +162,10 @@ class DirectSolver final : public NonlinearSolver {
 
   /// Newton's method from now on, where the fixed-point iteration has turned out to be slow.
   void judge(int iterations) {
-    if (judged_solves_ == solves_to_judge) return;
     judged_iterations_ += report_.ok() ? iterations : max_fixed_point;
-    given_up_ = ++judged_solves_ == solves_to_judge && judged_iterations_ > quick * solves_to_judge;
+    if (++judged_solves_ < solves_to_judge) return;
+    given_up_ = judged_iterations_ > quick * solves_to_judge;
+    judged_solves_ = judged_iterations_ = 0;
   }
 
   /// Newton's method with full steps, as KINSOL takes them: until F is below the tolerance, and where the
