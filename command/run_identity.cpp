@@ -97,7 +97,7 @@ std::vector<std::pair<std::string, std::string>> run_identity(const CatalogueSce
   run.emplace_back("trajectory", to_file ? fmt::format("every {}", keeping.every) : "none");
   run.emplace_back("momentum", diracstep::name(keeping.momentum));
   run.emplace_back("rule", choice.rule.value_or("the method's own"));
-  run.emplace_back("solver", name(session.solver_options.iteration));
+  run.emplace_back("solver", session.solver);
   run.emplace_back("Jacobian", name(session.solver_options.jacobian));
   for (const Plugin& plugin : session.plugins)
     if (serves(plugin, entry, choice, options.method))
