@@ -10,8 +10,6 @@ namespace diracstep {
 
 namespace {
 
-/// A residual of so many tolerances is round-off.
-constexpr double round_off = 16.0;
 /// With a Jacobian of another point the last correction has to be this small beside the unknowns.
 constexpr double linear_step_tolerance = 1e-14;
 /// Without KINSOL around them so many fixed-point iterations cost what Newton's method does; they are judged
@@ -20,27 +18,8 @@ constexpr int quick = 8, solves_to_judge = 12;
 /// Of a matrix of so many entries, a step takes one Jacobian and its factors cost what two or three residuals
 /// do.
 constexpr int few_entries = 600;
-/// A solve gives it up where its rate promises more iterations than these; a single rate says little.
-constexpr int max_fixed_point = 30, iterations_to_judge = 2;
-constexpr double quick_rate = 0.2;  ///< reaches round-off in that many
-
-/// Largest absolute entry; infinite where one is no number.  In two strands: in a single one each entry waits
-/// for the last.
-inline double largest_or_infinite(const double* x, int count) {
-  double largest = 0.0, other = 0.0, sum = 0.0, other_sum = 0.0;  // a sum is finite where its terms are
-  for (int i = 0; i + 1 < count; i += 2) {
-    const double a = std::abs(x[i]), b = std::abs(x[i + 1]);
-    largest = a > largest ? a : largest;
-    other = b > other ? b : other;
-    sum += a;
-    other_sum += b;
-  }
-  if (count % 2 == 1) {
-    sum += std::abs(x[count - 1]);
-    largest = std::max(largest, std::abs(x[count - 1]));
-  }
-  return std::isfinite(sum + other_sum) ? std::max(largest, other) : HUGE_VAL;
-}
+/// A solve gives it up where its rate promises more iterations than these.
+constexpr int max_fixed_point = 30;
 
 class DirectSolver final : public NonlinearSolver {
  public:
@@ -59,9 +38,8 @@ class DirectSolver final : public NonlinearSolver {
     report_ = {};
     report_.status = SolveStatus::no_convergence;
     guess_ = x;
-    const Eigen::Ref<const Vector> at(x);  // made once: it costs as much as the norm of a small residual
-    if (fixed_point_ && !given_up_) contract(at, x);
-    if (!report_.ok()) newton(at, x);
+    if (fixed_point_ && !given_up_) contract(x);
+    if (!report_.ok()) newton(x, x);
     return report_.ok() ? report_ : by_kinsol(x);
   }
 
@@ -106,58 +84,19 @@ class DirectSolver final : public NonlinearSolver {
   double evaluate(ConstVectorRef x) {
     ++report_.residual_evaluations;
     problem_.residual(x, f_);
-    const double* row = f_.data();
-    double largest = 0.0;
-    std::size_t b = 0;
-    for (const ResidualBlock& block : problem_.blocks()) {
-      const double norm = report_.residual_norms[b++] = largest_or_infinite(row, block.rows);
-      largest = std::max(largest, norm / block.scale);
-      row += block.rows;
-    }
-    return largest;
-  }
-
-  /// x −= f; a call of Eigen's costs as much as the few numbers of a small step.
-  void subtract(VectorRef& x) {
-    double* const to = x.data();
-    const double* const f = f_.data();
-    for (Eigen::Index i = 0, size = f_.size(); i < size; ++i) to[i] -= f[i];
-  }
-
-  /// Whether the residual is as small as it gets: below the tolerance, or round-off that no longer falls.
-  bool solved(double norm, double before) const {
-    return norm <= options_.tolerance || (norm > before / 2.0 && norm <= round_off * options_.tolerance);
+    return norms_of_blocks(problem_.blocks(), f_.data(), report_.residual_norms);
   }
 
   /// x ← x − P⁻¹F(x) until F is round-off; where that is slow, x is left where F is smaller than at the
   /// guess.
-  void contract(ConstVectorRef at, VectorRef& x) {
-    const double first = evaluate(at);
-    double norm = first, before = HUGE_VAL;
-    int count = 0;
-    while (!solved(norm, before) && !too_slow(norm, before, count)) {
-      problem_.solve_splitting(f_);
-      subtract(x);
-      ++count;
-      before = norm;
-      norm = evaluate(at);
-    }
-    report_.iterations += count;
-    if (solved(norm, before)) report_.status = SolveStatus::ok;
-    if (!(norm <= first)) x = guess_;
-    if (options_.iteration == Iteration::automatic) judge(count);
-  }
-
-  /// Whether the iteration diverges, or at its rate takes too many iterations.
-  bool too_slow(double norm, double before, int count) const {
-    if (!std::isfinite(norm)) return true;
-    if (count < iterations_to_judge) return norm > 2.0 * before;
-    const double rate = norm / before;
-    if (rate < quick_rate && count < max_fixed_point) return false;
-    if (rate >= 1.0) return true;
-    double expected = norm;
-    for (int k = count; k < max_fixed_point && expected > options_.tolerance; ++k) expected *= rate;
-    return expected > options_.tolerance;
+  void contract(VectorRef& x) {
+    const Contraction end = problem_.contract(x, f_, {options_.tolerance, max_fixed_point});
+    report_.iterations += end.iterations;
+    report_.residual_evaluations += end.iterations + 1;
+    report_.residual_norms = end.residual_norms;
+    if (end.solved) report_.status = SolveStatus::ok;
+    if (!end.nearer) x = guess_;
+    if (options_.iteration == Iteration::automatic) judge(end.iterations);
   }
 
   /// Newton's method from now on, where the fixed-point iteration has turned out to be slow.
@@ -180,7 +119,7 @@ class DirectSolver final : public NonlinearSolver {
       last_ = x;
       factors_.solve(f_.data());
       const bool small = small_correction();
-      subtract(x);
+      x -= f_;
       ++report_.iterations;
       norm = evaluate(at);
       if (norm <= options_.tolerance || !small || norm < before / 2.0) continue;

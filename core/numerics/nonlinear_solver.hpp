@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <diracstep/core/numerics/contraction.hpp>
 #include <diracstep/core/numerics/snapshot.hpp>
 #include <diracstep/core/numerics/sparsity_pattern.hpp>
 #include <diracstep/core/numerics/types.hpp>
@@ -38,7 +39,14 @@ class NonlinearProblem {
   virtual bool has_splitting() const { return false; }
   /// f ← P⁻¹ f.  Called only where there is a splitting.
   virtual void solve_splitting(VectorRef /*f*/) {}
+  /// x ← x − P⁻¹F(x) again and again (contraction.hpp), with F at the last x in f.  Called only where there
+  /// is a splitting; a problem that can do it without a call for each part of an iteration does it itself.
+  virtual Contraction contract(VectorRef x, VectorRef f, const ContractionLimits& limits);
 };
+
+/// Maximum norm of each block of a residual into `norms`, and the largest entry in units of its block;
+/// infinite where an entry is no number.
+double norms_of_blocks(std::span<const ResidualBlock> blocks, const double* f, std::array<double, 4>& norms);
 
 /// How a solve ended.
 enum class SolveStatus {

@@ -90,6 +90,24 @@ inline double largest_if_finite(const double* x, int count) {
   return largest;
 }
 
+/// Largest absolute entry; infinite where one is no number.  In two strands: in a single one each entry waits
+/// for the last.
+inline double largest_or_infinite(const double* x, int count) {
+  double largest = 0.0, other = 0.0, sum = 0.0, other_sum = 0.0;  // a sum is finite where its terms are
+  for (int i = 0; i + 1 < count; i += 2) {
+    const double a = std::abs(x[i]), b = std::abs(x[i + 1]);
+    largest = a > largest ? a : largest;
+    other = b > other ? b : other;
+    sum += a;
+    other_sum += b;
+  }
+  if (count % 2 == 1) {
+    sum += std::abs(x[count - 1]);
+    largest = std::max(largest, std::abs(x[count - 1]));
+  }
+  return std::isfinite(sum + other_sum) ? std::max(largest, other) : HUGE_VAL;
+}
+
 /// A size of terms to measure residuals by: positive and finite, 1 where none is known.
 inline double usable_scale(double scale) { return scale > 0.0 && std::isfinite(scale) ? scale : 1.0; }
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/core/numerics/small_lu.hpp>
 #include <diracstep/core/steps/gauss_lobatto/fixed_stages.hpp>
 #include <diracstep/core/steps/gauss_lobatto/stage_sums.hpp>
@@ -97,6 +98,32 @@ class Stages final : public FixedStages {
     if constexpr (m > 0) sum_stages<n, s>(a_.impulses, weights_.impulse.data(), row.data(), n, row.data());
     copy<velocities>(row.data(), f);
     if constexpr (m > 0) constraint(x, f + velocities);
+  }
+
+  Contraction contract(double* x, double* f, const ContractionLimits& limits, Scales& scales,
+                       const std::function<void()>& prepare) override {
+    std::array<double, 4> norms{};
+    bool prepared = false;
+    const auto evaluate = [&] {
+      scales.momentum = std::max(scales.momentum, Stages::evaluate(x) + scales.beside_impulses);
+      Stages::residual(x, f);
+      norms[0] = largest_or_infinite(f, velocities);
+      double largest = norms[0] / scales.momentum;
+      if constexpr (m > 0) {
+        norms[1] = largest_or_infinite(f + velocities, s * m);
+        largest = std::max(largest, norms[1] / scales.constraint);
+      }
+      return largest;
+    };
+    const auto correct = [&] {
+      if (!prepared) prepare();
+      prepared = true;
+      Stages::solve_splitting(f);
+      for (int k = 0; k < unknowns; ++k) x[k] -= f[k];
+    };
+    Contraction end = diracstep::contract(limits, evaluate, correct);
+    end.residual_norms = norms;
+    return end;
   }
 
   void jacobian(bool same, double* values) override {

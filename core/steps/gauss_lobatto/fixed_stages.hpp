@@ -1,9 +1,11 @@
 #pragma once
 
+#include <diracstep/core/numerics/contraction.hpp>
 #include <diracstep/core/numerics/types.hpp>
 #include <diracstep/core/steps/gauss_lobatto/points.hpp>
 #include <diracstep/core/system/constraint_rows.hpp>
 #include <diracstep/core/system/phase_function.hpp>
+#include <functional>
 #include <memory>
 
 namespace diracstep {
@@ -38,6 +40,14 @@ class FixedStages {
   /// The full Jacobian, by columns, from all second derivatives; `same` where those of L and the step size
   /// are the ones of the call before.
   virtual void jacobian(bool same, double* values) = 0;
+  /// contract() at x, with F at the last x in f; after the first evaluation it calls `prepare`, which is to
+  /// call take_splitting().  Scales are those of the residual's two blocks, the first of which grows with the
+  /// impulses: to the largest term of one and `beside_impulses`.
+  struct Scales {
+    double momentum, constraint, beside_impulses;
+  };
+  virtual Contraction contract(double* x, double* f, const ContractionLimits& limits, Scales& scales,
+                               const std::function<void()>& prepare) = 0;
   /// Takes the splitting of StageSplitting with M⁻¹, n×n, and A at the nodes.
   virtual void take_splitting(const double* inverse_mass) = 0;
   /// f ← P⁻¹ f; NaN where P is singular.

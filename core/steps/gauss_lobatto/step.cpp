@@ -11,6 +11,7 @@
 #include <diracstep/core/steps/gauss_lobatto/splitting.hpp>
 #include <diracstep/core/steps/gauss_lobatto/stage_sums.hpp>
 #include <diracstep/core/steps/gauss_lobatto/step.hpp>
+#include <functional>
 #include <optional>
 
 namespace diracstep {
@@ -90,6 +91,20 @@ class GaussLobattoStep final : public StepProblem {
     else
       splitting_->solve(f);
   }
+  Contraction contract(VectorRef x, VectorRef f, const ContractionLimits& limits) override {
+    if (!fixed_) return StepProblem::contract(x, f, limits);
+    const auto prepare = [&] {
+      evaluated_at(x.data());
+      take_splitting();
+    };
+    FixedStages::Scales scales{blocks_[0].scale, m_ > 0 ? blocks_[1].scale : 1.0,
+                               sizes_.row_curvature * sizes_.position};
+    const Contraction end = fixed_->contract(x.data(), f.data(), limits, scales, std::ref(prepare));
+    blocks_[0].scale = scales.momentum;
+    evaluated_at(x.data());
+    return end;
+  }
+
   void begin(Interval step, const State& start, const StepMemory& memory) override {
     points_.begin(step);
     if (sums_) sums_->begin(start.rest);
@@ -166,6 +181,13 @@ class GaussLobattoStep final : public StepProblem {
   }
 
  private:
+  /// The arrays hold what belongs to this x, as far as the residual looks at it.
+  void evaluated_at(const double* x) {
+    std::copy_n(x, size(), last_x_.data());
+    evaluated_ = true;
+    if (m_ > 0) rows_.front().set_gauss_known(true);
+  }
+
   StageArrays arrays() {
     StageArrays arrays{};
     arrays.points = &points_;
