@@ -1,16 +1,14 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <diracstep/core/numerics/combination.hpp>
 #include <diracstep/core/numerics/scales.hpp>
-#include <diracstep/core/steps/gauss_lobatto/compensated_sums.hpp>
 #include <diracstep/core/steps/gauss_lobatto/momentum.hpp>
 #include <diracstep/core/steps/gauss_lobatto/points.hpp>
 #include <diracstep/core/steps/gauss_lobatto/rows.hpp>
 #include <diracstep/core/steps/gauss_lobatto/sizes.hpp>
 #include <diracstep/core/steps/gauss_lobatto/splitting.hpp>
-#include <diracstep/core/steps/gauss_lobatto/stage_sums.hpp>
 #include <diracstep/core/steps/gauss_lobatto/step.hpp>
+#include <diracstep/core/steps/gauss_lobatto/step_sums.hpp>
 #include <functional>
 #include <optional>
 
@@ -36,8 +34,8 @@ class GaussLobattoStep final : public StepProblem {
       : s_(s),
         n_(scene.dimension()),
         m_(scene.rows()),
-        sum_(stage_sum(n_, s)),
         points_(s, n_),
+        sums_(s, n_, m_),
         momentum_(scene.lagrangian, scene.force, s, dense),
         layout_(size(), size()),
         affine_(affine(scene)) {
@@ -75,7 +73,7 @@ class GaussLobattoStep final : public StepProblem {
   }
 
   bool compensate() override {
-    sums_.emplace(s_, n_);
+    sums_.compensate();
     fixed_.reset();
     return true;
   }
@@ -93,6 +91,7 @@ class GaussLobattoStep final : public StepProblem {
   }
   Contraction contract(VectorRef x, VectorRef f, const ContractionLimits& limits) override {
     if (!fixed_) return StepProblem::contract(x, f, limits);
+    evaluated_ = false;
     const auto prepare = [&] {
       evaluated_at(x.data());
       take_splitting();
@@ -107,7 +106,7 @@ class GaussLobattoStep final : public StepProblem {
 
   void begin(Interval step, const State& start, const StepMemory& memory) override {
     points_.begin(step);
-    if (sums_) sums_->begin(start.rest);
+    sums_.begin(start);
     p0_ = start.p;
     points_.lobatto.col(0) = start.q;
     splitting_known_ = false;
@@ -131,12 +130,7 @@ class GaussLobattoStep final : public StepProblem {
       if (m_ > 0) rows_.front().set_gauss_known(true);
       return;
     }
-    if (sums_)
-      residual_in_extended_precision(f);
-    else if (sum_ != nullptr)
-      momentum_rows(f.data());
-    else
-      for (int i = 0; i < s_; ++i) long_momentum_row(i, f.data() + n_ * i);
+    sums_.momentum_rows(points_, momentum_, p0_, impulses_, f);
     for (StageRows& rows : rows_) rows.residual(points_, x, f);
   }
 
@@ -158,25 +152,10 @@ class GaussLobattoStep final : public StepProblem {
 
   void finish(ConstVectorRef x, StepEnd& end) override {
     evaluate(x);
-    const StageWeights& weights = points_.weights;
-    const auto q0 = points_.lobatto.col(0);
-    if (sums_) {
-      sums_->end(step_size(), q0, p0_, velocities(x), momentum_.forces(), impulses_, end);
-    } else {
-      end.at.q.resize(n_);
-      end.at.p.resize(n_);
-      if (m_ > 0) end.at.q = points_.lobatto.col(s_);
-      for_each_piece(n_, [&](int first, int rows) {
-        if (m_ == 0)  // nothing else looks there
-          combine_piece(first, rows, n_, s_, &weights.lobatto(0, s_), x.data(), points_.lobatto.data(),
-                        end.at.q.data());
-        add_forces_and_impulses(first, rows, weights.end_force.data(), weights.table.lobatto_b.data(),
-                                p0_.data(), end.at.p.data());
-      });
-    }
-    end.at.v = (end.at.q - q0) / step_size();
+    sums_.end(points_, momentum_, p0_, impulses_, x, end);
+    end.at.v = (end.at.q - points_.lobatto.col(0)) / step_size();
     // The impulse at q0 is that part of λ_0 which enters there.
-    end.impulse = weights.table.lobatto_b[0] * x.segment(n_ * s_, m_);
+    end.impulse = points_.weights.table.lobatto_b[0] * x.segment(n_ * s_, m_);
     measure(x, end.memory);
   }
 
@@ -206,8 +185,6 @@ class GaussLobattoStep final : public StepProblem {
   double step_size() const { return points_.step.size; }
   int row_of(int j) const { return n_ * s_ + m_ * j; }
 
-  Eigen::Map<const Columns> velocities(ConstVectorRef x) const { return {x.data(), n_, s_}; }
-
   /// Everything the residual is made of, at x, unless x is where it was last taken.
   void evaluate(ConstVectorRef x) {
     if (evaluated_ &&
@@ -216,28 +193,8 @@ class GaussLobattoStep final : public StepProblem {
     evaluated_ = true;
     const double impulse = evaluate_points(x);
     if (m_ == 0) return;
-    blocks_[0].scale = std::max(blocks_[0].scale, (sums_ ? last_bit : 1.0) * impulse_scale(impulse));
-  }
-
-  void momentum_rows(double* f) const {
-    const double* lv = momentum_.momenta().data();
-    for (int i = 0; i < s_; ++i)
-      for (int k = 0; k < n_; ++k) f[n_ * i + k] = *lv++ - p0_[k];
-    sum_(momentum_.forces().data(), points_.weights.force.data(), f, n_, f);
-    if (m_ > 0) sum_(impulses_.data(), points_.weights.impulse.data(), f, n_, f);
-  }
-  void long_momentum_row(int i, double* momentum) const {
-    const auto lv = momentum_.momenta().col(i);
-    for_each_piece(n_, [&](int first, int rows) {
-      for (int k = first; k < first + rows; ++k) momentum[k] = lv[k] - p0_[k];
-      add_forces_and_impulses(first, rows, &points_.weights.force(0, i), &points_.weights.impulse(0, i),
-                              momentum, momentum);
-    });
-  }
-  void residual_in_extended_precision(VectorRef& f) {
-    for (int i = 0; i < s_; ++i)
-      sums_->momentum_row(i, step_size(), momentum_.momenta().col(i), p0_, momentum_.forces(), impulses_,
-                          f.segment(n_ * i, n_));
+    blocks_[0].scale =
+        std::max(blocks_[0].scale, (sums_.compensated() ? last_bit : 1.0) * impulse_scale(impulse));
   }
 
   /// Gives the largest term of an impulse.
@@ -247,51 +204,13 @@ class GaussLobattoStep final : public StepProblem {
       if (m_ > 0) rows_.front().set_gauss_known(false);
       return fixed_->evaluate(x.data());
     }
-    move_points(x);
+    last_x_ = x;
+    sums_.move(points_, x);
     momentum_.evaluate(points_, x);
     if (m_ == 0) return 0.0;
     impulses_.setZero();
     for (StageRows& rows : rows_) rows.add_impulses(points_, x, impulses_);
     return impulse_size(x.tail(m_ * s_));
-  }
-
-  /// to = base + Σ_j force_j ∂L/∂q_j + Σ_j impulse_j Aᵀλ_j in these rows.
-  void add_forces_and_impulses(int first, int rows, const double* force, const double* impulse,
-                               const double* base, double* to) const {
-    combine_piece(first, rows, n_, s_, force, momentum_.forces().data(), base, to);
-    if (m_ > 0) combine_piece(first, rows, n_, s_, impulse, impulses_.data(), to, to);
-  }
-
-  /// q0 + h Σ_k a_ik V_k at the Gauss nodes, and so at those Lobatto nodes that are looked at; x is kept.
-  void move_points(ConstVectorRef x) {
-    const int first_lobatto = m_ > 0 ? 1 : s_ + 1;
-    if (sums_) {
-      last_x_ = x;
-      const ExtendedGaussLobattoTableau& table = sums_->table;
-      const auto start = points_.lobatto.col(0);
-      for (int i = 0; i < s_; ++i)
-        sums_->position(step_size(), table.a.row(i), start, velocities(x), points_.gauss.col(i));
-      for (int j = first_lobatto; j <= s_; ++j)
-        sums_->position(step_size(), table.lobatto_a.row(j), start, velocities(x), points_.lobatto.col(j));
-      return;
-    }
-    const StageWeights& weights = points_.weights;
-    const double* const q0 = points_.lobatto.data();
-    if (sum_ != nullptr) {
-      std::copy_n(x.data(), size(), last_x_.data());
-      sum_(x.data(), weights.position.data(), q0, 0, points_.gauss.data());
-      if (m_ > 0) sum_(x.data(), &weights.lobatto(0, 1), q0, 0, &points_.lobatto(0, 1));
-      return;
-    }
-    for_each_piece(n_, [&](int first, int rows) {
-      for (int i = 0; i < s_; ++i) {
-        std::copy_n(x.data() + n_ * i + first, rows, last_x_.data() + n_ * i + first);
-        combine_piece(first, rows, n_, s_, &weights.position(0, i), x.data(), q0, &points_.gauss(0, i));
-      }
-      for (int j = first_lobatto; j <= s_; ++j)
-        combine_piece(first, rows, n_, s_, &weights.lobatto(0, j), x.data(), q0, &points_.lobatto(0, j));
-    });
-    last_x_.tail(m_ * s_) = x.tail(m_ * s_);
   }
 
   /// Sizes at x, for the next step.
@@ -341,20 +260,19 @@ class GaussLobattoStep final : public StepProblem {
     if (m_ > 0) blocks_[1].scale = usable_scale(one_forms * velocity);
     // What an iteration leaves of the residual is no random error: it is a smooth function of the state and
     // drives the energy one way.  So solve to the last bit.
-    if (sums_)
+    if (sums_.compensated())
       for (ResidualBlock& block : blocks_) block.scale *= last_bit;
   }
 
   int s_, n_, m_;
-  StageSum sum_;  ///< null for long columns
   StagePoints points_;
+  StepSums sums_;
   StageMomentum momentum_;
   std::vector<StageRows> rows_;
   SparsityPattern pattern_;
   BlockPattern layout_;
   std::vector<ResidualBlock> blocks_;
 
-  std::optional<CompensatedSums> sums_;
   std::unique_ptr<FixedStages> fixed_;  ///< of few coordinates, rows and stages, without a force
 
   Vector p0_, last_x_;
