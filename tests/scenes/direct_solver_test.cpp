@@ -109,9 +109,10 @@ TEST_P(StagesOfFixedSize, HaveTheSystemOfThoseOfAnySize) {
           << "Jacobian of GL(" << s << ")";
       fixed->solve_splitting(f);
       any->solve_splitting(g);
-      if (mass_is_regular)
+      if (mass_is_regular) {
         EXPECT_LT((f - g).lpNorm<Eigen::Infinity>(), 1e-10 * (1.0 + g.lpNorm<Eigen::Infinity>()))
             << "splitting of GL(" << s << ")";
+      }
       StepEnd one, other;
       fixed->finish(x, one);
       any->finish(x, other);
