@@ -69,6 +69,7 @@ void StageSplitting::move_to(const StagePoints& at, StageMomentum& momentum, std
                              ConstVectorRef x) {
   take_mass(at, momentum, x);
   if (m_ == 0) return;
+  through_mass_.setZero();  // entries outside the pattern are those of the last one
   for (StageRows& block : rows) {
     block.evaluate_constraint(at);
     for (int j = 0; j < s_; ++j) {
