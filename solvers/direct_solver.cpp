@@ -14,12 +14,12 @@ namespace {
 constexpr double linear_step_tolerance = 1e-14;
 /// Without KINSOL around them so many fixed-point iterations cost what Newton's method does; they are judged
 /// by so many solves at a time.
-constexpr int quick = 8, solves_to_judge = 12;
+constexpr int quick = 7, solves_to_judge = 12;
 /// Of a matrix of so many entries, a step takes one Jacobian and its factors cost what two or three residuals
 /// do.
 constexpr int few_entries = 600;
 /// A solve gives it up where its rate promises more iterations than these.
-constexpr int max_fixed_point = 30;
+constexpr int max_fixed_point = 16;
 
 class DirectSolver final : public NonlinearSolver {
  public:
