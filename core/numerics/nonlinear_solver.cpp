@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <diracstep/core/numerics/contraction_loop.hpp>
 #include <diracstep/core/numerics/nonlinear_solver.hpp>
 #include <diracstep/core/numerics/scales.hpp>
 #include <limits>

@@ -39,8 +39,9 @@ class NonlinearProblem {
   virtual bool has_splitting() const { return false; }
   /// f ← P⁻¹ f.  Called only where there is a splitting.
   virtual void solve_splitting(VectorRef /*f*/) {}
-  /// x ← x − P⁻¹F(x) again and again (contraction.hpp), with F at the last x in f.  Called only where there
-  /// is a splitting; a problem that can do it without a call for each part of an iteration does it itself.
+  /// x ← x − P⁻¹F(x) again and again (contraction.hpp), with the last correction in f.  Called only where
+  /// there is a splitting; a problem that can do it without a call for each part of an iteration does it
+  /// itself.
   virtual Contraction contract(VectorRef x, VectorRef f, const ContractionLimits& limits);
 };
 

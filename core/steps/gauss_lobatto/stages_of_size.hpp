@@ -5,7 +5,7 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
-#include <diracstep/core/numerics/contraction.hpp>
+#include <diracstep/core/numerics/contraction_loop.hpp>
 #include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/core/numerics/small_lu.hpp>
 #include <diracstep/core/steps/gauss_lobatto/fixed_stages.hpp>

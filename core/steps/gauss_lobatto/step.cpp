@@ -100,7 +100,6 @@ class GaussLobattoStep final : public StepProblem {
                                sizes_.row_curvature * sizes_.position};
     const Contraction end = fixed_->contract(x.data(), f.data(), limits, scales, std::ref(prepare));
     blocks_[0].scale = scales.momentum;
-    evaluated_at(x.data());
     return end;
   }
 
