@@ -46,9 +46,9 @@ inline Contraction contract(const ContractionLimits& limits, Evaluate evaluate, 
     norm = evaluate();
   }
   end.solved = detail::contracted(limits, norm, before);
-  // What is left has the same sign in one step after the other, and drives the energy one way: a last
-  // correction, which is not evaluated any more, makes it small beside round-off.
-  if (end.solved) correct();
+  // What is left has the same sign in one step after the other, and drives the energy one way: unless it is
+  // small beside round-off, a last correction, which is not evaluated any more, makes it so.
+  if (end.solved && norm > limits.tolerance / 8.0) correct();
   end.nearer = norm <= first;
   return end;
 }

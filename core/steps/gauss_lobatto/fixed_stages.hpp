@@ -45,6 +45,7 @@ class FixedStages {
   /// impulses: to the largest term of one and `beside_impulses`.
   struct Scales {
     double momentum, constraint, beside_impulses;
+    bool moved = false;  ///< set where x has moved since it was evaluated last
   };
   virtual Contraction contract(double* x, double* f, const ContractionLimits& limits, Scales& scales,
                                const std::function<void()>& prepare) = 0;

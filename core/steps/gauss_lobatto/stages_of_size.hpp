@@ -77,6 +77,7 @@ class Stages final : public FixedStages {
     std::array<double, 4> norms{};
     bool prepared = false;
     const auto evaluate = [&] {
+      scales.moved = false;
       scales.momentum = std::max(scales.momentum, Stages::evaluate(x) + scales.beside_impulses);
       Stages::residual(x, f);
       norms[0] = largest_or_infinite(f, velocities);
@@ -89,7 +90,7 @@ class Stages final : public FixedStages {
     };
     const auto correct = [&] {
       if (!prepared) prepare();
-      prepared = true;
+      prepared = scales.moved = true;
       Stages::solve_splitting(f);
       for (int k = 0; k < unknowns; ++k) x[k] -= f[k];
     };

@@ -100,6 +100,7 @@ class GaussLobattoStep final : public StepProblem {
                                sizes_.row_curvature * sizes_.position};
     const Contraction end = fixed_->contract(x.data(), f.data(), limits, scales, std::ref(prepare));
     blocks_[0].scale = scales.momentum;
+    if (!scales.moved) evaluated_at(x.data());
     return end;
   }
 
