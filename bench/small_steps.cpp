@@ -326,7 +326,7 @@ int main() {
   std::printf(
       "ns a step; ratios: KINSOL over automatic, over direct, over by hand, direct over by hand; iterations "
       "a\n"
-      "step of each; how far they are apart after 40 steps\n");
+      "step of each; how far they are apart at the end\n");
   std::printf("%-27s%5s%7s%8s%8s%8s%8s%8s%8s%10s%10s  %s\n", "", "", "step", "KINSOL", "autom.", "direct",
               "hand", "K/aut.", "K/dir.", "K/hand", "dir./hand", "iterations");
   compare("kepler_e06", 4, 50.0, 453, by_hand<KeplerByHand, 4>);
