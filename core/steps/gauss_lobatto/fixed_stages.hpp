@@ -40,9 +40,9 @@ class FixedStages {
   /// The full Jacobian, by columns, from all second derivatives; `same` where those of L and the step size
   /// are the ones of the call before.
   virtual void jacobian(bool same, double* values) = 0;
-  /// contract() at x, with the last correction in f; after the first evaluation it calls `prepare`, which is to
-  /// call take_splitting().  Scales are those of the residual's two blocks, the first of which grows with the
-  /// impulses: to the largest term of one and `beside_impulses`.
+  /// contract() at x, with the last correction in f; after the first evaluation it calls `prepare`, which is
+  /// to call take_splitting().  Scales are those of the residual's two blocks, the first of which grows with
+  /// the impulses: to the largest term of one and `beside_impulses`.
   struct Scales {
     double momentum, constraint, beside_impulses;
     bool moved = false;  ///< set where x has moved since it was evaluated last
