@@ -6,10 +6,12 @@
 #include <diracstep/core/steps/gauss_lobatto/compensated_sums.hpp>
 #include <diracstep/core/steps/gauss_lobatto/momentum.hpp>
 #include <diracstep/core/steps/gauss_lobatto/points.hpp>
+#include <diracstep/core/steps/gauss_lobatto/row_scales.hpp>
 #include <diracstep/core/steps/gauss_lobatto/rows.hpp>
 #include <diracstep/core/steps/gauss_lobatto/sizes.hpp>
 #include <diracstep/core/steps/gauss_lobatto/splitting.hpp>
 #include <diracstep/core/steps/gauss_lobatto/step.hpp>
+#include <diracstep/core/system/length_of_rows.hpp>
 #include <optional>
 
 namespace diracstep {
@@ -37,6 +39,8 @@ class GaussLobattoStep final : public StepProblem {
         points_(s, n_),
         momentum_(scene.lagrangian, scene.force, s, dense),
         layout_(size(), size()),
+        row_scales_(s_, scene),
+        length_(length_of_rows(scene)),
         affine_(affine(scene)) {
     int row = n_ * s_;
     for (const auto& block : scene.constraints) {
@@ -86,6 +90,7 @@ class GaussLobattoStep final : public StepProblem {
     splitting_known_ = true;
     splitting_->solve(f);
   }
+
   void begin(Interval step, const State& start, const StepMemory& memory) override {
     points_.step = step;
     points_.weights.scale_to(step.size);
@@ -136,6 +141,10 @@ class GaussLobattoStep final : public StepProblem {
     }
   }
 
+  const double* scales_of_unsolved_rows(ConstVectorRef f, double level) override {
+    return row_scales_.unsolved({points_, momentum_, rows_, p0_, last_x_}, f, level, blocks_, part());
+  }
+
   void finish(ConstVectorRef x, StepEnd& end) override {
     evaluate(x);
     const StageWeights& weights = points_.weights;
@@ -177,8 +186,14 @@ class GaussLobattoStep final : public StepProblem {
     if (m_ == 0) return;
     impulses_.setZero();
     for (StageRows& rows : rows_) rows.add_impulses(points_, x, impulses_);
-    blocks_[0].scale = std::max(blocks_[0].scale, (sums_ ? last_bit : 1.0) * impulse_scale(x.tail(m_ * s_)));
+    blocks_[0].scale = std::max(blocks_[0].scale, part() * impulse_scale(x.tail(m_ * s_)));
+    if (blocks_[1].scale <= smallest_scale)  // at rest in the origin
+      blocks_[1].scale = scale_of(part() * form_size(rows_) * largest_entry(x.data(), n_ * s_));
   }
+
+  /// What an iteration leaves of the residual is no random error: it is a smooth function of the state and
+  /// drives the energy one way.  So compensated sums are solved for to the last bit.
+  double part() const { return sums_ ? last_bit : 1.0; }
 
   /// to = base + Σ_j force_j ∂L/∂q_j + Σ_j impulse_j Aᵀλ_j in these rows.
   void add_forces_and_impulses(int first, int rows, const double* force, const double* impulse,
@@ -231,9 +246,7 @@ class GaussLobattoStep final : public StepProblem {
 
   /// Size of the impulses of such multipliers, and of what they lose to the round-off of positions.
   double impulse_scale(ConstVectorRef multipliers) const {
-    double largest = 0.0;
-    for (const StageRows& rows : rows_) largest = std::max(largest, rows.impulse_size(multipliers));
-    return largest + sizes_.row_curvature * sizes_.position;
+    return impulse_size(rows_, multipliers) + sizes_.row_curvature * sizes_.position;
   }
 
   /// Before the first solve: the derivatives at the start, for the round-off scales.
@@ -250,15 +263,11 @@ class GaussLobattoStep final : public StepProblem {
   /// Terms of the momentum rows are momenta, those of the last step where this one is not solved yet; a
   /// velocity of size |q|/h loses ε|q|/h to round-off.
   void update_scales() {
-    const double h = std::abs(step_size()), velocity = sizes_.position / h;
-    blocks_[0].scale = usable_scale(sizes_.momentum(h, largest_entry(p0_.data(), n_)) + last_impulse_);
-    double one_forms = 0.0;
-    for (const StageRows& rows : rows_) one_forms = std::max(one_forms, rows.form_size());
-    if (m_ > 0) blocks_[1].scale = usable_scale(one_forms * velocity);
-    // What an iteration leaves of the residual is no random error: it is a smooth function of the state and
-    // drives the energy one way.  So solve to the last bit.
-    if (sums_)
-      for (ResidualBlock& block : blocks_) block.scale *= last_bit;
+    const double h = std::abs(step_size()),
+                 velocity = std::max(sizes_.position, part_of_length * length_) / h;
+    blocks_[0].scale = scale_of(sizes_.momentum(h, largest_entry(p0_.data(), n_)) + last_impulse_);
+    if (m_ > 0) blocks_[1].scale = scale_of(form_size(rows_) * velocity);
+    for (ResidualBlock& block : blocks_) block.scale *= part();
   }
 
   int s_, n_, m_;
@@ -268,15 +277,15 @@ class GaussLobattoStep final : public StepProblem {
   SparsityPattern pattern_;
   BlockPattern layout_;
   std::vector<ResidualBlock> blocks_;
-
   std::optional<CompensatedSums> sums_;
-
   Vector p0_, last_x_;
+  StageRowScales row_scales_;
   Columns impulses_;  ///< A(Q~_j)ᵀ λ_j
   StageSizes sizes_;
   double last_impulse_ = 0.0;  ///< size of it with the multipliers of the step before, at this start
   std::optional<StageSplitting> splitting_;  ///< small scenes with rows of one kind
   bool splitting_known_ = false;
+  double length_;           ///< of the rows
   bool affine_;             ///< the residual is affine in the unknowns
   bool evaluated_ = false;  ///< at last_x_
 };
