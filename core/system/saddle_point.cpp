@@ -73,7 +73,7 @@ const double* SaddlePointProblem::scales_of_unsolved_rows(ConstVectorRef f, doub
 
 void SaddlePointProblem::raise_scales(double momentum, ConstVectorRef x, bool mass_taken) {
   last_x_ = x;
-  if (mass_taken) {
+  if (mass_taken && !scene_.lagrangian->structure().y_hessian_diagonal) {  // else these are momenta
     sizes_.setZero();
     add_mass_sizes(x, sizes_);
     momentum = std::max(momentum, max_norm(sizes_));
@@ -144,7 +144,7 @@ void AccelerationProblem::begin(double t, ConstVectorRef q, ConstVectorRef v) {
 void AccelerationProblem::residual(ConstVectorRef x, VectorRef f) {
   f.head(n_).setZero();
   scene_.lagrangian->pattern().multiply_add(lvv_.data(), x.data(), f.data());
-  raise_scales(0.0, x, true);
+  raise_scales(f.head(n_).lpNorm<Eigen::Infinity>(), x, true);
   f.head(n_) -= known_force_;
   if (m_ == 0) return;
   rows_.add_annihilator(x.tail(m_), f.head(n_), -1.0);
