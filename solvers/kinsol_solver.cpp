@@ -22,6 +22,8 @@ using detail::require;
 constexpr double no_limit = 1e100;
 /// A residual of so many tolerances is round-off.
 constexpr double round_off = 16.0;
+/// The row that a norm is of is no larger than that norm times its scale, but for rounding.
+constexpr double at_rounding = 1e-12;
 /// With a Jacobian of another point the error falls by a mere factor in each iteration, so that the last
 /// correction has to be this small.
 constexpr double linear_step_tolerance = 1e-14;
@@ -166,7 +168,8 @@ class KinsolSolver final : public NonlinearSolver {
   void solve_small_rows(double norm) {
     const Eigen::Map<Vector> f(residual_, guess_.size());
     if (went_back_) problem_.residual(unknowns(), f);
-    const double* const scales = problem_.scales_of_unsolved_rows(f, std::max(norm, options_.tolerance));
+    const double level = std::max((1.0 + at_rounding) * norm, options_.tolerance);
+    const double* const scales = problem_.scales_of_unsolved_rows(f, level);
     if (scales == nullptr) return;
     row_scales_ = scales;
     detail::set_weights(residual_scale_.get(), scales);

@@ -36,7 +36,7 @@ class ImplicitStep final : public StepProblem {
                   dense) {
     y_.setZero(n_, s_->columns());
     gradient_ = y_;
-    hessian_.setZero(s_->pattern().nonzeros(), s_->pairs());
+    at_end_ = hessian_ = Columns::Zero(s_->pattern().nonzeros(), s_->pairs());
     last_x_.setZero(size());
     q1_.setZero(n_);
     for (Vector* column : {&increment_, &sizes_, &largest_, &as_largest_}) column->setZero(n_);
@@ -228,8 +228,7 @@ class ImplicitStep final : public StepProblem {
   }
   /// The same row by row, and with the other terms of each row.
   void size_terms(double factor, double level) {
-    s_->hessian(data_.step, y_, hessian_);
-    hessian_known_ = true;
+    s_->hessian(data_.step, y_, at_end_);
     for (int i = 0; i < s_->columns(); ++i) {
       if (i == 1) continue;  // the end is no row
       sizes_ = gradient_.col(i).cwiseAbs();
@@ -258,8 +257,8 @@ class ImplicitStep final : public StepProblem {
   void add_sizes(int i, int j, ConstVectorRef y, Vector& sizes) const {
     const int pair = s_->pair(std::min(i, j), std::max(i, j));
     s_->pattern().for_each([&](Eigen::Index e, int r, int c) {
-      const double both = by_increment_ && j == 0 ? hessian_(e, 1) : 0.0;  // with the increment kept
-      const double derivative = std::abs(hessian_(e, pair) + both);
+      const double both = by_increment_ && j == 0 ? at_end_(e, 1) : 0.0;  // with the increment kept
+      const double derivative = std::abs(at_end_(e, pair) + both);
       if (i <= j)
         sizes[r] += derivative * std::abs(y[c]);
       else
@@ -280,7 +279,7 @@ class ImplicitStep final : public StepProblem {
   Vector sizes_, largest_, as_largest_, none_;  ///< workspaces of size_terms(), but for an empty one
   bool quadratic_ = false;                      ///< L without force
   bool by_increment_ = false;                   ///< the unknown is q1 − q0 instead of q1
-  Columns y_, gradient_, hessian_;
+  Columns y_, gradient_, hessian_, at_end_;     ///< the last one at the last point, for size_terms()
   Vector terms_, multipliers_;  ///< of the last step: sizes of the terms of each column of the gradient, λ
   bool hessian_known_ = false;  ///< hessian_ was taken in this step
 };
