@@ -88,6 +88,9 @@ std::vector<std::pair<std::string, std::string>> run_identity(const CatalogueSce
   run.emplace_back("start, as bits", sha256(bits(Vector::Constant(1, start.time)) + bits(start.q) +
                                             bits(start.v) + bits(start.p))
                                          .substr(0, 16));
+  for (Eigen::Index i = 0; i < entry.scene->tolerances.size(); ++i)
+    run.emplace_back("tolerance of " + entry.scene->coordinates[static_cast<std::size_t>(i)],
+                     fmt::format("{:.17g}", entry.scene->tolerances[i]));
   run.emplace_back("redundant rows", session.drop_redundant_rows ? "dropped" : "as the scene says");
   run.emplace_back("method", options.method);
   run.emplace_back("order", std::to_string(options.order));

@@ -31,6 +31,7 @@ struct Session {
   std::vector<std::string> plugin_files;  ///< as given by --plugin
   std::vector<Plugin> plugins;            ///< those and the ones on DIRACSTEP_PLUGIN_PATH
   bool drop_redundant_rows = false;       ///< of every scene that is made
+  std::vector<std::string> tolerances;    ///< of its coordinates, as given by --tolerance
   int exit_status = done;
 };
 

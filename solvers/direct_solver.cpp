@@ -40,6 +40,10 @@ class DirectSolver final : public NonlinearSolver {
     guess_ = x;
     if (fixed_point_ && !given_up_) contract(x);
     if (!report_.ok()) newton(x, x);
+    if (report_.ok() && small_rows_are_unsolved(x)) {  // KINSOL goes on from here
+      guess_ = x;
+      return by_kinsol(x);
+    }
     return report_.ok() ? report_ : by_kinsol(x);
   }
 
@@ -85,6 +89,13 @@ class DirectSolver final : public NonlinearSolver {
     ++report_.residual_evaluations;
     problem_.residual(x, f_);
     return norms_of_blocks(problem_.blocks(), f_.data(), report_.residual_norms);
+  }
+
+  /// Whether rows whose terms are far smaller than those of others in their block are not zero beside these.
+  bool small_rows_are_unsolved(ConstVectorRef x) {
+    problem_.residual(x, f_);
+    const double norm = norms_of_blocks(problem_.blocks(), f_.data(), report_.residual_norms);
+    return problem_.scales_of_unsolved_rows(f_, std::max(norm, options_.tolerance)) != nullptr;
   }
 
   /// x ← x − P⁻¹F(x) until F is round-off; where that is slow, x is left where F is smaller than at the

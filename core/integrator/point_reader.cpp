@@ -68,7 +68,7 @@ SolveReport PointReader::velocity(double t, ConstVectorRef q, ConstVectorRef p, 
     return velocity_solver_->solve(v);
   }
   const Eigen::Index n = scene_->dimension();
-  velocity_->begin(t, q, p);
+  velocity_->begin(t, q, p, v);
   unknowns_.head(n) = v;
   unknowns_.tail(unknowns_.size() - n).setZero();
   const SolveReport report = velocity_solver_->solve(unknowns_);

@@ -30,6 +30,12 @@ class NonlinearProblem {
   virtual void residual(ConstVectorRef x, VectorRef f) = 0;
   virtual void jacobian(ConstVectorRef x, VectorRef values) = 0;
 
+  /// Asked of a residual f, where it was last taken, that is small beside the scales of its blocks: whether
+  /// each row is at most `level` times the size of its own terms (RowScales), which may be far smaller.  Null
+  /// where that is so, and for problems whose rows are alike; else the scales of all rows, by which the
+  /// solver goes on.  A few comparisons for each row, unless one is not small.
+  virtual const double* scales_of_unsolved_rows(ConstVectorRef /*f*/, double /*level*/) { return nullptr; }
+
   /// Where the Jacobian is the same at every x and in every solve with the same value of some parameter, such
   /// as the step size: that value.  NaN where it is not.
   virtual double constant_jacobian_parameter() const;

@@ -1,3 +1,4 @@
+#include <cmath>
 #include <diracstep/core/numerics/combination.hpp>
 #include <diracstep/core/steps/gauss_lobatto/momentum.hpp>
 #include <utility>
@@ -120,6 +121,27 @@ void StageMomentum::evaluate_start(const StagePoints& at, ConstVectorRef v0) {
   const auto q0 = at.lobatto.col(0);
   lagrangian_->gradient(t, q0, v0, lq_.col(0), lv_.col(0));
   lagrangian_->hessian(t, q0, v0, lqq_.col(0), lqv_.col(0), lvv_.col(0));
+  if (!force_) return;
+  force_->value(t, q0, v0, f_);
+  lq_.col(0) += f_;
+}
+
+void StageMomentum::prepare_sizes(const StagePoints& at, ConstVectorRef x) {
+  if (!hessians_known_) second_derivatives(at, x, 0);
+  if (force_) force_->derivatives(at.gauss_time(0), at.gauss.col(0), x.head(n_), fq_.col(0), fv_.col(0));
+}
+
+void StageMomentum::add_sizes(double h, const Vector& q, const Vector& v, Vector& sizes) const {
+  pattern().for_each([&](Eigen::Index e, int r, int c) {
+    const double by_velocity = std::abs(lvv_(e, 0)) + h * std::abs(lqv_(e, 0)) + h * h * std::abs(lqq_(e, 0));
+    sizes[r] += by_velocity * std::abs(v[c]) + h * std::abs(lqq_(e, 0) * q[c]);
+    sizes[c] += std::abs(lqv_(e, 0)) * (std::abs(q[r]) + h * std::abs(v[r]));
+  });
+  if (!force_) return;
+  force_->pattern().for_each([&](Eigen::Index e, int r, int c) {
+    const double by_velocity = h * std::abs(fv_(e, 0)) + h * h * std::abs(fq_(e, 0));
+    sizes[r] += by_velocity * std::abs(v[c]) + h * std::abs(fq_(e, 0) * q[c]);
+  });
 }
 
 }  // namespace diracstep

@@ -44,8 +44,14 @@ class StageMomentum {
   /// Whether the part of L in the Jacobian is the one of the last Jacobian.
   bool jacobian_known(const StagePoints& at);
 
-  /// ∂L/∂q and ∂²L/∂q² at the start of the step in place of the first node, to know their size.
+  /// ∂L/∂q + f and ∂²L/∂q² at the start of the step in place of the first node, to know their size.
   void evaluate_start(const StagePoints& at, ConstVectorRef v0);
+
+  /// The second derivatives at the first node, as they are needed for add_sizes().
+  void prepare_sizes(const StagePoints& at, ConstVectorRef x);
+  /// sizes += those of the terms that make up ∂L/∂v and h (∂L/∂q + f) and may cancel in them, coordinate by
+  /// coordinate, for positions q and velocities v: second derivatives times these.
+  void add_sizes(double h, const Vector& q, const Vector& v, Vector& sizes) const;
 
  private:
   bool all_finite() const;

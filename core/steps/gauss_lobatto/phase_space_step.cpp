@@ -4,7 +4,7 @@
 #include <diracstep/core/numerics/combination.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/numerics/lu.hpp>
-#include <diracstep/core/numerics/scales.hpp>
+#include <diracstep/core/numerics/row_scales.hpp>
 #include <diracstep/core/steps/gauss_lobatto/phase_space_step.hpp>
 #include <diracstep/core/steps/gauss_lobatto/stage_sums.hpp>
 #include <diracstep/core/steps/gauss_lobatto/tableau.hpp>
@@ -33,9 +33,11 @@ class PhaseSpaceStep final : public StepProblem {
     for (Columns* stages : {&lqq_, &lqv_, &lvv_}) stages->setZero(lagrangian_->pattern().nonzeros(), s_);
     times_.setZero(s_);
     stiffness_.setZero(lqq_.rows());
-    for (Vector* column : {&q0_, &p0_, &q1_, &p_start_, &p_end_}) column->setZero(n_);
+    for (Vector* column : {&q0_, &p0_, &q1_, &p_start_, &p_end_, &sizes_, &largest_, &largest_q_})
+      column->setZero(n_);
     last_x_.setConstant(size(), std::nan(""));
     dense_ = dense;
+    tolerances_ = scene.tolerances;
     Columns weights = Columns::Ones(s_ + 1, s_ + 1);
     weights.topLeftCorner(s_, s_) = table_.a;
     weights.bottomLeftCorner(1, s_) = table_.b.transpose();
@@ -85,7 +87,7 @@ class PhaseSpaceStep final : public StepProblem {
     start_.take_second(*lagrangian_, step.start, q0_, zero_);
     start_.take_first(*lagrangian_, step.start, q0_, zero_);
     const double size = std::max(max_norm(p0_), max_norm(start_.qv) * max_norm(q0_));
-    blocks_[0].scale = blocks_[1].scale = usable_scale(size + std::abs(step.size) * max_norm(start_.q));
+    blocks_[0].scale = blocks_[1].scale = scale_of(size + std::abs(step.size) * max_norm(start_.q));
   }
 
   void guess(ConstVectorRef v0, VectorRef x) override {
@@ -119,6 +121,27 @@ class PhaseSpaceStep final : public StepProblem {
     for (int k = 0; k < s_; ++k)
       set_block(values, s_, k, [&](Eigen::Index e) { return end_by_velocity(k, e); });
     set_block(values, s_, s_, [&](Eigen::Index e) { return end_by_projection(e); });
+  }
+
+  /// Terms of a row: p0, Dθ(q0) q0 and h ∂L/∂q.
+  const double* scales_of_unsolved_rows(ConstVectorRef f, double level) override {
+    bool solved = true;
+    for (int i = 0; i <= s_; ++i)
+      solved = solved && RowScales::solved(f.data() + n_ * i, p0_.data(), n_, level);
+    if (solved) return nullptr;
+    sizes_ = p0_.cwiseAbs() + std::abs(step_.size) * start_.q.cwiseAbs();
+    largest_.setZero();
+    RowScales::set_largest(largest_q_, lagrangian_->structure().quadratic ? 0.0 : max_norm(q0_), tolerances_,
+                           level);
+    lagrangian_->pattern().for_each([&](Eigen::Index e, int r, int c) {
+      const double momentum = std::abs(start_.qv[e]), impulse = std::abs(step_.size * start_.qq[e]);
+      sizes_[c] += momentum * std::abs(q0_[r]);
+      sizes_[r] += impulse * std::abs(q0_[c]);
+      largest_[c] += momentum * largest_q_[r];
+      largest_[r] += impulse * largest_q_[c];
+    });
+    for (int i = 0; i <= s_; ++i) row_scales_.set(n_ * i, sizes_, largest_, blocks_[0].scale);
+    return row_scales_.unsolved(f, level);
   }
 
   void finish(ConstVectorRef x, StepEnd& end) override {
@@ -230,6 +253,8 @@ class PhaseSpaceStep final : public StepProblem {
   SparsityPattern pattern_;
   BlockPattern layout_{0, 0};
   std::vector<ResidualBlock> blocks_;
+  RowScales row_scales_{n_ * (s_ + 1)};
+  Vector tolerances_, sizes_, largest_, largest_q_;
 
   Interval step_{0.0, 1.0};
   Vector zero_;

@@ -8,7 +8,12 @@
 namespace diracstep {
 
 StageRows::StageRows(std::shared_ptr<const ConstraintRows> rows, int stages, int first, int stride)
-    : rows_(std::move(rows)), s_(stages), n_(rows_->dimension()), first_(first), stride_(stride) {
+    : rows_(std::move(rows)),
+      s_(stages),
+      n_(rows_->dimension()),
+      first_(first),
+      stride_(stride),
+      leading_(rows_->pattern()) {
   const int nonzeros = rows_->pattern().nonzeros(), curved = curvature_pattern().nonzeros();
   at_lobatto_.setZero(nonzeros, s_ + 1);
   at_gauss_.setZero(nonzeros, s_);
@@ -16,6 +21,8 @@ StageRows::StageRows(std::shared_ptr<const ConstraintRows> rows, int stages, int
   derivative_.setZero(nonzeros, s_);
   sum_.setZero(curved);
   for (Columns* at_nodes : {&offset_, &positions_, &multipliers_}) at_nodes->setZero(rows_->rows(), s_);
+  lambda_.setZero(rows_->rows());
+  start_curvature_.setZero(rows_->curvature_pattern().nonzeros());
 }
 
 const SparsityPattern& StageRows::curvature_pattern() const {
@@ -132,6 +139,34 @@ double StageRows::impulse_size(ConstVectorRef multipliers) const {
 
 double StageRows::curvature_size() const {
   return s_ == 1 ? 0.0 : largest_entry(curvature_.data(), curvature_.size());
+}
+
+void StageRows::add_impulse_sizes(const StagePoints& at, ConstVectorRef x, const Vector& q, Vector& sizes) {
+  lambda_.setZero();
+  for (int j = 0; j < s_; ++j) lambda_ += x.segment(first_ + stride_ * j, rows_->rows()).cwiseAbs();
+  rows_->pattern().for_each(
+      [&](Eigen::Index e, int r, int c) { sizes[c] += std::abs(at_lobatto_(e, 0) * lambda_[r]); });
+  rows_->annihilator_derivative(at.lobatto_time(0), at.lobatto.col(0), lambda_, start_curvature_);
+  rows_->curvature_pattern().for_each(
+      [&](Eigen::Index e, int r, int c) { sizes[r] += std::abs(start_curvature_[e] * q[c]); });
+}
+
+void StageRows::size_terms(double h, const Vector& q, const Vector& v, Vector& sizes) {
+  leading_.add_up(rows_->pattern(), sizes.data() + first(), [&](Eigen::Index e, int c) {
+    return std::abs(at_lobatto_(e, 0)) * (std::abs(q[c]) / h + std::abs(v[c]));
+  });
+}
+
+double form_size(const std::vector<StageRows>& all) {
+  double largest = 0.0;
+  for (const StageRows& rows : all) largest = std::max(largest, rows.form_size());
+  return largest;
+}
+
+double impulse_size(const std::vector<StageRows>& all, ConstVectorRef multipliers) {
+  double largest = 0.0;
+  for (const StageRows& rows : all) largest = std::max(largest, rows.impulse_size(multipliers));
+  return largest;
 }
 
 }  // namespace diracstep

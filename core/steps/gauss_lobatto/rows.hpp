@@ -1,5 +1,6 @@
 #pragma once
 
+#include <diracstep/core/numerics/row_scales.hpp>
 #include <diracstep/core/steps/gauss_lobatto/fixed_stages.hpp>
 #include <diracstep/core/steps/gauss_lobatto/points.hpp>
 #include <diracstep/core/system/constraint_rows.hpp>
@@ -52,6 +53,20 @@ class StageRows {
   double impulse_size(ConstVectorRef multipliers) const;
   /// Size of the curvature when the Jacobian was last taken.
   double curvature_size() const;
+  /// sizes += those of the terms of A(q0)ᵀλ at all stages, coordinate by coordinate, and of what they lose to
+  /// round-off of positions of this size.
+  void add_impulse_sizes(const StagePoints& at, ConstVectorRef x, const Vector& q, Vector& sizes);
+  /// Whether these rows of f are at most `allowed` times a term of theirs, A(q0) times positions over h and
+  /// velocities, at all stages.
+  bool bound(const StagePoints& at, const double* x, const double* f, double allowed) const {
+    const double per_step = 1.0 / std::abs(at.step.size);
+    return leading_.bound(f + first_, s_, stride_, allowed, [&](Eigen::Index e, int c) {
+      return std::abs(at_lobatto_(e, 0)) * (per_step * std::abs(at.lobatto(c, 0)) + std::abs(x[c]));
+    });
+  }
+  /// sizes = those of the terms of these rows, among those of all rows of the scene, for positions and
+  /// velocities of these sizes.
+  void size_terms(double h, const Vector& q, const Vector& v, Vector& sizes);
 
  private:
   /// Of the curvature; empty for one stage, whose only impulse enters at the start and so has none.
@@ -66,8 +81,14 @@ class StageRows {
   Columns derivative_;             ///< ∂(A V + b)/∂q at the Gauss nodes
   Columns offset_, positions_, multipliers_;
   Vector sum_;
+  LeadingTerms leading_;
+  Vector lambda_, start_curvature_;  ///< workspaces of add_impulse_sizes()
   bool gauss_known_ = false;
   int first_layout_ = -1;  ///< three for each pair of stages: impulses, curvature, rows
 };
+
+/// The largest of StageRows::form_size() and impulse_size() over all rows.
+double form_size(const std::vector<StageRows>& all);
+double impulse_size(const std::vector<StageRows>& all, ConstVectorRef multipliers);
 
 }  // namespace diracstep

@@ -4,11 +4,13 @@
 #include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/core/steps/gauss_lobatto/momentum.hpp>
 #include <diracstep/core/steps/gauss_lobatto/points.hpp>
+#include <diracstep/core/steps/gauss_lobatto/row_scales.hpp>
 #include <diracstep/core/steps/gauss_lobatto/rows.hpp>
 #include <diracstep/core/steps/gauss_lobatto/sizes.hpp>
 #include <diracstep/core/steps/gauss_lobatto/splitting.hpp>
 #include <diracstep/core/steps/gauss_lobatto/step.hpp>
 #include <diracstep/core/steps/gauss_lobatto/step_sums.hpp>
+#include <diracstep/core/system/length_of_rows.hpp>
 #include <functional>
 #include <optional>
 
@@ -38,6 +40,8 @@ class GaussLobattoStep final : public StepProblem {
         sums_(s, n_, m_),
         momentum_(scene.lagrangian, scene.force, s, dense),
         layout_(size(), size()),
+        row_scales_(s_, scene),
+        length_(length_of_rows(scene)),
         affine_(affine(scene)) {
     int row = n_ * s_;
     for (const auto& block : scene.constraints) {
@@ -90,7 +94,8 @@ class GaussLobattoStep final : public StepProblem {
       splitting_->solve(f);
   }
   Contraction contract(VectorRef x, VectorRef f, const ContractionLimits& limits) override {
-    if (!fixed_) return StepProblem::contract(x, f, limits);
+    const bool at_rest_in_origin = m_ > 0 && blocks_[1].scale <= smallest_scale;  // then scales follow x
+    if (!fixed_ || at_rest_in_origin) return StepProblem::contract(x, f, limits);
     evaluated_ = false;
     const auto prepare = [&] {
       evaluated_at(x.data());
@@ -112,7 +117,7 @@ class GaussLobattoStep final : public StepProblem {
     splitting_known_ = false;
     sizes_.begin(memory, largest_entry(start.q.data(), start.q.size()));
     for (StageRows& rows : rows_) rows.begin(points_);
-    last_impulse_ = memory.known && m_ > 0 ? impulse_scale(impulse_size(memory.multipliers)) : 0.0;
+    last_impulse_ = memory.known && m_ > 0 ? impulse_scale(impulse_size(rows_, memory.multipliers)) : 0.0;
     update_scales();
     evaluated_ = false;
   }
@@ -148,6 +153,10 @@ class GaussLobattoStep final : public StepProblem {
     for (const StageRows& rows : rows_) {
       sizes_.row_curvature = std::max(sizes_.row_curvature, rows.curvature_size());
     }
+  }
+
+  const double* scales_of_unsolved_rows(ConstVectorRef f, double level) override {
+    return row_scales_.unsolved({points_, momentum_, rows_, p0_, last_x_}, f, level, blocks_, part());
   }
 
   void finish(ConstVectorRef x, StepEnd& end) override {
@@ -193,9 +202,14 @@ class GaussLobattoStep final : public StepProblem {
     evaluated_ = true;
     const double impulse = evaluate_points(x);
     if (m_ == 0) return;
-    blocks_[0].scale =
-        std::max(blocks_[0].scale, (sums_.compensated() ? last_bit : 1.0) * impulse_scale(impulse));
+    blocks_[0].scale = std::max(blocks_[0].scale, part() * impulse_scale(impulse));
+    if (blocks_[1].scale <= smallest_scale)  // at rest in the origin
+      blocks_[1].scale = scale_of(part() * form_size(rows_) * largest_entry(x.data(), n_ * s_));
   }
+
+  /// What an iteration leaves of the residual is no random error: it is a smooth function of the state and
+  /// drives the energy one way.  So compensated sums are solved for to the last bit.
+  double part() const { return sums_.compensated() ? last_bit : 1.0; }
 
   /// Gives the largest term of an impulse.
   double evaluate_points(ConstVectorRef x) {
@@ -210,7 +224,7 @@ class GaussLobattoStep final : public StepProblem {
     if (m_ == 0) return 0.0;
     impulses_.setZero();
     for (StageRows& rows : rows_) rows.add_impulses(points_, x, impulses_);
-    return impulse_size(x.tail(m_ * s_));
+    return impulse_size(rows_, x.tail(m_ * s_));
   }
 
   /// Sizes at x, for the next step.
@@ -233,11 +247,6 @@ class GaussLobattoStep final : public StepProblem {
   double impulse_scale(double size_of_impulses) const {
     return size_of_impulses + sizes_.row_curvature * sizes_.position;
   }
-  double impulse_size(ConstVectorRef multipliers) const {
-    double largest = 0.0;
-    for (const StageRows& rows : rows_) largest = std::max(largest, rows.impulse_size(multipliers));
-    return largest;
-  }
 
   /// Before the first solve: the derivatives at the start, for the round-off scales.
   void sample_start(ConstVectorRef v0) {
@@ -253,15 +262,11 @@ class GaussLobattoStep final : public StepProblem {
   /// Terms of the momentum rows are momenta, those of the last step where this one is not solved yet; a
   /// velocity of size |q|/h loses ε|q|/h to round-off.
   void update_scales() {
-    const double h = std::abs(step_size()), velocity = sizes_.position / h;
-    blocks_[0].scale = usable_scale(sizes_.momentum(h, largest_entry(p0_.data(), n_)) + last_impulse_);
-    double one_forms = 0.0;
-    for (const StageRows& rows : rows_) one_forms = std::max(one_forms, rows.form_size());
-    if (m_ > 0) blocks_[1].scale = usable_scale(one_forms * velocity);
-    // What an iteration leaves of the residual is no random error: it is a smooth function of the state and
-    // drives the energy one way.  So solve to the last bit.
-    if (sums_.compensated())
-      for (ResidualBlock& block : blocks_) block.scale *= last_bit;
+    const double h = std::abs(step_size()),
+                 velocity = std::max(sizes_.position, part_of_length * length_) / h;
+    blocks_[0].scale = scale_of(sizes_.momentum(h, largest_entry(p0_.data(), n_)) + last_impulse_);
+    if (m_ > 0) blocks_[1].scale = scale_of(form_size(rows_) * velocity);
+    for (ResidualBlock& block : blocks_) block.scale *= part();
   }
 
   int s_, n_, m_;
@@ -276,11 +281,13 @@ class GaussLobattoStep final : public StepProblem {
   std::unique_ptr<FixedStages> fixed_;  ///< of few coordinates, rows and stages, without a force
 
   Vector p0_, last_x_;
+  StageRowScales row_scales_;
   Columns impulses_;  ///< A(Q~_j)ᵀ λ_j
   StageSizes sizes_;
   double last_impulse_ = 0.0;  ///< size of it with the multipliers of the step before, at this start
   std::optional<StageSplitting> splitting_;  ///< of small scenes
   bool splitting_known_ = false;
+  double length_;           ///< of the rows
   bool affine_;             ///< the residual is affine in the unknowns
   bool evaluated_ = false;  ///< at last_x_
 };
