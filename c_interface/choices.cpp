@@ -1,7 +1,7 @@
 #include <cmath>
 #include <diracstep/c_interface/handles.hpp>
 #include <diracstep/core/runs/run.hpp>
-#include <diracstep/solvers/kinsol_solver.hpp>
+#include <diracstep/solvers/direct_solver.hpp>
 
 using namespace diracstep;
 
@@ -31,9 +31,8 @@ Momentum momentum_from(int momentum) {
 
 SolverFactory solvers_from(const diracstep_options& options) {
   KinsolOptions solver;
-  if (options.solver != nullptr) solver.iteration = iteration(options.solver);
   if (options.jacobian != nullptr) solver.jacobian = jacobian_policy(options.jacobian);
-  return kinsol(solver);
+  return named_solver(options.solver != nullptr ? options.solver : "newton", solver);
 }
 
 IntegratorOptions stepping_from(const diracstep_model& model, const diracstep_options& options) {

@@ -121,7 +121,7 @@ typedef struct diracstep_options {
   int ends;             /* 1: the motion is to end at `end`, and a fixed step is made so much smaller … */
   double end;           /* … that whole steps lead there; 0: no such adjustment */
   const char *rule;     /* rule for nonholonomic rows; NULL: the method's own */
-  const char *solver;   /* "newton", "fixed-point", "automatic"; NULL: the first */
+  const char *solver;   /* "newton", "fixed-point", "automatic", "direct"; NULL: the first */
   const char *jacobian; /* "automatic", "fresh", "per-step", "kept"; NULL: the first */
   int project_start;    /* 1: an inconsistent start is moved onto the rows instead of refused */
   int substeps;         /* a step that cannot be solved is taken in 2, 4, … up to so many; 0: 1 */

@@ -51,14 +51,14 @@ std::vector<int> whole_numbers(const std::string& option, const std::string& lis
   return parse_list<int>(option, list, "a whole number");
 }
 
-Parameters parameters(const std::vector<std::string>& assignments) {
+Parameters parameters(const std::vector<std::string>& assignments, const std::string& option) {
   Parameters parsed;
   for (const auto& assignment : assignments) {
     const std::size_t sign = assignment.find('=');
     if (sign == std::string::npos || sign == 0)
-      throw Misuse(fmt::format("--set: '{}' is not of the form name=value", assignment));
+      throw Misuse(fmt::format("{}: '{}' is not of the form name=value", option, assignment));
     const std::string name = assignment.substr(0, sign);
-    parsed[name] = parse<double>("--set " + name, assignment.substr(sign + 1), "a number");
+    parsed[name] = parse<double>(option + " " + name, assignment.substr(sign + 1), "a number");
   }
   return parsed;
 }

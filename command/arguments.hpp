@@ -13,7 +13,7 @@ std::vector<double> numbers(const std::string& option, const std::string& list);
 std::vector<int> whole_numbers(const std::string& option, const std::string& list);
 
 /// "name=value" assignments.
-Parameters parameters(const std::vector<std::string>& assignments);
+Parameters parameters(const std::vector<std::string>& assignments, const std::string& option = "--set");
 
 /// "plus", "minus" or "projected".
 Momentum momentum(const std::string& text);

@@ -88,6 +88,9 @@ std::vector<std::pair<std::string, std::string>> run_identity(const CatalogueSce
   run.emplace_back("start, as bits", sha256(bits(Vector::Constant(1, start.time)) + bits(start.q) +
                                             bits(start.v) + bits(start.p))
                                          .substr(0, 16));
+  for (Eigen::Index i = 0; i < entry.scene->tolerances.size(); ++i)
+    run.emplace_back("tolerance of " + entry.scene->coordinates[static_cast<std::size_t>(i)],
+                     fmt::format("{:.17g}", entry.scene->tolerances[i]));
   run.emplace_back("redundant rows", session.drop_redundant_rows ? "dropped" : "as the scene says");
   run.emplace_back("method", options.method);
   run.emplace_back("order", std::to_string(options.order));
@@ -97,7 +100,7 @@ std::vector<std::pair<std::string, std::string>> run_identity(const CatalogueSce
   run.emplace_back("trajectory", to_file ? fmt::format("every {}", keeping.every) : "none");
   run.emplace_back("momentum", diracstep::name(keeping.momentum));
   run.emplace_back("rule", choice.rule.value_or("the method's own"));
-  run.emplace_back("solver", name(session.solver_options.iteration));
+  run.emplace_back("solver", session.solver);
   run.emplace_back("Jacobian", name(session.solver_options.jacobian));
   for (const Plugin& plugin : session.plugins)
     if (serves(plugin, entry, choice, options.method))

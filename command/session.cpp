@@ -25,15 +25,16 @@ void add_solver_options(CLI::App& verb, Session& session) {
   verb.add_option_function<std::string>(
       "--solver",
       [&session](const std::string& name) {
-        session.solver_options.iteration = iteration(name);
-        session.solvers = kinsol(session.solver_options);
+        session.solver = name;
+        session.solvers = named_solver(name, session.solver_options);
       },
-      "How a step is solved: newton; fixed-point where the step has a splitting; automatic");
+      "How a step is solved: newton; fixed-point where the step has a splitting; automatic;\n"
+      "direct, a plain loop in place of KINSOL, for small scenes");
   verb.add_option_function<std::string>(
       "--jacobian",
       [&session](const std::string& name) {
         session.solver_options.jacobian = jacobian_policy(name);
-        session.solvers = kinsol(session.solver_options);
+        session.solvers = named_solver(session.solver, session.solver_options);
       },
       "When Newton's method takes a new Jacobian: automatic, fresh, per-step, kept");
 }

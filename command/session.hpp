@@ -4,7 +4,7 @@
 #include <diracstep/core/methods/registry.hpp>
 #include <diracstep/plugins/loaded_plugin.hpp>
 #include <diracstep/scene_format/scene_catalogue.hpp>
-#include <diracstep/solvers/kinsol_solver.hpp>
+#include <diracstep/solvers/direct_solver.hpp>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -25,11 +25,13 @@ inline constexpr int doubted = 3;  ///< a run that came to its end, with a doubt
 /// What the verbs share.
 struct Session {
   Registry registry = Registry::with_built_ins();
+  std::string solver = "newton";  ///< see named_solver()
   KinsolOptions solver_options = {};
   SolverFactory solvers = kinsol();
   std::vector<std::string> plugin_files;  ///< as given by --plugin
   std::vector<Plugin> plugins;            ///< those and the ones on DIRACSTEP_PLUGIN_PATH
   bool drop_redundant_rows = false;       ///< of every scene that is made
+  std::vector<std::string> tolerances;    ///< of its coordinates, as given by --tolerance
   int exit_status = done;
 };
 

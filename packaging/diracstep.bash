@@ -12,7 +12,7 @@ _diracstep() {
     --method | --methods) words="$(diracstep list methods 2>/dev/null | awk '/^$/ { exit } NR > 1 && /^[^ ]/ { print $1 }')" ;;
     --momentum) words="plus minus projected" ;;
     --jacobian) words="automatic fresh per-step kept" ;;
-    --solver) words="newton fixed-point automatic" ;;
+    --solver) words="newton fixed-point automatic direct" ;;
     --out | --plugin | --checkpoint | --resume | --compare) compopt -o default 2>/dev/null && return ;;
     *)
       case "$cur,$verb" in

@@ -17,7 +17,7 @@ void drop_redundant_rows(CatalogueScene& entry) {
   const std::shared_ptr<const Scene> scene = completed(entry.scene);
   if (!scene->start.q.allFinite() || scene->start.q.size() != scene->dimension()) return;  // refused by runs
   const std::vector<std::string> dependent = redundant_rows(*scene, scene->start);
-  if (dependent.empty() || singular_at_start_only(*scene, scene->start)) return;
+  if (dependent.empty() || row_dependence(*scene, scene->start, dependent) != RowDependence::lasting) return;
   entry.scene = without_rows(*entry.scene, dependent);
   std::string names;
   for (const std::string& name : dependent) names += (names.empty() ? "'" : ", '") + name + "'";

@@ -209,6 +209,20 @@ class References {
   std::vector<std::size_t> valid_;
 };
 
+/// By coordinate; empty where the file states none.
+Vector tolerances_of(const LoadedScene& loaded) {
+  const auto& coordinates = loaded.program->document.coordinates;
+  const auto stated = [](const auto& coordinate) { return coordinate.tolerance != 0.0; };
+  if (std::ranges::none_of(coordinates, stated)) return {};
+  Vector tolerances = Vector::Zero(loaded.layout.dimension());
+  for (std::size_t f = 0; f < coordinates.size(); ++f) {
+    const int family = static_cast<int>(f);
+    for (long i = 0; i < loaded.layout.count(family); ++i)
+      tolerances[loaded.layout.position(family, loaded.layout.element(family, i))] = coordinates[f].tolerance;
+  }
+  return tolerances;
+}
+
 Scene scene_of(const LoadedScenePtr& loaded) {
   Scene scene;
   scene.name = loaded->program->document.name;
@@ -219,6 +233,7 @@ Scene scene_of(const LoadedScenePtr& loaded) {
   scene.force = file_force(loaded);
   scene.start = start_of(*loaded);
   scene.kinks = file_kinks(loaded);
+  scene.tolerances = tolerances_of(*loaded);
   return scene;
 }
 

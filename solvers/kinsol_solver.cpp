@@ -22,6 +22,8 @@ using detail::require;
 constexpr double no_limit = 1e100;
 /// A residual of so many tolerances is round-off.
 constexpr double round_off = 16.0;
+/// The row that a norm is of is no larger than that norm times its scale, but for rounding.
+constexpr double at_rounding = 1e-12;
 /// With a Jacobian of another point the error falls by a mere factor in each iteration, so that the last
 /// correction has to be this small.
 constexpr double linear_step_tolerance = 1e-14;
@@ -62,9 +64,7 @@ class KinsolSolver final : public NonlinearSolver {
     require(KINSetJacFn(memory(), &KinsolSolver::jacobian), "KINSetJacFn");
     require(KINSetMaxSetupCalls(memory(), 1), "KINSetMaxSetupCalls");
     require(KINSetFuncNormTol(memory(), options.tolerance), "KINSetFuncNormTol");
-    const double step_tolerance =
-        factors_.exact() ? options.step_tolerance : std::min(options.step_tolerance, linear_step_tolerance);
-    require(KINSetScaledStepTol(memory(), step_tolerance), "KINSetScaledStepTol");
+    require(KINSetScaledStepTol(memory(), step_tolerance()), "KINSetScaledStepTol");
     require(KINSetMaxNewtonStep(memory(), no_limit), "KINSetMaxNewtonStep");
   }
 
@@ -116,6 +116,11 @@ class KinsolSolver final : public NonlinearSolver {
  private:
   void* memory() const { return kinsol_.get(); }
 
+  double step_tolerance() const {
+    const double asked = options_.step_tolerance;
+    return factors_.exact() ? asked : std::min(asked, linear_step_tolerance);
+  }
+
   Eigen::Map<Vector> unknowns() const { return {data_of(x_.get()), guess_.size()}; }
 
   /// Newton's method from now on, where the fixed-point iteration has turned out to be slow.
@@ -128,17 +133,8 @@ class KinsolSolver final : public NonlinearSolver {
   /// From the guess to a status.
   void attempt(int strategy) {
     if (report_.residual_evaluations > 0) unknowns() = guess_;  // the first attempt starts there
-    strategy_ = strategy;
-    int code = run();
-    double norm = report_residual();
-    // KINSOL ends where its steps are small beside the unknowns, which may be far from the origin or of
-    // different sizes; it goes on for as long as the residual falls.
-    while (code == KIN_STEP_LT_STPTOL && norm > round_off * options_.tolerance &&
-           report_.iterations < options_.max_iterations)
-      if (!improve(code, norm)) break;
-    const bool converged = strategy != KIN_FP && (code == KIN_SUCCESS || code == KIN_INITIAL_GUESS_OK);
-    // Other codes, KIN_STEP_LT_STPTOL above all, come at the round-off floor as well as far from a solution.
-    if (converged || norm <= options_.accept)
+    double norm = 0.0;
+    if (iterate(strategy, norm))
       report_.status = SolveStatus::ok;
     else if (singular_)
       report_.status = SolveStatus::singular_jacobian;
@@ -146,8 +142,42 @@ class KinsolSolver final : public NonlinearSolver {
       report_.status = SolveStatus::not_finite;
     else
       report_.status = SolveStatus::no_convergence;
+    if (report_.ok()) solve_small_rows(norm);
     const bool quadratic = factors_.exact() || factors_.current();
     if (report_.ok() && strategy != KIN_FP && !quadratic && report_.iterations > 0) correct_again();
+  }
+
+  /// From where the unknowns are, for as long as the residual falls; whether it is solved.
+  bool iterate(int strategy, double& norm) {
+    strategy_ = strategy;
+    int code = run();
+    norm = report_residual();
+    // KINSOL ends where its steps are small beside the unknowns, which may be far from the origin or of
+    // different sizes; it goes on for as long as the residual falls.
+    while (code == KIN_STEP_LT_STPTOL && norm > round_off * options_.tolerance &&
+           report_.iterations < options_.max_iterations)
+      if (!improve(code, norm)) break;
+    small_step_ = code == KIN_STEP_LT_STPTOL;
+    const bool converged = strategy != KIN_FP && (code == KIN_SUCCESS || code == KIN_INITIAL_GUESS_OK);
+    // Other codes, KIN_STEP_LT_STPTOL above all, come at the round-off floor as well as far from a solution.
+    return converged || norm <= options_.accept;
+  }
+
+  /// Rows whose terms are far smaller than those of others in their block are not judged by the scale of the
+  /// block: Newton's method goes on by their own.
+  void solve_small_rows(double norm) {
+    const Eigen::Map<Vector> f(residual_, guess_.size());
+    if (went_back_) problem_.residual(unknowns(), f);
+    const double level = std::max((1.0 + at_rounding) * norm, options_.tolerance);
+    const double* const scales = problem_.scales_of_unsolved_rows(f, level);
+    if (scales == nullptr) return;
+    row_scales_ = scales;
+    detail::set_weights(residual_scale_.get(), scales);
+    require(KINSetScaledStepTol(memory(), options_.step_tolerance), "KINSetScaledStepTol");
+    const bool solved = iterate(KIN_NONE, norm);
+    require(KINSetScaledStepTol(memory(), step_tolerance()), "KINSetScaledStepTol");
+    // A small step of Newton's is one near a solution: what stays is round-off inside of the functions.
+    if (!solved && !small_step_) report_.status = SolveStatus::no_convergence;
   }
 
   /// Where the convergence is linear, what is left of the error is as large as the last residual and of the
@@ -165,7 +195,8 @@ class KinsolSolver final : public NonlinearSolver {
     last_ = unknowns();
     code = run();
     norm = report_residual();
-    if (norm > before) {
+    went_back_ = norm > before;
+    if (went_back_) {
       unknowns() = last_;
       report_.residual_norms = norms;
       norm = before;
@@ -175,7 +206,7 @@ class KinsolSolver final : public NonlinearSolver {
 
   /// One call of KINSOL from where the unknowns are.
   int run() {
-    singular_ = not_finite_ = false;
+    singular_ = not_finite_ = went_back_ = false;
     smallest_norm_ = HUGE_VAL;
     factors_.begin();
     const int code = KINSol(memory(), x_.get(), strategy_, unknown_scale_.get(), residual_scale_.get());
@@ -199,8 +230,14 @@ class KinsolSolver final : public NonlinearSolver {
     }
   }
 
+  /// The largest entry of the last residual, each in units of its row.
+  double norm_by_rows() const {
+    return largest_of(guess_.size(), [this](Eigen::Index i) { return residual_[i] / row_scales_[i]; });
+  }
+
   /// The largest scaled entry of the last residual.
   double scaled_norm() const {
+    if (row_scales_ != nullptr) return norm_by_rows();
     double largest = 0.0;
     for (std::size_t b = 0; b < norms_.size(); ++b)
       largest = std::max(largest, norms_[b] * inverse_scales_[b]);
@@ -217,10 +254,11 @@ class KinsolSolver final : public NonlinearSolver {
       if (std::isnan(norm)) return HUGE_VAL;
       largest = std::max(largest, norm / block.scale);
     }
-    return largest;
+    return row_scales_ != nullptr ? norm_by_rows() : largest;
   }
 
   void set_scales() {
+    row_scales_ = nullptr;
     const double size = largest_entry(guess_.data(), guess_.size());
     const double unit = size > 0.0 && std::isfinite(size) ? 1.0 / size : 1.0;
     detail::set_weights(unknown_scale_.get(), std::array{detail::Run{guess_.size(), unit}});
@@ -315,6 +353,7 @@ class KinsolSolver final : public NonlinearSolver {
   detail::KinsolHandle kinsol_;
   Vector guess_, last_, contraction_residual_;
   double* residual_ = nullptr;                        ///< the last one
+  const double* row_scales_ = nullptr;                ///< where rows are judged one by one
   std::array<double, 4> norms_{}, inverse_scales_{};  ///< of its blocks
   SolveReport report_;
   detail::ExceptionKeeper callbacks_;
@@ -324,6 +363,8 @@ class KinsolSolver final : public NonlinearSolver {
   double smallest_norm_ = HUGE_VAL;  ///< of the fixed-point iteration so far
   bool singular_ = false;
   bool not_finite_ = false;  ///< the last residual or Jacobian
+  bool small_step_ = false;  ///< the iteration ended by one
+  bool went_back_ = false;   ///< the unknowns are those before the last residual
 };
 
 template <class Enum, std::size_t N>

@@ -1,7 +1,9 @@
 #include <fmt/format.h>
 
 #include <CLI/App.hpp>
+#include <algorithm>
 #include <cmath>
+#include <ctime>
 #include <diracstep/command/arguments.hpp>
 #include <diracstep/command/verbs.hpp>
 #include <diracstep/core/adaptive/rate_survey.hpp>
@@ -24,6 +26,40 @@ struct PlanArguments {
   std::vector<std::string> set;
   bool json = false;
 };
+
+/// Above so many unknowns the arithmetic of a step takes far longer than what KINSOL does around it.
+constexpr int largest_to_measure = 40;
+constexpr int steps_to_measure = 48, max_rounds = 40;
+constexpr std::clock_t enough = CLOCKS_PER_SEC / 200;
+
+/// Processor time of the first steps, a mean of several rounds; NaN where one fails.
+double seconds_of_steps(const CatalogueScene& entry, const Session& session, const SolverFactory& solvers,
+                        const IntegratorOptions& options) {
+  Integrator integrator(entry.scene, session.registry, solvers, options);
+  const std::clock_t start = std::clock();
+  int rounds = 0;
+  while (rounds < max_rounds && std::clock() - start < enough) {
+    integrator.reset();
+    for (int k = 0; k < steps_to_measure; ++k)
+      if (!integrator.step().ok()) return std::nan("");
+    ++rounds;
+  }
+  return static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC / rounds;
+}
+
+/// What steps without KINSOL take of the time of those with it, measured.
+void add_direct_line(const CatalogueScene& entry, const Session& session, const IntegratorOptions& options,
+                     std::vector<PlanLine>& lines) {
+  if (entry.scene->dimension() + entry.scene->rows() > largest_to_measure) return;
+  const std::string other = session.solver == "direct" ? "newton" : session.solver;
+  const double by_kinsol =
+      seconds_of_steps(entry, session, named_solver(other, session.solver_options), options);
+  const double direct =
+      seconds_of_steps(entry, session, named_solver("direct", session.solver_options), options);
+  if (!(by_kinsol > 0.0 && direct > 0.0)) return;
+  lines.push_back({"--solver direct", fmt::format("{:.2f} of the time", direct / by_kinsol),
+                   fmt::format("of --solver {}: {} steps measured now", other, steps_to_measure)});
+}
 
 std::string as_json(const Integrator& integrator, const std::vector<PlanLine>& lines) {
   Json json;
@@ -56,6 +92,8 @@ void plan(const PlanArguments& options, Session& session) {
     lines = AdaptiveIntegrator(entry.scene, session.registry, session.solvers, used,
                                {.eps = options.eps, .end = entry.t_end})
                 .plan();
+  else
+    add_direct_line(entry, session, used, lines);
   for (const std::string& change : entry.changes) lines.push_back({"scene", "changed", change});
   if (choice.name != options.method.name)
     lines.push_back({"method", choice.name, "the scene's file recommends it"});

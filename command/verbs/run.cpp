@@ -410,6 +410,12 @@ void add_run(CLI::App& app, Session& session) {
       ->type_name("WHAT")
       ->capture_default_str();
   add_set_option(*verb, options->set);
+  verb->add_option(
+          "--tolerance", session.tolerances,
+          "A coordinate that is far smaller than others is solved to this in each step, not to 1e-15\n"
+          "of the largest; may be repeated")
+      ->type_name("COORDINATE=VALUE")
+      ->allow_extra_args(false);
   verb->add_flag("--json", options->json, "One JSON document on standard output");
   verb->footer(
       "Examples:\n"

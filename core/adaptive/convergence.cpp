@@ -72,8 +72,9 @@ double Convergence::next_factor() const {
 
 double Convergence::work_to_go() const {
   if (runs() < 4 || !(estimate_ > 0.0)) return 1.0;
-  double p = order_;
-  for (const std::size_t last : {runs(), runs() - 1}) p = std::min(p, std::max(order_of(last), 0.3));
+  double p = 0.3;
+  for (const std::size_t last : {runs(), runs() - 1}) p = std::max(p, order_of(last));
+  p = std::min<double>(p, order_);
   return std::max(1.0, std::pow(safety * estimate_ / error_, 1.0 / p));
 }
 

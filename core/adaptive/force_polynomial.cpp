@@ -106,7 +106,7 @@ void ForcePolynomial::find_scales(const std::vector<PathPoint>& path) {
   weights_.head(n_).setConstant(1.0 / momentum);
   weights_.segment(n_, n_).setConstant(1.0 / (momentum * span_));
   for (Eigen::Index r = 0; r < m_; ++r) {
-    const double scale = usable_scale(row_terms[r]);
+    const double scale = size_or_one(row_terms[r]);
     allowed_[2 * n_ + r] = std::max(part, read_error) * scale;
     weights_[2 * n_ + r] = 1.0 / (scale * span_);
   }

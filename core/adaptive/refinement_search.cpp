@@ -18,13 +18,13 @@ constexpr double missed_allowed = 0.1;        // by the forces surveyed, in part
 constexpr double error_out_of_reach = 1e-15;  // differences of runs hold nothing but round-off below it
 constexpr long nodes_between_looks = 64;
 
-double relative_change(const Vector& a, const Vector& b) {
-  const double size = max_norm(b), change = max_norm(a - b);
-  return size > 1e-14 ? change / size : change;
-}
+constexpr double no_size = 1e-14;  // of the largest on the way: an end that comes back to zero
 
-double relative_change(const Sample& a, const Sample& b) {
-  return std::max(relative_change(a.q, b.q), relative_change(a.p, b.p));
+/// In parts of b; of the largest on the way where nothing is left of b.
+double relative_change(const Vector& a, const Vector& b, double largest) {
+  const double size = max_norm(b), change = max_norm(a - b);
+  if (change == 0.0) return 0.0;
+  return change / (size > no_size * largest ? size : largest);
 }
 
 std::string text(double value) { return to_text(value, 3); }
@@ -129,7 +129,11 @@ RefinementSearch::Outcome RefinementSearch::run(long refinement) {
   NodeCheck rest(*motion_.scene, 0, true);
   Sample node;
   const auto at_node = [&](const ReadNode& read, bool last) {
-    if (!last && rest.wants(nodes) && read(Momentum::projected, node).ok()) rest.see(nodes, node);
+    if (!last && rest.wants(nodes) && read(Momentum::projected, node).ok()) {
+      rest.see(nodes, node);
+      largest_position_ = std::max(largest_position_, max_norm(node.q));
+      largest_momentum_ = std::max(largest_momentum_, max_norm(node.p));
+    }
     if (last) read_end = read(Momentum::projected, end);
     if (++nodes % nodes_between_looks != 0) return true;
     ended_ = motion_.options.go_on && !motion_.options.go_on();
@@ -155,7 +159,9 @@ RefinementSearch::Outcome RefinementSearch::run(long refinement) {
   last_steps_ = work.steps;
   frozen_ = rest.text();
   if (first) first_good_ = refinement;
-  if (!first) now.difference = relative_change(end, report_.end);
+  if (!first)
+    now.difference = std::max(relative_change(end.q, report_.end.q, largest_position_),
+                              relative_change(end.p, report_.end.p, largest_momentum_));
   convergence_.add(now.step, now.difference);
   now.estimate = convergence_.estimate();
   now.observed_order = convergence_.observed_order();

@@ -54,6 +54,7 @@ class RefinementSearch {
   double first_;
   double eps_step_ = 0.0;  ///< of the options of variable steps, with its sign
   long refinement_ = 1, last_steps_ = 0, last_refinement_ = 1, first_good_ = 0;
+  double largest_position_ = 0.0, largest_momentum_ = 0.0;  ///< at the nodes read
   int failures_ = 0, divisions_ = 0;
   bool surveyed_ = false, ended_ = false, accepted_ = false;
   std::string fast_;    ///< empty, or where the forces change fast

@@ -15,10 +15,11 @@ void VariableRunChecks::before_step() {
   looking_ = step == next_look_ && integrator_.sample(Momentum::projected, start_).ok();
 }
 
-bool VariableRunChecks::halve(double size) {
+bool VariableRunChecks::divide(double size) {
+  const double first = StepComparison::first_part * size;
   side_.restart(start_.time, start_.q, start_.p, start_.v);
-  return side_.step(0.5 * size).ok() && side_.step(0.5 * size).ok() &&
-         side_.sample(Momentum::projected, halves_).ok();
+  return side_.step(first).ok() && side_.step(size - first).ok() &&
+         side_.sample(Momentum::projected, parts_).ok();
 }
 
 void VariableRunChecks::after_step() {
@@ -26,7 +27,7 @@ void VariableRunChecks::after_step() {
   next_look_ += std::min(most_steps_for_a_look, std::max(steps_for_a_look, next_look_));
   if (!integrator_.sample(Momentum::projected, whole_).ok()) return;
   const double size = whole_.time - start_.time;
-  if (halve(size)) comparison_.add(start_, size, whole_, halves_);
+  if (divide(size)) comparison_.add(start_, size, whole_, parts_);
 }
 
 std::string VariableRunChecks::text() const {

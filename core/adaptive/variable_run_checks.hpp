@@ -9,7 +9,7 @@
 namespace diracstep {
 
 /// What RunChecks does, for variable steps: the energy at the points shown, and at the nodes that are asked
-/// for steps beside their halves, alternating values and frozen momenta.  Steps are halved by the side
+/// for steps beside two parts of them, alternating values and frozen momenta.  Steps are divided by the side
 /// integrator of one's own, so that the main sequence keeps its bits.
 class VariableRunChecks {
  public:
@@ -28,7 +28,7 @@ class VariableRunChecks {
   std::string text() const;
 
  private:
-  bool halve(double size);
+  bool divide(double size);
 
   AdaptiveIntegrator& integrator_;
   Integrator side_;
@@ -37,7 +37,7 @@ class VariableRunChecks {
   StepComparison comparison_;
   long next_look_ = 1;
   bool looking_ = false;
-  Sample node_, start_, whole_, halves_;
+  Sample node_, start_, whole_, parts_;
 };
 
 }  // namespace diracstep

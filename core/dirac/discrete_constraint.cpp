@@ -37,6 +37,12 @@ void DiscreteConstraint::plan_own(std::vector<int> places, int dimension) {
 
 void DiscreteConstraint::residual(Interval step, ConstVectorRef q0, ConstVectorRef q1, VectorRef out) {
   increment_ = q1 - q0;
+  residual(step, q0, q1, increment_, out);
+}
+
+void DiscreteConstraint::residual(Interval step, ConstVectorRef q0, ConstVectorRef q1,
+                                  ConstVectorRef increment, VectorRef out) {
+  if (increment.data() != increment_.data()) increment_ = increment;
   for (Block& block : blocks_) residual(block, step, q0, q1, out.segment(block.first, block.rows->rows()));
   if (!own_.rows) return;
   own_.rows->residual(step, q0, q1, own_.values);

@@ -23,7 +23,9 @@ class DiscreteConstraint {
   /// Of ∂c/∂q1.
   const SparsityPattern& pattern() const { return pattern_; }
 
-  /// out = c(q0,q1).
+  /// out = c(q0,q1); `increment` is q1 − q0, given apart where it is known to more digits than the difference
+  /// has.
+  void residual(Interval step, ConstVectorRef q0, ConstVectorRef q1, ConstVectorRef increment, VectorRef out);
   void residual(Interval step, ConstVectorRef q0, ConstVectorRef q1, VectorRef out);
 
   /// d = ∂c/∂q1 on pattern().

@@ -8,28 +8,30 @@ DiscreteForce::DiscreteForce(std::shared_ptr<const Force> force, StepRule rule)
   for (Vector* values : {&fq_, &fv_}) values->setZero(force_->pattern().nonzeros());
 }
 
-void DiscreteForce::move_to(const StepNode& node, Interval step, ConstVectorRef q0, ConstVectorRef q1) {
+void DiscreteForce::move_to(const StepNode& node, Interval step, ConstVectorRef q0, ConstVectorRef q1,
+                            ConstVectorRef increment) {
   t_ = step.start + node.c * step.size;
   q_ = (1.0 - node.c) * q0 + node.c * q1;
-  v_ = (q1 - q0) / step.size;
+  v_ = increment / step.size;
 }
 
-void DiscreteForce::evaluate(Interval step, ConstVectorRef q0, ConstVectorRef q1) {
+void DiscreteForce::evaluate(Interval step, ConstVectorRef q0, ConstVectorRef q1, ConstVectorRef increment) {
   minus_.setZero();
   plus_.setZero();
   for (const StepNode& node : step_nodes(rule_)) {
-    move_to(node, step, q0, q1);
+    move_to(node, step, q0, q1, increment);
     force_->value(t_, q_, v_, f_);
     minus_ += step.size * node.weight * (1.0 - node.c) * f_;
     plus_ += step.size * node.weight * node.c * f_;
   }
 }
 
-void DiscreteForce::minus_by_end(Interval step, ConstVectorRef q0, ConstVectorRef q1, VectorRef d) {
+void DiscreteForce::minus_by_end(Interval step, ConstVectorRef q0, ConstVectorRef q1,
+                                 ConstVectorRef increment, VectorRef d) {
   d.setZero();
   for (const StepNode& node : step_nodes(rule_)) {
     if (node.c == 1.0) continue;
-    move_to(node, step, q0, q1);
+    move_to(node, step, q0, q1, increment);
     force_->derivatives(t_, q_, v_, fq_, fv_);
     d += node.weight * (1.0 - node.c) * (step.size * node.c * fq_ + fv_);
   }

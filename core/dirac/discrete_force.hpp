@@ -20,15 +20,18 @@ class DiscreteForce {
 
   const SparsityPattern& pattern() const { return force_->pattern(); }
 
-  void evaluate(Interval step, ConstVectorRef q0, ConstVectorRef q1);
+  /// `increment` is q1 − q0, given apart since it is known to more digits than the difference has.
+  void evaluate(Interval step, ConstVectorRef q0, ConstVectorRef q1, ConstVectorRef increment);
   const Vector& minus() const { return minus_; }  ///< F⁻ where it was last evaluated
   const Vector& plus() const { return plus_; }    ///< F⁺
 
   /// d = ∂F⁻/∂q1 on pattern().
-  void minus_by_end(Interval step, ConstVectorRef q0, ConstVectorRef q1, VectorRef d);
+  void minus_by_end(Interval step, ConstVectorRef q0, ConstVectorRef q1, ConstVectorRef increment,
+                    VectorRef d);
 
  private:
-  void move_to(const StepNode& node, Interval step, ConstVectorRef q0, ConstVectorRef q1);
+  void move_to(const StepNode& node, Interval step, ConstVectorRef q0, ConstVectorRef q1,
+               ConstVectorRef increment);
 
   std::shared_ptr<const Force> force_;
   StepRule rule_;

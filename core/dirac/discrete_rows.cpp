@@ -35,7 +35,7 @@ void require_below(double value, double allowed, const char* what) {
 /// Distance of the row space of `rows` from that of `forms`, relative to the largest entry of each row.
 double outside_span(Columns rows, const Columns& forms) {
   for (Eigen::Index r = 0; r < rows.rows(); ++r)
-    rows.row(r) /= usable_scale(max_norm(rows.row(r).transpose()));
+    rows.row(r) /= size_or_one(max_norm(rows.row(r).transpose()));
   const Columns transposed = forms.transpose();
   const Eigen::ColPivHouseholderQR<Columns> qr(transposed);
   const Columns coefficients = qr.solve(Columns(rows.transpose()));
@@ -55,7 +55,7 @@ double derivative_error(const DiscreteRows& rows, Interval step, const Vector& q
         (residual(rows, step, q0, forward) - residual(rows, step, q0, backward)) / (2.0 * delta);
     largest = std::max(largest, max_norm(column - exact.col(i)));
   }
-  return largest / usable_scale(max_norm(exact));
+  return largest / size_or_one(max_norm(exact));
 }
 
 }  // namespace
@@ -69,7 +69,7 @@ void require_discretisation(const DiscreteRows& rows, const ConstraintBlocks& co
   ConstraintsAtPoint at(blocks, n);
   at.evaluate(t, q);
   const Columns forms = at.pattern().full(at.coefficients());
-  const double terms = usable_scale(max_norm(forms) * max_norm(q));
+  const double terms = size_or_one(max_norm(forms) * max_norm(q));
   const Interval none{t, 0.0}, small{t, 1e-7};
   require_below(max_norm(residual(rows, none, q, q)), tolerance * terms,
                 "the diagonal q1 = q0 violates it (4.17)");
@@ -85,7 +85,7 @@ void require_discretisation(const DiscreteRows& rows, const ConstraintBlocks& co
       Columns(forms.transpose()).colPivHouseholderQr().solve(Columns(d.transpose())).transpose();
   const Vector rate = residual(rows, small, q, q) / small.size;
   require_below(max_norm(rate - combination * offset),
-                1e-5 * usable_scale(std::max({max_norm(rate), max_norm(offset), max_norm(d)})),
+                1e-5 * size_or_one(std::max({max_norm(rate), max_norm(offset), max_norm(d)})),
                 "c(q,q)/h misses the term b of A v + b");
   Vector q1 = q;
   for (int i = 0; i < n; ++i) q1[i] += 1e-2 * std::sin(1.0 + 1.7 * i) * std::max(1.0, std::abs(q[i]));

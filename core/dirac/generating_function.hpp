@@ -89,6 +89,11 @@ class GeneratingFunction {
   virtual void gradient(Interval step, ConstColumnsRef y, ColumnsRef g) = 0;
   virtual void hessian(Interval step, ConstColumnsRef y, ColumnsRef blocks) = 0;
 
+  /// From now on column 1 of y is the increment b − a of the arguments (a, b) of type one, derivatives stay
+  /// those by a and b: velocities (b − a)/h then lose nothing to the round-off of b.  False where S has no
+  /// such form.
+  virtual bool take_increments() { return false; }
+
   /// Starting values of the inner columns from the start point and a velocity there.
   virtual void guess_inner(Interval /*step*/, ConstVectorRef /*q0*/, ConstVectorRef /*p0*/,
                            ConstVectorRef /*v0*/, ColumnsRef /*inner*/) {}

@@ -33,14 +33,42 @@ AccelerationProblem& PointReader::acceleration_problem() {
   return *acceleration_;
 }
 
+/// Whether v follows from p without a system: L_v = L_v(q, 0) + M v with M constant and diagonal, and no
+/// rows.
+bool PointReader::constant_diagonal_mass(double t, ConstVectorRef q) {
+  const Lagrangian& l = *scene_->lagrangian;
+  const PhaseStructure& structure = l.structure();
+  if (scene_->rows() > 0 || !structure.y_hessian_constant || !structure.y_hessian_diagonal) return false;
+  if (mass_examined_) return mass_.size() > 0;
+  mass_examined_ = true;
+  const Vector rest = Vector::Zero(scene_->dimension());
+  Vector qq(l.pattern().nonzeros()), qv = qq, vv = qq, diagonal = rest;
+  l.hessian(t, q, rest, qq, qv, vv);
+  Eigen::Index value = 0;
+  for (const auto& [row, column] : l.pattern().entries()) {
+    if (row == column) diagonal[row] = vv[value];
+    ++value;
+  }
+  if (diagonal.allFinite() && (diagonal.array() != 0.0).all()) mass_ = diagonal;
+  return mass_.size() > 0;
+}
+
 SolveReport PointReader::velocity(double t, ConstVectorRef q, ConstVectorRef p, Vector& v) {
+  if (!phase_space_velocity_ && constant_diagonal_mass(t, q)) {
+    v.setZero(p.size());
+    scene_->lagrangian->gradient(t, q, v, lq_, unknowns_);
+    v = (p - unknowns_).cwiseQuotient(mass_);
+    SolveReport report;
+    if (!v.allFinite()) report.status = SolveStatus::not_finite;
+    return report;
+  }
   velocity_solver_->reset();
   if (phase_space_velocity_) {
     phase_space_velocity_->begin(t, q);
     return velocity_solver_->solve(v);
   }
   const Eigen::Index n = scene_->dimension();
-  velocity_->begin(t, q, p);
+  velocity_->begin(t, q, p, v);
   unknowns_.head(n) = v;
   unknowns_.tail(unknowns_.size() - n).setZero();
   const SolveReport report = velocity_solver_->solve(unknowns_);
@@ -88,7 +116,10 @@ SolveReport PointReader::acceleration_by_elimination(double t, ConstVectorRef q,
 SolveReport PointReader::read(double t, const State& at, Momentum momentum, Sample& sample) {
   sample.v = at.v;
   SolveReport report = velocity(t, at.q, at.p, sample.v);
-  if (report.ok()) report = acceleration(t, at.q, sample.v, a_, sample.lambda);
+  if (scene_->rows() == 0)
+    sample.lambda.resize(0);
+  else if (report.ok())
+    report = acceleration(t, at.q, sample.v, a_, sample.lambda);
   if (!report.ok()) return report;
   sample.time = t;
   sample.q = at.q;

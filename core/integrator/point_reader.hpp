@@ -34,6 +34,7 @@ class PointReader {
 
  private:
   struct Elimination;
+  bool constant_diagonal_mass(double t, ConstVectorRef q);
   AccelerationProblem& acceleration_problem();
 
   std::shared_ptr<const Scene> scene_;
@@ -45,6 +46,8 @@ class PointReader {
   std::unique_ptr<NonlinearSolver> velocity_solver_, acceleration_solver_;
   std::unique_ptr<Elimination> elimination_;
   Vector unknowns_, a_, lq_;
+  bool mass_examined_ = false;
+  Vector mass_;  ///< ∂²L/∂v² where it is constant, diagonal and regular and there are no rows; else empty
 };
 
 }  // namespace diracstep

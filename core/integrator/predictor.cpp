@@ -4,6 +4,7 @@
 #include <diracstep/core/integrator/predictor.hpp>
 #include <diracstep/core/numerics/combination.hpp>
 #include <diracstep/core/numerics/scales.hpp>
+#include <diracstep/core/steps/gauss_lobatto/stage_sums.hpp>
 #include <iterator>
 #include <utility>
 
@@ -12,6 +13,7 @@ namespace diracstep {
 namespace {
 
 constexpr std::size_t longest = 5;
+constexpr std::array<double, 8> no_base{};  ///< of sums of few rows
 
 /// Weights, newest first, of the polynomial through k equally spaced values, taken one spacing further.
 constexpr std::array<std::array<double, longest>, longest + 1> extrapolation{
@@ -62,6 +64,11 @@ void Predictor::extrapolate_stages(const Vector& last, VectorRef x) const {
   Eigen::Index first = 0;
   for (const StageBlock& block : traits_.stages) {
     const auto stages = static_cast<int>(block.weights.rows());
+    if (const StageSum sum = stage_sum(block.rows, stages)) {
+      sum(last.data() + first, block.weights.data(), no_base.data(), 0, x.data() + first);
+      first += static_cast<Eigen::Index>(block.rows) * stages;
+      continue;
+    }
     for (int i = 0; i < stages; ++i)
       combine(block.rows, stages, &block.weights(0, i), last.data() + first, nullptr,
               x.data() + first + static_cast<Eigen::Index>(block.rows) * i);

@@ -41,9 +41,11 @@ PreparedScene prepared(std::shared_ptr<const Scene> given, const IntegratorOptio
   require_size("scene '" + scene->name + "': the start q", scene->start.q.size(), scene->storage_size());
   if (scene->rows() > 0 && scene->start.q.allFinite()) {
     const std::vector<std::string> dependent = redundant_rows(*scene, scene->start);
-    if (!dependent.empty() && singular_at_start_only(*scene, scene->start))
-      throw Misuse("scene '" + scene->name + "': redundant constraints at the start, but not near it: " +
-                   joined(dependent) + "; the start is singular: move it");
+    const std::string kept_for =
+        dependent.empty() ? "" : why_not_left_out(row_dependence(*scene, scene->start, dependent));
+    if (!kept_for.empty())
+      throw Misuse("scene '" + scene->name + "': redundant constraints at the start: " + joined(dependent) +
+                   "; " + kept_for);
     if (!dependent.empty() && !options.drop_redundant_rows)
       throw Misuse("scene '" + scene->name + "': redundant constraints at the start: " + joined(dependent) +
                    "; remove them, or drop them: --drop-redundant, redundant = \"drop\" in a scene file, or "

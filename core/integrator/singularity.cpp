@@ -44,8 +44,8 @@ std::string names_in(const Vector& combination, const NonlinearProblem& problem,
 
 Columns balanced(Columns matrix) {
   for (Eigen::Index r = 0; r < matrix.rows(); ++r)
-    matrix.row(r) /= usable_scale(max_norm(matrix.row(r).transpose()));
-  for (Eigen::Index c = 0; c < matrix.cols(); ++c) matrix.col(c) /= usable_scale(max_norm(matrix.col(c)));
+    matrix.row(r) /= size_or_one(max_norm(matrix.row(r).transpose()));
+  for (Eigen::Index c = 0; c < matrix.cols(); ++c) matrix.col(c) /= size_or_one(max_norm(matrix.col(c)));
   return matrix;
 }
 

@@ -35,6 +35,8 @@ class Adjoint final : public GeneratingFunction {
       }
   }
 
+  bool take_increments() override { return increments_ = s_->take_increments(); }
+
   void guess_inner(Interval step, ConstVectorRef q0, ConstVectorRef p0, ConstVectorRef v0,
                    ColumnsRef inner) override {
     // The inner columns were made for a step that starts at q1.
@@ -46,10 +48,15 @@ class Adjoint final : public GeneratingFunction {
   static int other(int column) { return column < 2 ? 1 - column : column; }
   const Columns& exchanged(ConstColumnsRef y) {
     for (int j = 0; j < columns(); ++j) y_.col(j) = y.col(other(j));
+    if (increments_) {
+      y_.col(0) = y.col(0) + y.col(1);
+      y_.col(1) = -y.col(1);
+    }
     return y_;
   }
 
   std::unique_ptr<GeneratingFunction> s_;
+  bool increments_ = false;
   std::vector<int> mirror_;
   Columns y_, gradient_, blocks_;
 };

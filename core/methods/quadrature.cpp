@@ -108,10 +108,16 @@ class QuadratureLagrangian final : public GeneratingFunction {
   }
 
   ExplicitGraph* explicit_graph() override { return explicit_.get(); }
+  bool take_increments() override { return increments_ = true; }
 
  private:
   void move_to(const StepNode& node, Interval step, ConstColumnsRef y) {
     t_ = step.start + node.c * step.size;
+    if (increments_) {
+      q_ = y.col(0) + node.c * y.col(1);
+      v_ = y.col(1) / step.size;
+      return;
+    }
     q_ = (1.0 - node.c) * y.col(0) + node.c * y.col(1);
     v_ = (y.col(1) - y.col(0)) / step.size;
   }
@@ -120,6 +126,7 @@ class QuadratureLagrangian final : public GeneratingFunction {
   StepRule rule_;
   std::vector<int> mirror_;
   std::unique_ptr<SeparableEnds> explicit_;
+  bool increments_ = false;
   double t_ = 0.0;
   Vector q_, v_, lq_, lv_, lqq_, lqv_, lvv_;
 };

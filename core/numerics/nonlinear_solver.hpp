@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <diracstep/core/numerics/contraction.hpp>
 #include <diracstep/core/numerics/snapshot.hpp>
 #include <diracstep/core/numerics/sparsity_pattern.hpp>
 #include <diracstep/core/numerics/types.hpp>
@@ -29,6 +30,12 @@ class NonlinearProblem {
   virtual void residual(ConstVectorRef x, VectorRef f) = 0;
   virtual void jacobian(ConstVectorRef x, VectorRef values) = 0;
 
+  /// Asked of a residual f, where it was last taken, that is small beside the scales of its blocks: whether
+  /// each row is at most `level` times the size of its own terms (RowScales), which may be far smaller.  Null
+  /// where that is so, and for problems whose rows are alike; else the scales of all rows, by which the
+  /// solver goes on.  A few comparisons for each row, unless one is not small.
+  virtual const double* scales_of_unsolved_rows(ConstVectorRef /*f*/, double /*level*/) { return nullptr; }
+
   /// Where the Jacobian is the same at every x and in every solve with the same value of some parameter, such
   /// as the step size: that value.  NaN where it is not.
   virtual double constant_jacobian_parameter() const;
@@ -38,7 +45,15 @@ class NonlinearProblem {
   virtual bool has_splitting() const { return false; }
   /// f ← P⁻¹ f.  Called only where there is a splitting.
   virtual void solve_splitting(VectorRef /*f*/) {}
+  /// x ← x − P⁻¹F(x) again and again (contraction.hpp), with the last correction in f.  Called only where
+  /// there is a splitting; a problem that can do it without a call for each part of an iteration does it
+  /// itself.
+  virtual Contraction contract(VectorRef x, VectorRef f, const ContractionLimits& limits);
 };
+
+/// Maximum norm of each block of a residual into `norms`, and the largest entry in units of its block;
+/// infinite where an entry is no number.
+double norms_of_blocks(std::span<const ResidualBlock> blocks, const double* f, std::array<double, 4>& norms);
 
 /// How a solve ended.
 enum class SolveStatus {

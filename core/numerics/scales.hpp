@@ -15,6 +15,9 @@ inline double max_norm(ConstColumnsRef x) { return x.size() == 0 ? 0.0 : x.lpNor
 /// A scene at rest moves by the round-off of its coordinates: ways of this part of them count as none.
 constexpr double at_rest = 1e-12;
 
+/// Positions may be this part of the lengths in a row, which is then off by round-off of these.
+constexpr double part_of_length = 1e-4;
+
 /// Reductions over long columns go in so many strands: in a single one each entry waits for the last.
 constexpr std::size_t strands = 8;
 using Strands = std::array<double, strands>;
@@ -90,7 +93,33 @@ inline double largest_if_finite(const double* x, int count) {
   return largest;
 }
 
-/// A size of terms to measure residuals by: positive and finite, 1 where none is known.
-inline double usable_scale(double scale) { return scale > 0.0 && std::isfinite(scale) ? scale : 1.0; }
+/// Largest absolute entry; infinite where one is no number.  In two strands: in a single one each entry waits
+/// for the last.
+inline double largest_or_infinite(const double* x, int count) {
+  double largest = 0.0, other = 0.0, sum = 0.0, other_sum = 0.0;  // a sum is finite where its terms are
+  for (int i = 0; i + 1 < count; i += 2) {
+    const double a = std::abs(x[i]), b = std::abs(x[i + 1]);
+    largest = a > largest ? a : largest;
+    other = b > other ? b : other;
+    sum += a;
+    other_sum += b;
+  }
+  if (count % 2 == 1) {
+    sum += std::abs(x[count - 1]);
+    largest = std::max(largest, std::abs(x[count - 1]));
+  }
+  return std::isfinite(sum + other_sum) ? std::max(largest, other) : HUGE_VAL;
+}
+
+/// A size to divide by: 1 where it is none.
+inline double size_or_one(double size) { return size > 0.0 && std::isfinite(size) ? size : 1.0; }
+
+/// A size of terms to measure residuals by.  None is below this: where all terms vanish, as at rest without a
+/// force, so does the residual.
+constexpr double smallest_scale = 1e-100;
+inline double scale_of(double terms) {
+  if (!(terms > smallest_scale)) return smallest_scale;
+  return std::isfinite(terms) ? terms : 1.0;  // the residual is not finite either
+}
 
 }  // namespace diracstep

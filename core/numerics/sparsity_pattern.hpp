@@ -30,6 +30,14 @@ class SparsityPattern {
   /// (row, column) of every value, in order.
   std::vector<std::pair<int, int>> entries() const;
 
+  /// Calls visit(index of the value, row, column) for every value, in order.
+  template <class Visit>
+  void for_each(Visit visit) const {
+    for (int column = 0, k = 0; column < columns(); ++column)
+      for (; k < column_starts_[static_cast<std::size_t>(column) + 1]; ++k)
+        visit(Eigen::Index{k}, row_indices_[static_cast<std::size_t>(k)], column);
+  }
+
   /// This square pattern with every diagonal entry added.
   SparsityPattern with_diagonal() const;
 

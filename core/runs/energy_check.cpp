@@ -9,7 +9,7 @@ namespace diracstep {
 namespace {
 
 constexpr double doubted = 0.1;
-constexpr long points_on_the_way = 10, points_for_a_mean = 32;
+constexpr long points_for_a_mean = 32;
 
 }  // namespace
 
@@ -36,12 +36,12 @@ void EnergyCheck::see(const Sample& point) {
   add_at_play(point);
   double change = std::abs(point.energy - start_energy_);
   if (!std::isfinite(change)) change = HUGE_VAL;
-  const double noise = at_rest * std::abs(start_energy_);
-  if (points_ >= points_on_the_way && change > std::max(doubted * at_play_, noise)) lost_on_the_way_ = true;
-  if (change <= worst_change_) return;
-  worst_change_ = change;
-  worst_energy_ = point.energy;
-  worst_time_ = point.time;
+  if (change > worst_change_) {
+    worst_change_ = change;
+    worst_energy_ = point.energy;
+    worst_time_ = point.time;
+  }
+  if (points_ >= points_for_a_mean) lost_ = lost_ || too_large(mean_at_play());
 }
 
 void EnergyCheck::add_at_play(const Sample& point) {
@@ -56,9 +56,12 @@ void EnergyCheck::add_at_play(const Sample& point) {
   ++points_;
 }
 
+bool EnergyCheck::too_large(double at_play) const {
+  return worst_change_ > std::max(doubted * at_play, at_rest * std::abs(start_energy_));
+}
+
 std::string EnergyCheck::text() const {
-  const double size = points_ < points_for_a_mean ? at_play_ : sum_at_play_ / static_cast<double>(points_);
-  if (!lost_on_the_way_ && !(worst_change_ > doubted * size)) return {};
+  if (!lost_ && !(points_ < points_for_a_mean && too_large(at_play_))) return {};
   std::ostringstream text;
   text << "the energy, which this scene keeps, went from " << start_energy_ << " to " << worst_energy_
        << " at t = " << worst_time_ << ": the step is too large for the result to be trusted";

@@ -16,10 +16,9 @@ bool keeps_energy(const Scene& scene);
 ///   |p·v|/2  and  |∂L/∂q·(q − q(start))|,
 ///
 /// where the start is the first point seen: neither depends on where coordinates or energies count from.
-/// Twice measured, since a run that blows up has large energies at its end: by their mean over the run (by
-/// the largest where fewer than 32 points were seen), and from the tenth point on by the largest up to the
-/// point.  Earlier, methods of order 1 are off by so much where they start from rest: by 1/k of the kinetic
-/// energy after k steps.
+/// They are measured by their mean over all points up to one, since a run that blows up has large ones at its
+/// end, from the 32nd point on; where fewer were seen, by the largest of all.  Methods of order 1 are off by
+/// 1/k of the kinetic energy k steps after a start from rest.
 ///
 /// Points that have not moved from the start are not looked at.  No method here changes the energy so much at
 /// a step that resolves the motion.  Silence proves nothing: an energy can be kept on a wrong path.
@@ -35,6 +34,9 @@ class EnergyCheck {
 
  private:
   void add_at_play(const Sample& point);
+  /// Beside such energies at play; a change by the round-off of the energy itself is none.
+  bool too_large(double at_play) const;
+  double mean_at_play() const { return sum_at_play_ / static_cast<double>(points_); }
 
   const Scene& scene_;
   bool keeps_energy_;
@@ -44,7 +46,7 @@ class EnergyCheck {
   double at_play_ = 0.0;  ///< the largest so far
   double sum_at_play_ = 0.0;
   long points_ = 0;
-  bool lost_on_the_way_ = false;
+  bool lost_ = false;  ///< at a point seen, from the 32nd on
   double worst_change_ = 0.0, worst_energy_ = 0.0, worst_time_ = 0.0;
 };
 

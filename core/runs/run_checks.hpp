@@ -2,6 +2,7 @@
 
 #include <diracstep/core/runs/branch_check.hpp>
 #include <diracstep/core/runs/energy_check.hpp>
+#include <diracstep/core/runs/kink_check.hpp>
 #include <diracstep/core/runs/node_check.hpp>
 #include <diracstep/core/runs/step_size_check.hpp>
 #include <string>
@@ -28,7 +29,8 @@ class RunChecks {
         energy_(integrator.scene()),
         step_(integrator, steps),
         nodes_(integrator.scene(), steps),
-        branch_(integrator) {}
+        branch_(integrator),
+        kinks_(integrator) {}
 
   void before_step(Integrator& integrator) {
     if (nodes_.wants(step_number_)) see_node(integrator);
@@ -38,12 +40,13 @@ class RunChecks {
     ++step_number_;
     step_.after(integrator);
     branch_.after(integrator);
+    kinks_.after(integrator);
   }
   void see(const Sample& point) { energy_.see(point); }
 
   /// Empty, or the doubts, one after the other.
   std::string text() const {
-    return joined_doubts({energy_.text(), step_.text(), nodes_.text(), branch_.text(),
+    return joined_doubts({energy_.text(), step_.text(), nodes_.text(), branch_.text(), kinks_.text(),
                           scene_.doubt ? scene_.doubt() : std::string()});
   }
 
@@ -57,6 +60,7 @@ class RunChecks {
   StepSizeCheck step_;
   NodeCheck nodes_;
   BranchCheck branch_;
+  KinkCheck kinks_;
   long step_number_ = 0;
   Sample node_;
 };

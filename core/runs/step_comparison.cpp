@@ -14,18 +14,18 @@ constexpr long fewest_steps = 3;    // before velocities and momenta count
 
 std::string line(double time, double part, const char* of) {
   std::ostringstream text;
-  text << "two half steps from t = " << time << " end " << std::round(100.0 * part) << " % of " << of
+  text << "two parts of the step from t = " << time << " end " << std::round(100.0 * part) << " % of " << of
        << " beside the whole one: the step is too large for the result to be trusted";
   return text.str();
 }
 
 }  // namespace
 
-void StepComparison::Differences::add(const Vector& start, const Vector& whole, const Vector& halves,
+void StepComparison::Differences::add(const Vector& start, const Vector& whole, const Vector& parts,
                                       double t) {
   size = std::max(size, max_norm(whole));
-  way = std::max({way, max_norm(whole - start), max_norm(halves - start)});
-  const double difference = max_norm(whole - halves);
+  way = std::max({way, max_norm(whole - start), max_norm(parts - start)});
+  const double difference = max_norm(whole - parts);
   if (!(difference > largest)) return;
   largest = difference;
   time = t;
@@ -35,18 +35,18 @@ bool StepComparison::Differences::doubted() const {
   return largest > doubted_change * std::max(way, no_change * size);
 }
 
-void StepComparison::add(const Sample& start, double h, const Sample& whole, const Sample& halves) {
+void StepComparison::add(const Sample& start, double h, const Sample& whole, const Sample& parts) {
   ++steps_;
   longest_way_ = std::max({longest_way_, std::abs(h) * max_norm(start.v), max_norm(whole.q - start.q),
-                           max_norm(halves.q - start.q)});
-  const double difference =
-      max_norm(whole.q - halves.q) / std::max(longest_way_, at_rest * max_norm(start.q));
+                           max_norm(parts.q - start.q)});
+  const double difference = max_norm(whole.q - parts.q) / std::max(longest_way_, at_rest * max_norm(start.q));
   if (difference > 0.0 && !(difference <= worst_)) {
     worst_ = difference;
     worst_time_ = start.time;
   }
-  velocity_.add(start.v, whole.v, halves.v, start.time);
-  momentum_.add(start.p, whole.p, halves.p, start.time);
+  if (longest_way_ <= at_rest * max_norm(start.q)) return;  // velocities and momenta are round-off
+  velocity_.add(start.v, whole.v, parts.v, start.time);
+  momentum_.add(start.p, whole.p, parts.p, start.time);
 }
 
 std::string StepComparison::text() const {

@@ -5,16 +5,19 @@
 
 namespace diracstep {
 
-/// Compares steps with two halves of them: how far apart their ends are, in positions, velocities and
-/// momenta, measured by the longest way that such a step went so far.
+/// Compares steps with two parts of them: how far apart their ends are, in positions, velocities and momenta,
+/// measured by the longest way that such a step went so far.  The parts are unequal, 0.382 and 0.618 of the
+/// step: where it spans whole turns of a motion, halves of it see the same phase twice and end where it does.
 ///
 /// Positions are doubted above a quarter of  max h |v|∞ : methods of order 1 stay below at h times the rate
 /// of the motion of 1, the others at more.  Velocities and momenta, whose way may be short at a turning
 /// point, are measured by the longest way of the whole run, and doubted above a half of it.
 class StepComparison {
  public:
-  /// A step of size h from `start`, where it led, and where its halves did.  q, v and p are read.
-  void add(const Sample& start, double h, const Sample& whole, const Sample& halves);
+  static constexpr double first_part = 0.382;
+
+  /// A step of size h from `start`, where it led, and where its parts did.  q, v and p are read.
+  void add(const Sample& start, double h, const Sample& whole, const Sample& parts);
 
   /// Empty, or a line that names the worst step so far.
   std::string text() const;
@@ -24,7 +27,7 @@ class StepComparison {
  private:
   struct Differences {
     double largest = 0.0, way = 0.0, size = 0.0, time = 0.0;
-    void add(const Vector& start, const Vector& whole, const Vector& halves, double t);
+    void add(const Vector& start, const Vector& whole, const Vector& parts, double t);
     bool doubted() const;
   };
 

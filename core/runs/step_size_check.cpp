@@ -13,19 +13,19 @@ StepSizeCheck::StepSizeCheck(const Integrator& integrator, long steps)
     : between_looks_(std::clamp(steps / fewest_looks, 1L, steps_for_a_look)),
       next_look_(integrator.work().steps + std::min(1L, steps - 1)) {}  // the first step may be one from rest
 
-void StepSizeCheck::halve(Integrator& integrator) {
+void StepSizeCheck::divide(Integrator& integrator) {
   next_look_ += between_looks_;
   const Snapshot state = integrator.save();
-  const double half = 0.5 * integrator.options().step;
-  halved_ = integrator.sample(Momentum::projected, start_).ok() && integrator.step(half).ok() &&
-            integrator.step(half).ok() && integrator.sample(Momentum::projected, halves_).ok();
+  const double h = integrator.options().step, first = StepComparison::first_part * h;
+  divided_ = integrator.sample(Momentum::projected, start_).ok() && integrator.step(first).ok() &&
+             integrator.step(h - first).ok() && integrator.sample(Momentum::projected, parts_).ok();
   integrator.restore(state);
 }
 
 void StepSizeCheck::compare(Integrator& integrator) {
-  halved_ = false;
+  divided_ = false;
   if (!integrator.sample(Momentum::projected, whole_).ok()) return;
-  comparison_.add(start_, integrator.options().step, whole_, halves_);
+  comparison_.add(start_, integrator.options().step, whole_, parts_);
 }
 
 }  // namespace diracstep

@@ -6,10 +6,10 @@
 
 namespace diracstep {
 
-/// Halves a few steps of a run, one in 600 and at least three, to say when they are too large: at a step that
-/// resolves the motion, two halves end where the whole does; see StepComparison.
+/// Divides a few steps of a run, one in 600 and at least three, to say when they are too large: at a step
+/// that resolves the motion, two parts end where the whole does; see StepComparison.
 ///
-/// Needs no energy, so that it also sees forced and driven scenes.  The halves are taken between
+/// Needs no energy, so that it also sees forced and driven scenes.  The parts are taken between
 /// Integrator::save and restore: the run keeps its bits.  Silence proves nothing: a short event between the
 /// looks is not seen.
 class StepSizeCheck {
@@ -19,10 +19,10 @@ class StepSizeCheck {
 
   /// Around each step of the run; for most of them a comparison of numbers.
   void before(Integrator& integrator) {
-    if (integrator.work().steps == next_look_) halve(integrator);
+    if (integrator.work().steps == next_look_) divide(integrator);
   }
   void after(Integrator& integrator) {
-    if (halved_) compare(integrator);
+    if (divided_) compare(integrator);
   }
 
   /// Empty, or a line that names the worst step so far.
@@ -31,12 +31,12 @@ class StepSizeCheck {
   double worst() const { return comparison_.worst(); }
 
  private:
-  void halve(Integrator& integrator);
+  void divide(Integrator& integrator);
   void compare(Integrator& integrator);
 
   long between_looks_, next_look_;
-  bool halved_ = false;
-  Sample start_, whole_, halves_;
+  bool divided_ = false;
+  Sample start_, whole_, parts_;
   StepComparison comparison_;
 };
 

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <diracstep/core/dirac/discrete_force.hpp>
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/numerics/row_scales.hpp>
 #include <diracstep/core/steps/implicit_jacobian.hpp>
 #include <diracstep/core/steps/implicit_step.hpp>
 #include <diracstep/core/steps/step_data.hpp>
@@ -24,7 +25,7 @@ class ImplicitStep final : public StepProblem {
                bool dense)
       : s_(std::move(s)),
         graph_(graph_of(s_->type())),
-        data_(scene.constraints, s_->dimension(), rule),
+        data_(scene, s_->dimension(), rule),
         n_(data_.n),
         m_(data_.rows()),
         inner_(n_ * s_->inner_columns()),
@@ -35,9 +36,13 @@ class ImplicitStep final : public StepProblem {
                   dense) {
     y_.setZero(n_, s_->columns());
     gradient_ = y_;
-    hessian_.setZero(s_->pattern().nonzeros(), s_->pairs());
+    at_end_ = hessian_ = Columns::Zero(s_->pattern().nonzeros(), s_->pairs());
     last_x_.setZero(size());
     q1_.setZero(n_);
+    for (Vector* column : {&increment_, &sizes_, &largest_, &as_largest_}) column->setZero(n_);
+    row_scales_ = RowScales(size());
+    quadratic_ = scene.lagrangian->structure().quadratic && !scene.force;
+    by_increment_ = s_->type() == GeneratingType::one && s_->take_increments();
     terms_.setZero(s_->columns());
     multipliers_.setZero(m_);
     if (force_) force_by_end_.setZero(force_->pattern().nonzeros());
@@ -51,7 +56,8 @@ class ImplicitStep final : public StepProblem {
   std::span<const ResidualBlock> blocks() const override { return blocks_; }
 
   StepTraits traits() const override {
-    std::string text = (graph_.ends_at_position ? "q1 (" : "p1 (") + std::to_string(n_) + ")";
+    const char* const end = by_increment_ ? "q1 - q0 (" : graph_.ends_at_position ? "q1 (" : "p1 (";
+    std::string text = end + std::to_string(n_) + ")";
     if (m_ > 0) text += ", multipliers (" + std::to_string(m_) + ")";
     if (inner_ > 0) text += ", inner columns (" + std::to_string(inner_) + ")";
     return {text, n_, s_->columns(), m_};
@@ -73,7 +79,9 @@ class ImplicitStep final : public StepProblem {
 
   void guess(ConstVectorRef v0, VectorRef x) override {
     const double h = data_.step.size;
-    if (graph_.ends_at_position)
+    if (by_increment_)
+      x.head(n_) = h * v0;
+    else if (graph_.ends_at_position)
       x.head(n_) = data_.q0 + h * v0;
     else
       x.head(n_) = h * data_.p0;
@@ -93,7 +101,7 @@ class ImplicitStep final : public StepProblem {
     if (force_ && graph_.starts_from_position) graph += row_factor() * force_->minus();
     if (m_ > 0) {
       if (graph_.starts_from_position) data_.start_rows.add_annihilator(x.segment(n_, m_), graph);
-      data_.discrete_constraint.residual(data_.step, data_.q0, q1_, f.segment(n_, m_));
+      data_.discrete_constraint.residual(data_.step, data_.q0, q1_, increment_, f.segment(n_, m_));
     }
     if (inner_ > 0) f.tail(inner_) = gradient_.rightCols(s_->inner_columns()).reshaped();
   }
@@ -102,11 +110,25 @@ class ImplicitStep final : public StepProblem {
     evaluate(x);
     s_->hessian(data_.step, y_, hessian_);
     hessian_known_ = true;
-    if (force_) force_->minus_by_end(data_.step, data_.q0, q1_, force_by_end_);
+    if (force_) force_->minus_by_end(data_.step, data_.q0, q1_, increment_, force_by_end_);
     if (m_ > 0) data_.discrete_constraint.end_derivative(data_.step, data_.q0, q1_, data_.end_derivative);
     jacobian_.assemble(
         {data_.step.size, hessian_, data_.start_rows.coefficients(), data_.end_derivative, force_by_end_},
         values);
+  }
+
+  const double* scales_of_unsolved_rows(ConstVectorRef f, double level) override {
+    const double factor = std::abs(row_factor());
+    const Vector& start = graph_.starts_from_position ? data_.p0 : data_.q0;
+    bool solved = RowScales::solved(f.data(), start.data(), n_, factor * level);
+    solved &= data_.bound(increment_, f.data() + n_, RowScales::margin * level);
+    // Of rows of inner columns nothing is known but that they are as light as the momentum.
+    const double of_inner = inner_ > 0 ? blocks_.back().scale / scale_of(max_norm(start)) : 0.0;
+    for (int i = 2; i < s_->columns(); ++i)
+      solved = solved && RowScales::solved(f.data() + n_ * (i - 1) + m_, start.data(), n_, of_inner * level);
+    if (solved) return nullptr;
+    size_terms(factor, level);
+    return row_scales_.unsolved(f, level);
   }
 
   void finish(ConstVectorRef x, StepEnd& end) override {
@@ -117,7 +139,7 @@ class ImplicitStep final : public StepProblem {
     else
       end.at.p = y_.col(1);
     if (force_) end.at.p += force_->plus();
-    end.at.v = (q1_ - data_.q0) / data_.step.size;
+    end.at.v = increment_ / data_.step.size;
     end.impulse = x.segment(n_, m_) / data_.step.size;
     end.memory.known = true;
     end.memory.scales = terms_;
@@ -139,23 +161,32 @@ class ImplicitStep final : public StepProblem {
     if (!graph_.starts_from_position && m_ > 0)
       data_.start_rows.add_annihilator(x.segment(n_, m_), y_.col(0), 1.0 / h);
     y_.col(1) = end_factor() * x.head(n_);
+    if (by_increment_) {
+      increment_ = x.head(n_);
+      q1_ = data_.q0 + increment_;
+    } else if (graph_.ends_at_position) {
+      q1_ = x.head(n_);
+      increment_ = q1_ - data_.q0;
+    }
     if (force_ && graph_.ends_at_position) {
-      force_->evaluate(data_.step, data_.q0, y_.col(1));
+      force_->evaluate(data_.step, data_.q0, q1_, increment_);
       if (!graph_.starts_from_position) y_.col(0) += force_->minus();
     }
     if (inner_ > 0) y_.rightCols(s_->inner_columns()) = x.tail(inner_).reshaped(n_, s_->inner_columns());
     s_->gradient(data_.step, y_, gradient_);
-    if (graph_.ends_at_position)
-      q1_ = y_.col(1);
-    else
+    if (!graph_.ends_at_position) {
       q1_ = graph_.end_sign * gradient_.col(1);
-    if (force_ && !graph_.ends_at_position) force_->evaluate(data_.step, data_.q0, q1_);
+      increment_ = q1_ - data_.q0;
+      if (force_) force_->evaluate(data_.step, data_.q0, q1_, increment_);
+    }
+    if (m_ > 0) data_.raise_constraint_scale(increment_, blocks_[1].scale);
   }
 
   /// Where nothing is known of an earlier step: the Hessian at a plausible point, for the round-off scales.
   void sample_terms() {
     y_.col(0) = graph_.starts_from_position ? data_.q0 : data_.p0;
     y_.col(1) = graph_.ends_at_position ? data_.q0 : data_.p0;
+    if (by_increment_) y_.col(1) = data_.step.size * data_.v0;
     if (inner_ > 0)
       s_->guess_inner(data_.step, data_.q0, data_.p0, Vector::Zero(n_), y_.rightCols(s_->inner_columns()));
     s_->hessian(data_.step, y_, hessian_);
@@ -172,12 +203,12 @@ class ImplicitStep final : public StepProblem {
         graph_.starts_from_position ? std::abs(data_.step.size) * max_norm(data_.p0) : max_norm(data_.q0);
     // The impulse, as large as it was in the last step.
     const double impulse = graph_.starts_from_position && m_ > 0 ? data_.impulse_scale(multipliers_) : 0.0;
-    blocks_[0].scale = usable_scale(std::max({own, impulse, std::abs(row_factor()) * terms_[0]}));
+    blocks_[0].scale = scale_of(std::max({own, impulse, std::abs(row_factor()) * terms_[0]}));
     if (m_ > 0) blocks_[1].scale = data_.constraint_scale();
     if (inner_ == 0) return;
     double largest = 0.0;
     for (int i = 2; i < s_->columns(); ++i) largest = std::max(largest, terms_[i]);
-    blocks_.back().scale = usable_scale(largest);
+    blocks_.back().scale = scale_of(largest);
   }
 
   /// Size of the terms that make up column i of the gradient: second derivatives times what they multiply.
@@ -185,9 +216,54 @@ class ImplicitStep final : public StepProblem {
     double largest = 0.0;
     for (int j = 0; j < s_->columns(); ++j) {
       const auto block = hessian_.col(s_->pair(std::min(i, j), std::max(i, j)));
-      largest = std::max(largest, max_norm(block) * max_norm(y_.col(j)));
+      const double size =
+          by_increment_ && j == 0 ? (block + hessian_.col(1)).lpNorm<Eigen::Infinity>() : max_norm(block);
+      largest = std::max(largest, size * max_norm(y_.col(j)));
     }
     return largest;
+  }
+
+  bool is_position(int column) const {
+    return column == 0 ? graph_.starts_from_position : column == 1 && graph_.ends_at_position;
+  }
+  /// The same row by row, and with the other terms of each row.
+  void size_terms(double factor, double level) {
+    s_->hessian(data_.step, y_, at_end_);
+    for (int i = 0; i < s_->columns(); ++i) {
+      if (i == 1) continue;  // the end is no row
+      sizes_ = gradient_.col(i).cwiseAbs();
+      largest_.setZero();
+      for (int j = 0; j < s_->columns(); ++j) {
+        add_sizes(i, j, y_.col(j), sizes_);
+        RowScales::set_largest(as_largest_, quadratic_ ? 0.0 : max_norm(y_.col(j)),
+                               is_position(j) ? data_.tolerances : none_, level);
+        add_sizes(i, j, as_largest_, largest_);
+      }
+      if (i > 1) {
+        row_scales_.set(n_ * (i - 1) + m_, sizes_, largest_, blocks_.back().scale);
+        continue;
+      }
+      sizes_ += (graph_.starts_from_position ? data_.p0 : data_.q0).cwiseAbs();
+      if (force_) sizes_ += force_->minus().cwiseAbs();
+      sizes_ *= factor;
+      if (m_ > 0 && graph_.starts_from_position) data_.add_impulse_sizes(last_x_.segment(n_, m_), sizes_);
+      largest_ *= factor;
+      row_scales_.set(0, sizes_, largest_, blocks_[0].scale);
+    }
+    if (m_ > 0) data_.scale_rows(increment_, level, n_, blocks_[1].scale, row_scales_);
+  }
+
+  /// sizes += |∂²S/∂y_i∂y_j| |y|.
+  void add_sizes(int i, int j, ConstVectorRef y, Vector& sizes) const {
+    const int pair = s_->pair(std::min(i, j), std::max(i, j));
+    s_->pattern().for_each([&](Eigen::Index e, int r, int c) {
+      const double both = by_increment_ && j == 0 ? at_end_(e, 1) : 0.0;  // with the increment kept
+      const double derivative = std::abs(at_end_(e, pair) + both);
+      if (i <= j)
+        sizes[r] += derivative * std::abs(y[c]);
+      else
+        sizes[c] += derivative * std::abs(y[r]);
+    });
   }
 
   std::unique_ptr<GeneratingFunction> s_;
@@ -198,10 +274,13 @@ class ImplicitStep final : public StepProblem {
   ImplicitJacobian jacobian_;
   Vector force_by_end_;
   std::vector<ResidualBlock> blocks_;
-  Vector last_x_, q1_;
-  Columns y_, gradient_, hessian_;
-  Vector terms_;        ///< size of the terms of each column of the gradient, as the last step knew it
-  Vector multipliers_;  ///< of the last step
+  RowScales row_scales_;
+  Vector last_x_, q1_, increment_;
+  Vector sizes_, largest_, as_largest_, none_;  ///< workspaces of size_terms(), but for an empty one
+  bool quadratic_ = false;                      ///< L without force
+  bool by_increment_ = false;                   ///< the unknown is q1 − q0 instead of q1
+  Columns y_, gradient_, hessian_, at_end_;     ///< the last one at the last point, for size_terms()
+  Vector terms_, multipliers_;  ///< of the last step: sizes of the terms of each column of the gradient, λ
   bool hessian_known_ = false;  ///< hessian_ was taken in this step
 };
 

@@ -13,7 +13,7 @@ class MultiplierStep final : public StepProblem {
                  bool dense)
       : s_(std::move(s)),
         graph_(*s_->explicit_graph()),
-        data_(scene.constraints, s_->dimension(), rule),
+        data_(scene, s_->dimension(), rule),
         displacement_(graph_.mobility_pattern(), false, data_.start_rows.pattern(), true),
         response_(data_.discrete_constraint.pattern(), false, displacement_.pattern(), false) {
     layout_.add(response_.pattern(), 0, 0);
@@ -24,6 +24,8 @@ class MultiplierStep final : public StepProblem {
     displacement_values_.setZero(displacement_.pattern().nonzeros());
     response_values_.setZero(response_.pattern().nonzeros());
     last_x_.setConstant(size(), std::nan(""));
+    increment_.setZero(data_.n);
+    row_scales_ = RowScales(size());
   }
 
   int size() const override { return data_.rows(); }
@@ -46,6 +48,13 @@ class MultiplierStep final : public StepProblem {
   void residual(ConstVectorRef x, VectorRef f) override {
     evaluate(x);
     data_.discrete_constraint.residual(data_.step, data_.q0, q1_, f);
+  }
+
+  const double* scales_of_unsolved_rows(ConstVectorRef f, double level) override {
+    increment_ = q1_ - data_.q0;
+    if (data_.bound(increment_, f.data(), RowScales::margin * level)) return nullptr;
+    data_.scale_rows(increment_, level, 0, blocks_[0].scale, row_scales_);
+    return row_scales_.unsolved(f, level);
   }
 
   void jacobian(ConstVectorRef x, VectorRef values) override {
@@ -75,6 +84,7 @@ class MultiplierStep final : public StepProblem {
     p_hat_ = data_.p0;
     if (size() > 0) data_.start_rows.add_annihilator(x, p_hat_, 1.0 / data_.step.size);
     graph_.map(data_.step, data_.q0, p_hat_, q1_, p1_);
+    if (size() > 0) data_.raise_constraint_scale(q1_ - data_.q0, blocks_[0].scale);
   }
 
   std::unique_ptr<GeneratingFunction> s_;
@@ -85,7 +95,8 @@ class MultiplierStep final : public StepProblem {
   SparsityPattern pattern_;
   BlockPattern layout_{data_.rows(), data_.rows()};
   std::vector<ResidualBlock> blocks_;
-  Vector last_x_, p_hat_, q1_, p1_, mobility_, displacement_values_, response_values_;
+  RowScales row_scales_;
+  Vector increment_, last_x_, p_hat_, q1_, p1_, mobility_, displacement_values_, response_values_;
 };
 
 }  // namespace

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/numerics/row_scales.hpp>
 #include <diracstep/core/system/consistent_start.hpp>
 #include <diracstep/core/system/constraint_distribution.hpp>
 #include <diracstep/core/system/hidden_rows.hpp>
@@ -27,7 +28,9 @@ class NearestPointProblem final : public NonlinearProblem {
         n_(static_cast<int>(given.size())),
         m_(rows_.rows()),
         pattern_(SparsityPattern::dense(n_ + m_, n_ + m_)),
-        residual_blocks_{{"distance", n_, 1.0 + given.lpNorm<Eigen::Infinity>()}, {"constraint", m_, 1.0}} {}
+        residual_blocks_{{"distance", n_, scale_of(max_norm(given))}, {"constraint", m_, smallest_scale}},
+        row_scales_(n_ + m_),
+        row_sizes_(Vector::Zero(m_)) {}
 
   int size() const override { return n_ + m_; }
   const SparsityPattern& pattern() const override { return pattern_; }
@@ -38,11 +41,22 @@ class NearestPointProblem final : public NonlinearProblem {
     f.head(n_) = x.head(n_) - given_;
     rows_.add_annihilator(x.tail(m_), f.head(n_));
     for (const int i : held_) f[i] = x[i] - given_[i];
+    raise_scales(x);
     int row = n_;
     for (const auto& block : blocks_) {
       block->position(t_, x.head(n_), f.segment(row, block->rows()));
       row += block->rows();
     }
+  }
+
+  const double* scales_of_unsolved_rows(ConstVectorRef f, double level) override {
+    const double distance = residual_blocks_[0].scale;
+    Vector largest = Vector::Zero(m_);
+    rows_.pattern().for_each(
+        [&](Eigen::Index e, int r, int) { largest[r] += std::abs(rows_.coefficients()[e]) * distance; });
+    row_scales_.set(0, Vector::Constant(n_, distance), Vector::Zero(n_), distance);
+    row_scales_.set(n_, row_sizes_, largest, residual_blocks_[1].scale);
+    return row_scales_.unsolved(f, level);
   }
 
   void jacobian(ConstVectorRef x, VectorRef values) override {
@@ -70,6 +84,20 @@ class NearestPointProblem final : public NonlinearProblem {
   }
 
  private:
+  /// The scales cover the terms at x: positions, and rows times positions.
+  void raise_scales(ConstVectorRef x) {
+    ResidualBlock &distance = residual_blocks_[0], &constraint = residual_blocks_[1];
+    const double size = max_norm(x.head(n_));
+    if (std::isfinite(size)) distance.scale = std::max(distance.scale, scale_of(size));
+    Vector sizes = Vector::Zero(m_);
+    rows_.pattern().for_each([&](Eigen::Index e, int r, int c) {
+      sizes[r] += std::abs(rows_.coefficients()[e]) * (std::abs(x[c]) + std::abs(given_[c]));
+    });
+    row_sizes_ = row_sizes_.cwiseMax(sizes);
+    const double largest = max_norm(row_sizes_);
+    if (std::isfinite(largest)) constraint.scale = std::max(constraint.scale, scale_of(largest));
+  }
+
   ConstraintBlocks blocks_;
   std::vector<int> held_;
   ConstraintsAtPoint rows_;
@@ -78,6 +106,8 @@ class NearestPointProblem final : public NonlinearProblem {
   int n_, m_;
   SparsityPattern pattern_;
   std::vector<ResidualBlock> residual_blocks_;
+  RowScales row_scales_;
+  Vector row_sizes_;
 };
 
 [[noreturn]] void throw_not_found(const Scene& scene, const char* what, const SolveReport& report) {
@@ -218,7 +248,7 @@ ConsistentStart project_start(const Scene& given, const Start& given_start, cons
     Vector lq(n), p(n), x = Vector::Zero(n + scene.rows());
     scene.lagrangian->gradient(start.time, result.start.q, start.v, lq, p);
     VelocityProblem problem(scene, true);
-    problem.begin(start.time, result.start.q, p);
+    problem.begin(start.time, result.start.q, p, start.v);
     x.head(n) = start.v;
     const SolveReport report = solvers(problem)->solve(x);
     if (!report.ok()) throw_not_found(scene, "no nearest velocity of the distribution", report);

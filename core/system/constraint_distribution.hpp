@@ -42,6 +42,7 @@ class ConstraintsAtPoint {
   ConstraintDistribution& distribution() { return distribution_; }
   const SparsityPattern& pattern() const { return distribution_.pattern(); }
   const Vector& coefficients() const { return a_; }
+  const Vector& offsets() const { return b_; }  ///< b
 
   /// out += factor · Aᵀ λ, an impulse or force in the annihilator Δ°_Q.
   void add_annihilator(ConstVectorRef lambda, VectorRef out, double factor = 1.0) const {

@@ -18,6 +18,30 @@ void ConstraintRows::position(double, ConstVectorRef, VectorRef) const {
   throw Misuse("these constraint rows have no position form φ(t,q)");
 }
 
+void ConstraintRows::positions(const PointColumns& at, double* phi) const {
+  for (int i = 0; i < at.count; ++i)
+    position(at.times[i], column(at.x, dimension(), i), column(phi, rows(), i));
+}
+
+void ConstraintRows::coefficients_at(const PointColumns& at, double* a, double* b) const {
+  for (int i = 0; i < at.count; ++i)
+    coefficients(at.times[i], column(at.x, dimension(), i), column(a, pattern_.nonzeros(), i),
+                 column(b, rows(), i));
+}
+
+void ConstraintRows::derivatives(const PointColumns& at, double* d) const {
+  for (int i = 0; i < at.count; ++i)
+    derivative(at.times[i], column(at.x, dimension(), i), column(at.y, dimension(), i), 1.0,
+               column(d, pattern_.nonzeros(), i));
+}
+
+void ConstraintRows::annihilator_derivatives(const PointColumns& at, const double* multipliers,
+                                             double* d) const {
+  for (int i = 0; i < at.count; ++i)
+    annihilator_derivative(at.times[i], column(at.x, dimension(), i), column(multipliers, rows(), i),
+                           column(d, curvature_pattern_.nonzeros(), i));
+}
+
 std::string ConstraintRows::origin(int) const { return {}; }
 
 int row_count(const ConstraintBlocks& blocks) {

@@ -2,6 +2,7 @@
 
 #include <diracstep/core/numerics/sparsity_pattern.hpp>
 #include <diracstep/core/numerics/types.hpp>
+#include <diracstep/core/system/point_columns.hpp>
 #include <memory>
 #include <string>
 #include <utility>
@@ -55,6 +56,14 @@ class ConstraintRows {
   /// ∂(A(t,q)ᵀ λ)/∂q on curvature_pattern(), λ held fixed.
   virtual void annihilator_derivative(double t, ConstVectorRef q, ConstVectorRef lambda,
                                       VectorRef d) const = 0;
+
+  /// position(), coefficients(), derivative() along w = y with s = 1, and annihilator_derivative() with a
+  /// column of multipliers for each point, at several points and into columns.  A step calls each once for
+  /// all its nodes.
+  virtual void positions(const PointColumns& at, double* phi) const;
+  virtual void coefficients_at(const PointColumns& at, double* a, double* b) const;
+  virtual void derivatives(const PointColumns& at, double* d) const;
+  virtual void annihilator_derivatives(const PointColumns& at, const double* multipliers, double* d) const;
 
  private:
   bool holonomic_;

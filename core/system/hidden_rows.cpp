@@ -97,18 +97,18 @@ Columns stacked(const Scene& scene, const Point& at, const FullDerivatives& d) {
   Columns all(scene.dimension() + scene.rows(), scene.dimension());
   all.topRows(scene.dimension()) = d.lvv;
   if (scene.rows() > 0) all.bottomRows(scene.rows()) = row_matrix(scene, at);
-  for (Eigen::Index r = 0; r < all.rows(); ++r) all.row(r) /= usable_scale(max_norm(all.row(r).transpose()));
+  for (Eigen::Index r = 0; r < all.rows(); ++r) all.row(r) /= size_or_one(max_norm(all.row(r).transpose()));
   return all;
 }
 
 bool vanishes(const Columns& product, const Columns& factor) {
-  return max_norm(product) <= zero_tolerance * usable_scale(max_norm(factor));
+  return max_norm(product) <= zero_tolerance * size_or_one(max_norm(factor));
 }
 
 /// A point near the start that shares no special position with it.
 Point near(const Start& start) {
   Point point{start.time + 0.37, start.q, start.v};
-  const double q_size = usable_scale(max_norm(start.q)), v_size = usable_scale(max_norm(start.v));
+  const double q_size = size_or_one(max_norm(start.q)), v_size = size_or_one(max_norm(start.v));
   for (Eigen::Index i = 0; i < start.q.size(); ++i) {
     point.q[i] += 1e-2 * q_size * std::sin(1.0 + 1.7 * static_cast<double>(i));
     point.v[i] += 0.3 * v_size * std::cos(0.3 + 2.3 * static_cast<double>(i));
@@ -190,7 +190,7 @@ Columns hidden_matrix(const Directions& w, const FullDerivatives& d) {
 Vector largest_of_rows(const Columns& matrix) {
   Vector largest(matrix.rows());
   for (Eigen::Index r = 0; r < matrix.rows(); ++r)
-    largest[r] = usable_scale(max_norm(matrix.row(r).transpose()));
+    largest[r] = size_or_one(max_norm(matrix.row(r).transpose()));
   return largest;
 }
 

@@ -6,6 +6,7 @@
 #include <diracstep/core/numerics/jet.hpp>
 #include <diracstep/core/numerics/sparsity_pattern.hpp>
 #include <diracstep/core/numerics/types.hpp>
+#include <diracstep/core/system/point_columns.hpp>
 #include <memory>
 #include <utility>
 
@@ -45,6 +46,11 @@ class PhaseFunction {
   virtual void gradient(double t, ConstVectorRef x, ConstVectorRef y, VectorRef fx, VectorRef fy) const = 0;
   virtual void hessian(double t, ConstVectorRef x, ConstVectorRef y, VectorRef fxx, VectorRef fxy,
                        VectorRef fyy) const = 0;
+
+  /// gradient() at several points, into n×count columns.  A step calls it once for all its stages.
+  virtual void gradients(const PointColumns& at, double* fx, double* fy) const;
+  /// hessian() at several points, into columns of values on pattern().
+  virtual void hessians(const PointColumns& at, double* fxx, double* fxy, double* fyy) const;
 
   /// ∂(f_y)/∂t with x and y held fixed; zero where f does not depend on the time.
   virtual void gradient_rate(double t, ConstVectorRef x, ConstVectorRef y, VectorRef fyt) const = 0;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <diracstep/core/numerics/nonlinear_solver.hpp>
+#include <diracstep/core/numerics/row_scales.hpp>
 #include <diracstep/core/system/scene.hpp>
 #include <memory>
 #include <vector>
@@ -20,6 +21,7 @@ class PhaseSpaceVelocityProblem final : public NonlinearProblem {
   void begin(double t, ConstVectorRef q);
   void residual(ConstVectorRef v, VectorRef f) override;
   void jacobian(ConstVectorRef v, VectorRef values) override;
+  const double* scales_of_unsolved_rows(ConstVectorRef f, double level) override;
 
  private:
   std::shared_ptr<const Lagrangian> lagrangian_;
@@ -27,8 +29,9 @@ class PhaseSpaceVelocityProblem final : public NonlinearProblem {
   SparsityPattern pattern_;
   BlockPattern layout_;
   std::vector<ResidualBlock> blocks_;
+  RowScales row_scales_{lagrangian_->dimension()};
   double t_ = 0.0;
-  Vector q_, lq_, lv_, lvt_, lqq_, lqv_, lvv_;
+  Vector q_, lq_, lv_, lvt_, lqq_, lqv_, lvv_, sizes_, largest_;
 };
 
 }  // namespace diracstep

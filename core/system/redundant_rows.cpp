@@ -6,90 +6,10 @@
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/system/redundant_rows.hpp>
 #include <optional>
-#include <set>
 
 namespace diracstep {
 
 namespace {
-
-/// Some rows of a block, in order.
-class RowSubset final : public ConstraintRows {
- public:
-  RowSubset(std::shared_ptr<const ConstraintRows> block, std::vector<int> kept)
-      : ConstraintRows(block->holonomic(), subset(block->pattern(), kept), block->curvature_pattern(),
-                       names_of(*block, kept)),
-        block_(std::move(block)),
-        kept_(std::move(kept)) {
-    const std::vector<int> numbers = numbers_of(block_->rows(), kept_);
-    int k = 0;
-    for (const auto& [row, column] : block_->pattern().entries()) {
-      if (numbers[static_cast<std::size_t>(row)] >= 0) places_.push_back(k);
-      ++k;
-    }
-  }
-
-  bool constant() const override { return block_->constant(); }
-  bool workless() const override { return block_->workless(); }
-  std::string origin(int row) const override { return block_->origin(kept_[static_cast<std::size_t>(row)]); }
-  void position(double t, ConstVectorRef q, VectorRef phi) const override {
-    Vector all(block_->rows());
-    block_->position(t, q, all);
-    take_rows(all, phi);
-  }
-  void coefficients(double t, ConstVectorRef q, VectorRef a, VectorRef b) const override {
-    Vector all(block_->pattern().nonzeros()), offset(block_->rows());
-    block_->coefficients(t, q, all, offset);
-    take_values(all, a);
-    take_rows(offset, b);
-  }
-  void derivative(double t, ConstVectorRef q, ConstVectorRef w, double s, VectorRef d) const override {
-    Vector all(block_->pattern().nonzeros());
-    block_->derivative(t, q, w, s, all);
-    take_values(all, d);
-  }
-  void time_derivative(double t, ConstVectorRef q, ConstVectorRef v, VectorRef d) const override {
-    Vector all(block_->rows());
-    block_->time_derivative(t, q, v, all);
-    take_rows(all, d);
-  }
-  void annihilator_derivative(double t, ConstVectorRef q, ConstVectorRef lambda, VectorRef d) const override {
-    Vector all = Vector::Zero(block_->rows());
-    for (std::size_t r = 0; r < kept_.size(); ++r) all[kept_[r]] = lambda[static_cast<Eigen::Index>(r)];
-    block_->annihilator_derivative(t, q, all, d);
-  }
-
- private:
-  /// The number of each row among the kept ones; -1 for those left out.
-  static std::vector<int> numbers_of(int rows, const std::vector<int>& kept) {
-    std::vector<int> numbers(static_cast<std::size_t>(rows), -1);
-    for (std::size_t r = 0; r < kept.size(); ++r)
-      numbers[static_cast<std::size_t>(kept[r])] = static_cast<int>(r);
-    return numbers;
-  }
-  static SparsityPattern subset(const SparsityPattern& pattern, const std::vector<int>& kept) {
-    const std::vector<int> numbers = numbers_of(pattern.rows(), kept);
-    std::vector<std::pair<int, int>> entries;
-    for (const auto& [row, column] : pattern.entries())
-      if (const int number = numbers[static_cast<std::size_t>(row)]; number >= 0)
-        entries.emplace_back(number, column);
-    return {static_cast<int>(kept.size()), pattern.columns(), entries};
-  }
-  static std::vector<std::string> names_of(const ConstraintRows& block, const std::vector<int>& kept) {
-    std::vector<std::string> names;
-    for (const int row : kept) names.push_back(block.names()[static_cast<std::size_t>(row)]);
-    return names;
-  }
-  void take_rows(const Vector& all, VectorRef out) const {
-    for (std::size_t r = 0; r < kept_.size(); ++r) out[static_cast<Eigen::Index>(r)] = all[kept_[r]];
-  }
-  void take_values(const Vector& all, VectorRef out) const {
-    for (std::size_t k = 0; k < places_.size(); ++k) out[static_cast<Eigen::Index>(k)] = all[places_[k]];
-  }
-
-  std::shared_ptr<const ConstraintRows> block_;
-  std::vector<int> kept_;    ///< ascending, so the entries keep their order
-  std::vector<int> places_;  ///< values of the kept rows among all
-};
 
 /// Up to so many rows full matrices take less time.
 constexpr int max_rows_in_full = 100;
@@ -163,6 +83,19 @@ std::vector<int> dependent_in_parts(const Eigen::SparseMatrix<double>& one_forms
 /// much.
 constexpr double pose_tolerance = 1e-7;
 
+/// Where motions cross at the start, poses around it are farther than this from being singular; where rows
+/// touch, poses are found to the square root of round-off only, and seem regular by so much.
+constexpr double crossing = 1e-3;
+
+/// A start moved by this part of its size in all coordinates.
+Vector moved(const Start& start, double distance) {
+  const double size = std::max(start.q.lpNorm<Eigen::Infinity>(), 1e-2);
+  Vector q = start.q;
+  for (Eigen::Index i = 0; i < q.size(); ++i)
+    q[i] += distance * size * std::sin(1.0 + 1.7 * static_cast<double>(i));
+  return q;
+}
+
 /// One-forms at the start, and at poses around it that the rows allow.
 std::vector<Columns> one_forms_around(const Scene& scene, const Start& start) {
   ConstraintsAtPoint rows(scene.constraints, scene.dimension());
@@ -172,12 +105,8 @@ std::vector<Columns> one_forms_around(const Scene& scene, const Start& start) {
   };
   std::vector<Columns> all{at(start.q)};
   const ConstraintBlocks holonomic = only_holonomic(scene.constraints);
-  const double size = std::max(start.q.lpNorm<Eigen::Infinity>(), 1e-2);
   for (const double distance : {-0.3, -0.1, 0.1, 0.3}) {
-    Vector q = start.q;
-    for (Eigen::Index i = 0; i < q.size(); ++i)
-      q[i] += distance * size * std::sin(1.0 + 1.7 * static_cast<double>(i));
-    const auto pose = pose_near(holonomic, start.time, q, {});
+    const auto pose = pose_near(holonomic, start.time, moved(start, distance), {});
     if (!pose) continue;
     if (Columns there = at(*pose); there.allFinite()) all.push_back(std::move(there));
   }
@@ -211,6 +140,38 @@ std::vector<int> best_choice(std::vector<int> at_start, const std::vector<Column
     at_start = std::move(other);
   }
   return at_start;
+}
+
+/// How far the rows of these blocks are from zero, in parts of their one-forms times the size of the pose.
+double distance_from(const ConstraintBlocks& holonomic, double t, const Vector& q) {
+  double largest = 0.0;
+  for (const auto& block : holonomic) {
+    Vector phi(block->rows()), a(block->pattern().nonzeros()), b(block->rows());
+    block->position(t, q, phi);
+    block->coefficients(t, q, a, b);
+    const double size = a.lpNorm<Eigen::Infinity>() * q.lpNorm<Eigen::Infinity>();
+    largest = std::max(largest, phi.lpNorm<Eigen::Infinity>() / size);
+  }
+  return largest;
+}
+
+/// Whether all poses found around the start that the other rows allow break the holonomic ones of these
+/// names.
+bool broken_by_the_others(const Scene& scene, const Start& start, const std::vector<std::string>& dependent) {
+  constexpr double met = 1e-7;
+  const ConstraintBlocks others = only_holonomic(without_rows(scene, dependent)->constraints);
+  std::vector<std::string> kept = scene.row_names();
+  std::erase_if(
+      kept, [&](const std::string& name) { return std::ranges::find(dependent, name) != dependent.end(); });
+  const ConstraintBlocks these = only_holonomic(without_rows(scene, kept)->constraints);
+  bool any = false;
+  for (const double distance : {-0.1, -0.03, -0.01, 0.01, 0.03, 0.1}) {
+    const auto pose = pose_near(others, start.time, moved(start, distance), {});
+    if (!pose) continue;
+    if (distance_from(these, start.time, *pose) <= met) return false;
+    any = true;
+  }
+  return any;
 }
 
 }  // namespace
@@ -274,30 +235,31 @@ std::vector<std::string> redundant_rows(const Scene& scene, const Start& start, 
   return dependent;
 }
 
-bool singular_at_start_only(const Scene& scene, const Start& start, double tolerance) {
-  if (scene.rows() == 0 || scene.rows() > max_rows_in_full) return false;
+RowDependence row_dependence(const Scene& scene, const Start& start,
+                             const std::vector<std::string>& dependent, double tolerance) {
+  if (scene.rows() == 0 || scene.rows() > max_rows_in_full) return RowDependence::lasting;
   const std::vector<Columns> poses = one_forms_around(scene, start);
   const std::size_t here = dependent_columns(poses[0], tolerance).size();
   // All poses: one that was found from afar may lie on another branch of the rows, of another rank.
-  return poses.size() > 1 && std::all_of(poses.begin() + 1, poses.end(), [&](const Columns& there) {
-           return dependent_columns(there, std::max(tolerance, pose_tolerance)).size() < here;
-         });
+  const bool crosses =
+      poses.size() > 1 && std::all_of(poses.begin() + 1, poses.end(), [&](const Columns& there) {
+        return dependent_columns(there, std::max(tolerance, crossing)).size() < here;
+      });
+  if (crosses) return RowDependence::at_start_only;
+  return broken_by_the_others(scene, start, dependent) ? RowDependence::touching : RowDependence::lasting;
 }
 
-std::shared_ptr<const Scene> without_rows(const Scene& scene, const std::vector<std::string>& names) {
-  auto copy = std::make_shared<Scene>(scene);
-  copy->constraints.clear();
-  const std::set<std::string> left_out(names.begin(), names.end());
-  for (const auto& block : scene.constraints) {
-    std::vector<int> kept;
-    for (int r = 0; r < block->rows(); ++r)
-      if (!left_out.contains(block->names()[static_cast<std::size_t>(r)])) kept.push_back(r);
-    if (static_cast<int>(kept.size()) == block->rows())
-      copy->constraints.push_back(block);
-    else if (!kept.empty())
-      copy->constraints.push_back(std::make_shared<const RowSubset>(block, kept));
+const char* why_not_left_out(RowDependence dependence) {
+  switch (dependence) {
+    case RowDependence::at_start_only:
+      return "not so at poses near it: the start is singular, move it";
+    case RowDependence::touching:
+      return "they only touch the others there, and without them other motions are possible: say what they "
+             "mean by rows of another form";
+    case RowDependence::lasting:
+      break;
   }
-  return copy;
+  return "";
 }
 
 }  // namespace diracstep

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <diracstep/core/system/constraint_distribution.hpp>
+#include <diracstep/core/system/row_subset.hpp>
 #include <diracstep/core/system/scene.hpp>
 #include <optional>
 #include <string>
@@ -28,11 +29,16 @@ std::vector<int> dependent_columns(const Columns& one_forms, double tolerance);
 /// harm while the rank stays the same.
 std::vector<std::string> redundant_rows(const Scene& scene, const Start& start, double tolerance = 1e-10);
 
-/// Whether the rows have a higher rank at poses around the start: then it is the start that is singular, and
-/// no row can be left out.
-bool singular_at_start_only(const Scene& scene, const Start& start, double tolerance = 1e-10);
-
-/// The same scene without the rows of these names.
-std::shared_ptr<const Scene> without_rows(const Scene& scene, const std::vector<std::string>& names);
+/// How rows depend on others at the start.
+enum class RowDependence {
+  lasting,        ///< at poses around it as well: they say nothing new, and can be left out
+  at_start_only,  ///< at poses around it the rank is higher: the start is singular
+  touching,  ///< their one-forms do at every pose that all rows allow, but poses that the others allow break
+             ///< them, as the third of three bars on a line: they cannot be left out
+};
+RowDependence row_dependence(const Scene& scene, const Start& start,
+                             const std::vector<std::string>& dependent, double tolerance = 1e-10);
+/// Why rows that depend so cannot be left out, and what to do; empty where they can.
+const char* why_not_left_out(RowDependence dependence);
 
 }  // namespace diracstep

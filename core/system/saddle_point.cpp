@@ -13,7 +13,13 @@ SaddlePointProblem::SaddlePointProblem(const Scene& scene, bool dense)
       rows_(scene.constraints, n_),
       lq_(Vector::Zero(n_)),
       lv_(Vector::Zero(n_)),
-      layout_(n_ + m_, n_ + m_) {
+      layout_(n_ + m_, n_ + m_),
+      known_(Vector::Zero(n_ + m_)),
+      last_x_(known_),
+      sizes_(known_),
+      largest_(known_),
+      all_(Vector::Zero(n_)),
+      row_scales_(n_ + m_) {
   const SparsityPattern& mass = scene.lagrangian->pattern();
   for (Vector* values : {&lqq_, &lqv_, &lvv_}) values->setZero(mass.nonzeros());
   layout_.add(mass, 0, 0);
@@ -37,13 +43,41 @@ void SaddlePointProblem::assemble(VectorRef& values) const {
   layout_.add_to(values.data(), 2, 1.0, rows_.coefficients().data());
 }
 
-void SaddlePointProblem::set_scales(double momentum, double velocity) {
-  blocks_[0].scale = usable_scale(momentum);
+void SaddlePointProblem::set_scales(ConstVectorRef momentum, ConstVectorRef velocity, double unknowns) {
+  known_.head(n_) = momentum.cwiseAbs();
+  blocks_[0].scale = scale_of(max_norm(momentum));
   if (m_ == 0) return;
-  blocks_[1].scale = usable_scale(max_norm(rows_.coefficients()) * velocity);
+  known_.tail(m_) = velocity.cwiseAbs();
+  blocks_[1].scale = scale_of(max_norm(rows_.coefficients()) * unknowns + max_norm(velocity));
 }
 
-void SaddlePointProblem::raise_scales(double momentum, ConstVectorRef x) {
+/// Beside the right-hand sides ∂²L/∂v², as it was last taken, and A times both parts of x.
+const double* SaddlePointProblem::scales_of_unsolved_rows(ConstVectorRef f, double level) {
+  if (RowScales::solved(f.data(), known_.data(), n_ + m_, level)) return nullptr;
+  sizes_ = known_;
+  largest_.setZero();
+  all_.setConstant(scene_.lagrangian->structure().quadratic ? 0.0 : max_norm(last_x_.head(n_)));
+  add_mass_sizes(last_x_, sizes_);
+  add_mass_sizes(all_, largest_);
+  if (m_ > 0)
+    rows_.pattern().for_each([&](Eigen::Index e, int r, int c) {
+      const double a = std::abs(rows_.coefficients()[e]);
+      sizes_[c] += a * std::abs(last_x_[n_ + r]);
+      sizes_[n_ + r] += a * std::abs(last_x_[c]);
+      largest_[n_ + r] += a * all_[c];
+    });
+  row_scales_.set(0, sizes_.head(n_), largest_.head(n_), blocks_[0].scale);
+  if (m_ > 0) row_scales_.set(n_, sizes_.tail(m_), largest_.tail(m_), blocks_[1].scale);
+  return row_scales_.unsolved(f, level);
+}
+
+void SaddlePointProblem::raise_scales(double momentum, ConstVectorRef x, bool mass_taken) {
+  last_x_ = x;
+  if (mass_taken && !scene_.lagrangian->structure().y_hessian_diagonal) {  // else these are momenta
+    sizes_.setZero();
+    add_mass_sizes(x, sizes_);
+    momentum = std::max(momentum, max_norm(sizes_));
+  }
   const double a = m_ > 0 ? rows_.coefficients().lpNorm<Eigen::Infinity>() : 0.0;
   if (m_ > 0) momentum = std::max(momentum, a * x.tail(m_).lpNorm<Eigen::Infinity>());
   if (std::isfinite(momentum)) blocks_[0].scale = std::max(blocks_[0].scale, momentum);
@@ -52,17 +86,23 @@ void SaddlePointProblem::raise_scales(double momentum, ConstVectorRef x) {
   if (std::isfinite(velocity)) blocks_[1].scale = std::max(blocks_[1].scale, velocity);
 }
 
-void VelocityProblem::begin(double t, ConstVectorRef q, ConstVectorRef p) {
+void SaddlePointProblem::add_mass_sizes(ConstVectorRef v, Vector& sizes) const {
+  scene_.lagrangian->pattern().for_each(
+      [&](Eigen::Index e, int r, int c) { sizes[r] += std::abs(lvv_[e] * v[c]); });
+}
+
+void VelocityProblem::begin(double t, ConstVectorRef q, ConstVectorRef p, ConstVectorRef v) {
   move_to(t, q);
   p_ = p;
-  set_scales(p.lpNorm<Eigen::Infinity>(), 1.0);
+  mass_taken_ = mass_known_;
+  set_scales(p, rows_.offsets(), max_norm(v));
 }
 
 void VelocityProblem::residual(ConstVectorRef x, VectorRef f) {
   const auto v = x.head(n_);
   scene_.lagrangian->gradient(t_, q_, v, lq_, lv_);
   f.head(n_) = lv_ - p_;
-  raise_scales(lv_.lpNorm<Eigen::Infinity>(), x);
+  raise_scales(lv_.lpNorm<Eigen::Infinity>(), x, mass_taken_);
   if (m_ == 0) return;
   rows_.add_annihilator(x.tail(m_), f.head(n_), -1.0);
   rows_.velocity_residual(v, f.tail(m_));
@@ -71,6 +111,7 @@ void VelocityProblem::residual(ConstVectorRef x, VectorRef f) {
 void VelocityProblem::jacobian(ConstVectorRef x, VectorRef values) {
   if (!mass_known_) scene_.lagrangian->hessian(t_, q_, x.head(n_), lqq_, lqv_, lvv_);
   mass_known_ = scene_.lagrangian->structure().y_hessian_constant;
+  mass_taken_ = true;
   assemble(values);
 }
 
@@ -97,13 +138,13 @@ void AccelerationProblem::begin(double t, ConstVectorRef q, ConstVectorRef v) {
     rows_.distribution().derivative(t, q, v, 1.0, row_derivative_);
     rows_.pattern().multiply_add(row_derivative_.data(), v_.data(), known_rate_.data());
   }
-  set_scales(known_force_.lpNorm<Eigen::Infinity>(), 1.0);
+  set_scales(known_force_, known_rate_, max_norm(known_force_) / size_or_one(max_norm(lvv_)));
 }
 
 void AccelerationProblem::residual(ConstVectorRef x, VectorRef f) {
   f.head(n_).setZero();
   scene_.lagrangian->pattern().multiply_add(lvv_.data(), x.data(), f.data());
-  raise_scales(f.head(n_).lpNorm<Eigen::Infinity>(), x);
+  raise_scales(f.head(n_).lpNorm<Eigen::Infinity>(), x, true);
   f.head(n_) -= known_force_;
   if (m_ == 0) return;
   rows_.add_annihilator(x.tail(m_), f.head(n_), -1.0);

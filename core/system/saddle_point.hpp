@@ -1,6 +1,7 @@
 #pragma once
 
 #include <diracstep/core/numerics/nonlinear_solver.hpp>
+#include <diracstep/core/numerics/row_scales.hpp>
 #include <diracstep/core/system/constraint_distribution.hpp>
 #include <diracstep/core/system/scene.hpp>
 #include <vector>
@@ -21,15 +22,17 @@ class SaddlePointProblem : public NonlinearProblem {
   int size() const final { return n_ + m_; }
   const SparsityPattern& pattern() const final { return pattern_; }
   std::span<const ResidualBlock> blocks() const final { return blocks_; }
+  const double* scales_of_unsolved_rows(ConstVectorRef f, double level) final;
 
  protected:
   void move_to(double t, ConstVectorRef q);
   /// The saddle-point matrix with ∂²L/∂v² as it stands in lvv_.
   void assemble(VectorRef& values) const;
-  void set_scales(double momentum, double velocity);
-  /// The scales cover the terms at x as well: ∂²L/∂v² or ∂L/∂v of size `momentum`, and A times both parts of
-  /// x.
-  void raise_scales(double momentum, ConstVectorRef x);
+  /// The right-hand sides, that of the rows beside A times unknowns of such a size.
+  void set_scales(ConstVectorRef momentum, ConstVectorRef velocity, double unknowns);
+  /// The scales cover the terms at x as well: momenta of such a size, ∂²L/∂v² times x where `mass_taken` says
+  /// that it was taken since move_to(), and A times both parts of x.
+  void raise_scales(double momentum, ConstVectorRef x, bool mass_taken);
 
   const Scene& scene_;
   int n_;
@@ -43,6 +46,12 @@ class SaddlePointProblem : public NonlinearProblem {
   SparsityPattern pattern_;
   BlockPattern layout_;
   std::vector<ResidualBlock> blocks_;
+  /// sizes += those of the terms of ∂²L/∂v² times v.
+  void add_mass_sizes(ConstVectorRef v, Vector& sizes) const;
+
+  Vector known_, last_x_;         ///< sizes of the right-hand sides; where the residual was last taken
+  Vector sizes_, largest_, all_;  ///< workspaces
+  RowScales row_scales_;
 };
 
 /// Unknowns (v, μ):   ∂L/∂v(q,v) − A(q)ᵀμ = p,   A(q) v + b(q) = 0.
@@ -50,13 +59,15 @@ class SaddlePointProblem : public NonlinearProblem {
 class VelocityProblem final : public SaddlePointProblem {
  public:
   using SaddlePointProblem::SaddlePointProblem;
-  void begin(double t, ConstVectorRef q, ConstVectorRef p);
+  /// `v` is a guess.
+  void begin(double t, ConstVectorRef q, ConstVectorRef p, ConstVectorRef v);
   void residual(ConstVectorRef x, VectorRef f) override;
   void jacobian(ConstVectorRef x, VectorRef values) override;
 
  private:
   Vector p_;
   bool mass_known_ = false;  ///< ∂²L/∂v² is constant and was taken
+  bool mass_taken_ = false;  ///< in this solve or known
 };
 
 /// Unknowns (a, Λ), linear:   d/dt(∂L/∂v) − ∂L/∂q − f = A(q)ᵀΛ,   d/dt(A(q) v + b(q)) = 0,   a = dv/dt.

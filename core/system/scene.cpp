@@ -58,6 +58,11 @@ void require_well_formed(const Scene& scene) {
     if (!block) throw Misuse(prefix + "scene.constraints holds a null pointer");
     require_size(prefix + "a constraint row", block->dimension(), scene.dimension());
   }
+  if (scene.tolerances.size() == 0) return;
+  require_size(prefix + "scene.tolerances", scene.tolerances.size(), scene.dimension());
+  for (const double tolerance : scene.tolerances)
+    if (!(tolerance >= 0.0 && std::isfinite(tolerance)))
+      throw Misuse(prefix + "a tolerance of a coordinate is a finite number of 0 or more");
 }
 
 Start completed_start(const Scene& scene, Start start) {

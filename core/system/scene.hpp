@@ -39,6 +39,10 @@ struct Scene {
   /// Empty, or says after use why the functions above are not to be believed, as derivatives by differences
   /// that two step sizes do not agree on.
   std::function<std::string()> doubt = {};
+  /// By coordinate, in its unit: a coordinate whose terms are far smaller than those of others is solved in
+  /// each step to this instead of to 1e-15 of the largest coordinate (RowScales).  0 where none is stated;
+  /// empty where none is at all.
+  Vector tolerances = {};
 
   /// Of the tangent spaces: how many numbers a velocity, a momentum, a row and the second derivatives of L
   /// have.

@@ -145,8 +145,8 @@ class Scene:
         (``max_solves`` and ``max_time`` in seconds limit that; ``adaptive=True`` or ``False`` decides whether steps vary).
         every: keeps each so-many-th point.  momentum: the representative kept as p: projected, plus or minus.
         progress: shows a bar (tqdm where installed); without it on long runs only.
-        Further options: method, order, step, rule, solver ("newton", "fixed-point"), jacobian, project_start, substeps,
-        compensated_sums; adaptive, eps (radians of a step), control, smallest_step, max_steps for steps that vary.
+        Further options: method, order, step, rule, solver ("newton", "fixed-point", "automatic", "direct"), jacobian, project_start,
+        substeps, compensated_sums; adaptive, eps (radians of a step), control, smallest_step, max_steps for steps that vary.
 
         Warns with Doubt where the library's checks find the result not to be believed.  Raises Misuse, or Failure, which holds
         what was computed in ``run``.  Ctrl-C ends the run and keeps what is computed.

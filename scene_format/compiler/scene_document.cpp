@@ -145,7 +145,7 @@ class DocumentReader : TableReader {
   void read_coordinates(const toml::table& root) {
     for (const Item& item : items(root, "coordinates")) {
       const toml::table& entry = table(item, "x = { unit = \"m\", meaning = \"…\" }");
-      check_keys(entry, "coordinate '" + item.key + "'", {"unit", "meaning", "for", "cyclic"});
+      check_keys(entry, "coordinate '" + item.key + "'", {"unit", "meaning", "for", "cyclic", "tolerance"});
       SceneDocument::Coordinate coordinate;
       coordinate.name = item.key;
       coordinate.place = item.place;
@@ -153,6 +153,9 @@ class DocumentReader : TableReader {
       coordinate.meaning = string(entry, "meaning");
       coordinate.loops = optional_formula(entry, "for");
       coordinate.cyclic = flag(entry, "cyclic");
+      coordinate.tolerance = number(entry, "tolerance").value_or(0.0);
+      if (!(coordinate.tolerance >= 0.0 && std::isfinite(coordinate.tolerance)))
+        fail(item.place, "the tolerance of '" + item.key + "' must be a finite number of 0 or more");
       if (coordinate.cyclic && !coordinate.loops) fail(item.place, "cyclic = true needs for = \"i = 1..N\"");
       add_coordinate(std::move(coordinate));
     }

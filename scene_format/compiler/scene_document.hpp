@@ -26,6 +26,7 @@ struct SceneDocument {
     std::optional<FormulaText> loops;  ///< "i = 1..N" of a repeated coordinate
     bool cyclic = false;
     Place place = {};
+    double tolerance = 0.0;  ///< of Scene::tolerances; 0 where none is stated
   };
   struct Parameter {
     std::string name;

@@ -11,6 +11,10 @@ using namespace scene_compiler;
 
 namespace {
 
+/// Functions of more coordinates, or with larger tables, take points one by one.
+constexpr int most_coordinates = 16;
+constexpr std::size_t largest_table = 256;
+
 /// The function's part of the table of compiled kernels; null where there is none.
 const CompiledKernel* table_of(const LoadedScene& scene, const SceneFunction& function) {
   const CompiledKernel* table = scene.library.kernels;
@@ -28,7 +32,28 @@ LoadedFunction::LoadedFunction(LoadedScenePtr scene, const SceneFunction& functi
     : scene_(std::move(scene)), function_(&function), table_(table_of(*scene_, function)) {
   place_rows();
   for (const Piece& piece : function.pieces) load(piece);
+  const auto small = [](const LoadedPiece& loaded) {
+    return loaded.slots.size() + loaded.instance.size() <= largest_table;
+  };
+  if (dimension() <= most_coordinates && std::ranges::all_of(pieces_, small)) copy_slots();
   plan_jobs();
+}
+
+/// The tables of the first point once more for each further one, whose columns stand behind.
+void LoadedFunction::copy_slots() {
+  copies_ = points;
+  const int rows = static_cast<int>(row_names_.size());
+  for (LoadedPiece& loaded : pieces_) {
+    const std::size_t slots = loaded.slots.size(), constants = loaded.instance.size();
+    const int width = loaded.piece->layout.width(), coordinates = loaded.piece->layout.slot_count;
+    for (int point = 1; point < points; ++point) {
+      for (std::size_t k = 0; k < slots; ++k) {
+        const bool of_coordinate = static_cast<int>(k) % width < coordinates;
+        loaded.slots.push_back(loaded.slots[k] + point * (of_coordinate ? dimension() : rows));
+      }
+      for (std::size_t k = 0; k < constants; ++k) loaded.instance.push_back(loaded.instance[k]);
+    }
+  }
 }
 
 void LoadedFunction::place_rows() {
@@ -125,6 +150,9 @@ void LoadedFunction::find_positions(const SparsityPattern& pattern, bool curvatu
   for (LoadedPiece& loaded : pieces_) {
     auto& positions = curvature ? loaded.curvature_positions : loaded.positions;
     for_each_entry(loaded, curvature, [&](int i, int j) { positions.push_back(pattern.position(i, j)); });
+    const std::size_t first = positions.size();
+    for (int point = 1; point < copies_; ++point)
+      for (std::size_t k = 0; k < first; ++k) positions.push_back(positions[k] + point * pattern.nonzeros());
   }
   plan_jobs();
 }
@@ -148,11 +176,11 @@ void LoadedFunction::plan_jobs() {
   }
 }
 
-void LoadedFunction::run(std::size_t number, KernelCall& call) const {
+void LoadedFunction::run(std::size_t number, KernelCall& call, int count) const {
   if (number >= jobs_.size()) return;  // a function without pieces
   call.known = scene_->known.data();
   for (const Job& job : jobs_[number]) {
-    call.count = job.count;
+    call.count = job.count * count;
     call.slots = job.slots;
     call.positions = job.positions;
     call.instance = job.instance;

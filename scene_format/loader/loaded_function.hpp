@@ -30,7 +30,15 @@ class LoadedFunction {
 
   /// Adds kernel `number` of every piece to call.out; the rest of the call, but in, t, s and multipliers, is
   /// filled in here.
-  void run(std::size_t number, scene_compiler::KernelCall& call) const;
+  void run(std::size_t number, scene_compiler::KernelCall& call) const { run(number, call, 1); }
+
+  /// The same at several points, at most `points` of them: columns in, in column by column.
+  void run(std::size_t number, scene_compiler::KernelCall& call, int count) const;
+
+  /// So many points are evaluated in one call, for functions of few coordinates: more than the nodes of
+  /// GL(6). Others are evaluated point by point.
+  static constexpr int points = 8;
+  int points_at_once() const { return copies_; }
 
  private:
   /// A piece with all its instances laid out.
@@ -51,6 +59,7 @@ class LoadedFunction {
     const double* instance;
   };
   void plan_jobs();
+  void copy_slots();
   template <class Visit>
   void for_each_entry(const LoadedPiece& loaded, bool curvature, const Visit& visit) const;
   void place_rows();
@@ -63,6 +72,7 @@ class LoadedFunction {
   const scene_compiler::CompiledKernel* table_;  ///< null where kernels are interpreted
   std::vector<LoadedPiece> pieces_;
   std::vector<std::vector<Job>> jobs_;  ///< by the number of the kernel
+  int copies_ = 1;                      ///< of the tables of a piece, one for each point
   std::vector<int> first_rows_;
   std::vector<std::string> row_names_;
 };

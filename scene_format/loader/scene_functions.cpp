@@ -36,6 +36,12 @@ void clear(VectorRef& x) {  // by reference: copies of references are not free
   clear_few(x.data(), x.size(), std::make_integer_sequence<int, few>());
 }
 
+/// The same for a few columns: two at a time and no call, which is quicker up to some dozens.
+void clear(double* x, int size) {
+  for (int i = 0; i + 1 < size; i += 2) x[i] = x[i + 1] = 0.0;
+  if (size % 2 == 1) x[size - 1] = 0.0;
+}
+
 template <class Base>
 class FilePhaseFunction final : public Base {
  public:
@@ -75,6 +81,26 @@ class FilePhaseFunction final : public Base {
     function_.run(2, call);
   }
 
+  void gradients(const PointColumns& at, double* fx, double* fy) const override {
+    if (!at_once(at)) return Base::gradients(at, fx, fy);
+    clear(fx, this->dimension() * at.count);
+    clear(fy, this->dimension() * at.count);
+    KernelCall call = call_at(at.times[0], at.x, at.y);
+    call.out[0] = fx;
+    call.out[1] = fy;
+    function_.run(1, call, at.count);
+  }
+
+  void hessians(const PointColumns& at, double* fxx, double* fxy, double* fyy) const override {
+    if (!at_once(at)) return Base::hessians(at, fxx, fxy, fyy);
+    for (double* const of : {fxx, fxy, fyy}) clear(of, this->pattern().nonzeros() * at.count);
+    KernelCall call = call_at(at.times[0], at.x, at.y);
+    call.out[0] = fxx;
+    call.out[1] = fxy;
+    call.out[2] = fyy;
+    function_.run(2, call, at.count);
+  }
+
   void gradient_rate(double t, ConstVectorRef x, ConstVectorRef y, VectorRef fyt) const override {
     clear(fyt);
     KernelCall call = call_at(t, x.data(), y.data());
@@ -90,6 +116,10 @@ class FilePhaseFunction final : public Base {
   }
 
  private:
+  /// A call holds one time.
+  bool at_once(const PointColumns& at) const {
+    return at.count <= function_.points_at_once() && this->structure().autonomous;
+  }
   static PhaseStructure structure_of(const SceneFunction& f) {
     return {f.separable, f.y_hessian_constant, f.y_hessian_diagonal,
             f.quadratic, f.y_hessian_zero,     f.autonomous};
@@ -163,7 +193,46 @@ class FileRows final : public ConstraintRows {
     function_.run(annihilator_kernel, call);
   }
 
+  void positions(const PointColumns& at, double* phi) const override {
+    if (!holonomic() || !at_once(at)) return ConstraintRows::positions(at, phi);
+    KernelCall call = call_at(at.times[0], at.x);
+    run(0, at, call, phi, rows());
+  }
+
+  void coefficients_at(const PointColumns& at, double* a, double* b) const override {
+    if (!at_once(at)) return ConstraintRows::coefficients_at(at, a, b);
+    clear(b, rows() * at.count);
+    KernelCall call = call_at(at.times[0], at.x);
+    call.out[1] = b;
+    run(1, at, call, a, pattern().nonzeros());
+  }
+
+  void derivatives(const PointColumns& at, double* d) const override {
+    if (!at_once(at)) return ConstraintRows::derivatives(at, d);
+    KernelCall call = call_at(at.times[0], at.x);
+    call.in[2] = at.y;
+    call.s = 1.0;
+    run(2, at, call, d, pattern().nonzeros());
+  }
+
+  void annihilator_derivatives(const PointColumns& at, const double* multipliers, double* d) const override {
+    if (!at_once(at)) return ConstraintRows::annihilator_derivatives(at, multipliers, d);
+    KernelCall call = call_at(at.times[0], at.x);
+    call.multipliers = multipliers;
+    run(annihilator_kernel, at, call, d, curvature_pattern().nonzeros());
+  }
+
  private:
+  /// A call holds one time.
+  bool at_once(const PointColumns& at) const { return at.count <= function_.points_at_once() && workless(); }
+
+  /// Kernel `number` into columns of so many entries.
+  void run(std::size_t number, const PointColumns& at, KernelCall& call, double* out, int entries) const {
+    clear(out, entries * at.count);
+    call.out[0] = out;
+    function_.run(number, call, at.count);
+  }
+
   LoadedFunction function_;
 };
 

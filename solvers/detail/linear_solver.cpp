@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 #include <diracstep/core/numerics/lu.hpp>
+#include <diracstep/core/numerics/small_lu.hpp>
 #include <diracstep/solvers/detail/linear_solver.hpp>
 #include <limits>
 #include <utility>
@@ -12,85 +13,16 @@ namespace diracstep::detail {
 
 namespace {
 
-constexpr int shortest_unrolled = 5;
-
-/// Elimination by columns with row exchanges, for few unknowns: of fixed size N, or of any size for N = 0.
-/// Multipliers that vanish, of which saddle-point matrices have many, are skipped.
 template <int N>
-class SmallLu final : public LinearSolver {
+class FullLu final : public LinearSolver {
  public:
-  explicit SmallLu(int size)
-      : size_(size), lu_(static_cast<std::size_t>(size) * size), inverse_pivots_(size), exchanges_(size) {}
-
-  bool factor(const double* values) override {
-    const int n = size();
-    std::copy_n(values, n * n, lu_.data());
-    const double round_off = std::numeric_limits<double>::epsilon() * n;
-    for (int k = 0; k < n; ++k) {
-      double* const pivot_column = column(k);
-      int pivot = k;
-      for (int i = k + 1; i < n; ++i)
-        if (std::abs(pivot_column[i]) > std::abs(pivot_column[pivot])) pivot = i;
-      double largest = 0.0;
-      for (int i = 0; i < n; ++i) largest = std::max(largest, std::abs(values[i + k * n]));
-      if (!(std::abs(pivot_column[pivot]) > round_off * largest)) return false;
-      exchanges_[static_cast<std::size_t>(k)] = pivot;
-      if (pivot != k)
-        for (int j = 0; j < n; ++j) std::swap(column(j)[k], column(j)[pivot]);
-      const double inverse = inverse_pivots_[static_cast<std::size_t>(k)] = 1.0 / pivot_column[k];
-      for (int i = k + 1; i < n; ++i) pivot_column[i] *= inverse;
-      for (int j = k + 1; j < n; ++j) subtract(pivot_column, k, column(j)[k], column(j));
-    }
-    return true;
-  }
-
-  void solve(double* b) override {
-    const int n = size();
-    for (int k = 0; k < n; ++k) std::swap(b[k], b[exchanges_[static_cast<std::size_t>(k)]]);
-    if constexpr (N >= shortest_unrolled) return substitute(b);
-    for (int k = 0; k < n; ++k) subtract(column(k), k, b[k], b);
-    for (int k = n - 1; k >= 0; --k) {
-      b[k] *= inverse_pivots_[static_cast<std::size_t>(k)];
-      for (int i = 0; i < k; ++i) b[i] -= column(k)[i] * b[k];
-    }
-  }
-
+  explicit FullLu(int size) : lu_(size) {}
+  bool factor(const double* values) override { return lu_.factor(values); }
+  void solve(double* b) override { lu_.solve(b); }
   const char* name() const override { return "dense LU"; }
 
  private:
-  int size() const { return N > 0 ? N : size_; }
-  double* column(int j) { return lu_.data() + static_cast<std::ptrdiff_t>(j) * size(); }
-
-  /// Substitution with b in registers: each entry waits for the one before it, and where that goes through
-  /// memory the waiting takes twice the time.
-  void substitute(double* b) const {
-    const double* const lu = lu_.data();
-    const double* const inverse_pivots = inverse_pivots_.data();
-    std::array<double, std::max(N, 1)> held;
-    double* const x = held.data();
-    std::copy_n(b, N, x);
-#pragma GCC unroll 16
-    for (int k = 0; k < N; ++k)
-#pragma GCC unroll 16
-      for (int i = k + 1; i < N; ++i) x[i] -= x[k] * lu[k * N + i];
-#pragma GCC unroll 16
-    for (int k = N - 1; k >= 0; --k) {
-      x[k] *= inverse_pivots[k];
-#pragma GCC unroll 16
-      for (int i = 0; i < k; ++i) x[i] -= lu[k * N + i] * x[k];
-    }
-    std::copy_n(x, N, b);
-  }
-
-  /// to −= factor · from, below row k.
-  void subtract(const double* from, int k, double factor, double* to) const {
-    if (factor == 0.0) return;
-    for (int i = k + 1; i < size(); ++i) to[i] -= factor * from[i];
-  }
-
-  int size_;
-  std::vector<double> lu_, inverse_pivots_;
-  std::vector<int> exchanges_;
+  SmallLu<N> lu_;
 };
 
 class DenseLu final : public LinearSolver {
@@ -120,13 +52,78 @@ class DenseLu final : public LinearSolver {
   Eigen::VectorXd solution_;
 };
 
+/// A matrix whose elimination meets a zero pivot is tried once more with rows and columns scaled so that
+/// their entries are about 1: a mass of 1e-20 beside rows of a constraint is no singularity.
+class Scaled final : public LinearSolver {
+ public:
+  Scaled(std::unique_ptr<LinearSolver> lu, int size) : lu_(std::move(lu)), size_(size) {}
+
+  bool factor(const double* values) override {
+    scaled_ = false;
+    if (lu_->factor(values)) return true;
+    scaled_ = scale(values) && lu_->factor(matrix_.data());
+    return scaled_;
+  }
+
+  void solve(double* b) override {
+    if (scaled_)
+      for (int i = 0; i < size_; ++i) b[i] *= rows_[i];
+    lu_->solve(b);
+    if (scaled_)
+      for (int i = 0; i < size_; ++i) b[i] *= columns_[i];
+  }
+
+  const char* name() const override { return lu_->name(); }
+
+ private:
+  static constexpr int sweeps = 8;
+
+  /// Rows and columns in turn by the mean of their smallest and largest entries, in powers of two; false
+  /// where that leaves all as it is.
+  bool scale(const double* values) {
+    matrix_ = Eigen::Map<const Eigen::MatrixXd>(values, size_, size_);
+    if (!matrix_.allFinite()) return false;
+    rows_ = columns_ = Eigen::VectorXd::Ones(size_);
+    bool changed = false;
+    const auto scale_all = [&](auto lines, Eigen::VectorXd& scales) {
+      Eigen::Index i = 0;
+      for (auto line : lines) {
+        double smallest = HUGE_VAL, largest = 0.0;
+        for (const double entry : line) {
+          if (entry == 0.0) continue;
+          smallest = std::min(smallest, std::abs(entry));
+          largest = std::max(largest, std::abs(entry));
+        }
+        if (largest > 0.0) {
+          const double factor = std::exp2(-std::round(0.5 * (std::log2(smallest) + std::log2(largest))));
+          line *= factor;
+          scales[i] *= factor;
+          changed = changed || factor != 1.0;
+        }
+        ++i;
+      }
+    };
+    for (int sweep = 0; sweep < sweeps; ++sweep) {
+      scale_all(matrix_.rowwise(), rows_);
+      scale_all(matrix_.colwise(), columns_);
+    }
+    return changed;
+  }
+
+  std::unique_ptr<LinearSolver> lu_;
+  int size_;
+  Eigen::MatrixXd matrix_;
+  Eigen::VectorXd rows_, columns_;
+  bool scaled_ = false;
+};
+
 /// Up to this size plain loops are faster than Eigen's blocks.
 constexpr int largest_small = 32;
 constexpr std::size_t largest_fixed = 16;
 
 template <int N>
 std::unique_ptr<LinearSolver> small_lu(int size) {
-  return std::make_unique<SmallLu<N>>(size);
+  return std::make_unique<FullLu<N>>(size);
 }
 
 template <std::size_t... N>
@@ -138,9 +135,13 @@ constexpr auto small_lu_of_each_size(std::index_sequence<N...>) {
 
 std::unique_ptr<LinearSolver> make_dense_lu(int size) {
   static constexpr auto make = small_lu_of_each_size(std::make_index_sequence<largest_fixed + 1>());
-  if (size > largest_small) return std::make_unique<DenseLu>(size);
   const auto length = static_cast<std::size_t>(size);
-  return make.at(length <= largest_fixed ? length : 0)(size);
+  std::unique_ptr<LinearSolver> lu;
+  if (size > largest_small)
+    lu = std::make_unique<DenseLu>(size);
+  else
+    lu = make.at(length <= largest_fixed ? length : 0)(size);
+  return std::make_unique<Scaled>(std::move(lu), size);
 }
 
 std::unique_ptr<LinearSolver> make_linear_solver(const SparsityPattern& pattern) {

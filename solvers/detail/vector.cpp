@@ -98,6 +98,8 @@ constexpr std::size_t longest_fixed = 16;
 struct Weights {
   std::array<Run, 4> runs{};
   std::size_t count = 0;
+  const double *scales = nullptr;  ///< of every entry; null where the runs say all
+  long length = 0;
 
   static Weights &of(N_Vector w) { return *static_cast<Weights *>(w->content); }
   static bool are(N_Vector w) { return w->ops->nvmin == minimum; }
@@ -105,8 +107,11 @@ struct Weights {
   /// Calls visit(first, behind the last, weight) for each run.
   template <class Visit>
   static void for_each(N_Vector w, Visit visit) {
+    const Weights &weights = of(w);
+    for (long i = 0; weights.scales != nullptr && i < weights.length; ++i)
+      visit(i, i + 1, 1.0 / weights.scales[i]);
     long first = 0;
-    for (const Run &run : std::span(of(w).runs).first(of(w).count)) {
+    for (const Run &run : std::span(weights.runs).first(weights.count)) {
       visit(first, first + run.length, run.value);
       first += run.length;
     }
@@ -176,7 +181,9 @@ VectorHandle make_weights(N_Vector vector) {
   if (N_VGetLength(vector) <= static_cast<long>(longest_fixed))
     return VectorHandle(require(clone(vector), "N_VClone"));
   VectorHandle w(require(N_VNewEmpty(vector->sunctx), "N_VNewEmpty"));
-  w->content = new Weights;  // NOLINT(cppcoreguidelines-owning-memory): nvdestroy deletes it
+  auto *const content = new Weights;  // NOLINT(cppcoreguidelines-owning-memory): nvdestroy deletes it
+  content->length = N_VGetLength(vector);
+  w->content = content;
   w->ops->nvdestroy = [](N_Vector v) {
     delete static_cast<Weights *>(v->content);  // NOLINT(cppcoreguidelines-owning-memory)
     N_VFreeEmpty(v);
@@ -187,12 +194,23 @@ VectorHandle make_weights(N_Vector vector) {
 
 void set_weights(N_Vector weights, std::span<const Run> runs) {
   if (Weights::are(weights)) {
+    Weights::of(weights).scales = nullptr;
     Weights::of(weights).count = runs.size();
     std::ranges::copy(runs, Weights::of(weights).runs.begin());
     return;
   }
   double *to = data_of(weights);
   for (const Run &run : runs) to = std::fill_n(to, run.length, run.value);
+}
+
+void set_weights(N_Vector weights, const double *scales) {
+  if (Weights::are(weights)) {
+    Weights::of(weights).scales = scales;
+    Weights::of(weights).count = 0;
+    return;
+  }
+  const long length = N_VGetLength(weights);
+  for (long i = 0; i < length; ++i) data_of(weights)[i] = 1.0 / scales[i];
 }
 
 }  // namespace diracstep::detail

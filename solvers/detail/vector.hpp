@@ -23,5 +23,7 @@ struct Run {
 /// long runs, at most four: of a long vector only these are kept.
 VectorHandle make_weights(N_Vector vector);
 void set_weights(N_Vector weights, std::span<const Run> runs);
+/// Weights that are all different, the inverses of these scales, which must stay where they are.
+void set_weights(N_Vector weights, const double* scales);
 
 }  // namespace diracstep::detail

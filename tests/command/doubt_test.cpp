@@ -115,6 +115,47 @@ step = 2
   }
 }
 
+/// Relative to the energies at play, whatever these are in joules.
+TEST_F(Doubt, TheErrorOfTheEnergyHasNoUnit) {
+  const auto energy_error = [&](const std::string& mass) {
+    const std::string file = scene("oscillator",
+                                   "lagrangian = \"m*(v_x^2 - x^2)/2\"\n[coordinates]\nx = {}\n"
+                                   "[parameters]\nm = " +
+                                       mass + "\n[start]\nx = 1\n[span]\nend = 3\nstep = 0.1\n");
+    return Json::parse(run("run " + file + " --method type1/trapezoidal --json").out)["energy_error"]
+        .get<double>();
+  };
+  const double of_one = energy_error("1");
+  EXPECT_NEAR(of_one, 4.89e-5, 1e-7);
+  for (const char* mass : {"1e-9", "1e9"}) EXPECT_NEAR(energy_error(mass), of_one, 1e-12) << mass;
+}
+
+/// What is left of a motion at rest is round-off, and so are the energies at play.
+TEST_F(Doubt, IsNotRaisedAtRest) {
+  for (const char* rest : {"hanging_chain --set N=8 --set g=0", "andrews_squeezer --set mom=0"}) {
+    const Outcome outcome = run(std::string("run ") + rest);
+    EXPECT_EQ(outcome.status, 0) << rest << outcome.err;
+  }
+}
+
+/// A drag that follows a fast drive: variable steps would take a thousand times those of the scene.
+TEST_F(Doubt, APlanDoesNotAdviseVariableStepsThatAreTooMany) {
+  const std::string file = scene("drag", R"toml(
+lagrangian = "v_x^2/2"
+[coordinates]
+x = {}
+[force]
+x = "-1e6*(v_x - sin(2000*t))"
+[span]
+end = 1
+step = 1e-3
+)toml");
+  const Outcome outcome = run("plan " + file);
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_NE(outcome.out.find("they would take about"), std::string::npos) << outcome.out;
+  EXPECT_EQ(outcome.out.find("pay: --adaptive"), std::string::npos) << outcome.out;
+}
+
 TEST_F(Doubt, AnErrorThatEqualRunsWouldStateIsNotStated) {
   const Outcome outcome = run("run vertical_rolling_disk --end 1 --step 10 --error 1e-6 --json");
   const Json json = Json::parse(outcome.out);

@@ -1,5 +1,6 @@
 #include <cmath>
 #include <cstdlib>
+#include <fstream>
 #include <nlohmann/json.hpp>
 #include <regex>
 
@@ -117,6 +118,25 @@ TEST_F(RunCommand, SetChangesAParameter) {
   const Json json = Json::parse(run("run kepler_e06 --set e=0.25 --end 1 --json").out);
   EXPECT_EQ(json["parameters"]["e"], 0.25);
   EXPECT_LT(json["error_q"].get<double>(), 1e-2);  // the reference has the same eccentricity
+}
+
+/// A pendulum of the length 1e-9 beside a coordinate that moves at 1e9: without a tolerance of its own it is
+/// solved to 1e-15 of the other.
+TEST_F(RunCommand, AToleranceOfACoordinateIsTaken) {
+  const std::string file = path("small.toml");
+  std::ofstream(file) << "name = \"small\"\nlagrangian = \"v_x^2/2 + a^2*cos(x/a) + v_y^2/2\"\n"
+                         "[coordinates]\nx = {}\ny = {}\n[parameters]\na = 1e-9\nu = 0\n"
+                         "[start]\nx = \"a\"\nv_y = \"u\"\n[span]\nend = 10\nstep = 0.1\n";
+  const auto end_of_x = [&](const std::string& options) {
+    const Outcome outcome = run("run " + file + " --json --doubt ignore " + options);
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+    return nlohmann::json::parse(outcome.out)["end"]["q"]["x"].get<double>();
+  };
+  const double alone = end_of_x("");
+  EXPECT_GT(std::abs(end_of_x("--set u=1e9") - alone), 1e-10);
+  EXPECT_NEAR(end_of_x("--set u=1e9 --tolerance x=1e-24"), alone, 1e-18);
+  EXPECT_NE(run("run " + file + " --tolerance z=1").err.find("no coordinate 'z'"), std::string::npos);
+  EXPECT_EQ(run("run " + file + " --tolerance x=-1").status, 2);
 }
 
 TEST_F(RunCommand, NonConvergenceIsToldAndKeepsWhatWasComputed) {

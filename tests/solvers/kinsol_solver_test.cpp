@@ -1,7 +1,9 @@
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/numerics/row_scales.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
 #include <stdexcept>
 
@@ -240,6 +242,45 @@ TEST(Kinsol, ExceptionsOfTheProblemPassThroughAndLeaveTheSolverUsable) {
   expect_thrown("jacobian");
   jacobians_left = 1;
   expect_thrown("jacobian");
+}
+
+/// 1e20 (x − 1) = 0 and, beside it in the same block, y² = square.
+class HeavyAndLight final : public NonlinearProblem {
+ public:
+  explicit HeavyAndLight(double square) : square_(square) {}
+
+  int size() const override { return 2; }
+  const SparsityPattern& pattern() const override { return pattern_; }
+  std::span<const ResidualBlock> blocks() const override { return blocks_; }
+  void residual(ConstVectorRef x, VectorRef f) override {
+    f[0] = mass * (x[0] - 1.0);
+    f[1] = x[1] * x[1] - square_;
+    last_ = x;
+  }
+  void jacobian(ConstVectorRef x, VectorRef values) override { values << mass, 0.0, 0.0, 2.0 * x[1]; }
+  const double* scales_of_unsolved_rows(ConstVectorRef f, double level) override {
+    scales_.set(0, Vector{{mass, std::abs(square_) + last_[1] * last_[1]}}, Vector::Zero(2), mass);
+    return scales_.unsolved(f, level);
+  }
+
+ private:
+  static constexpr double mass = 1e20;
+  double square_;
+  SparsityPattern pattern_ = SparsityPattern::dense(2, 2);
+  std::array<ResidualBlock, 1> blocks_{{{"row", 2, mass}}};
+  RowScales scales_{2};
+  Vector last_;
+};
+
+TEST(Kinsol, ALightRowIsSolvedBesideAHeavyOneThatIsSolvedAlready) {
+  HeavyAndLight problem(2.0);
+  Vector x{{1.0, 1.5}};
+  const SolveReport report = kinsol()(problem)->solve(x);
+  EXPECT_TRUE(report.ok());
+  EXPECT_EQ(x[0], 1.0);
+  EXPECT_NEAR(x[1], std::sqrt(2.0), 4.0 * epsilon);
+  HeavyAndLight impossible(-2.0);
+  EXPECT_FALSE(kinsol()(impossible)->solve(x).ok());
 }
 
 }  // namespace

@@ -61,9 +61,10 @@ Finding examine_rank(const Scene& scene) {
     finding.detail +=
         fmt::format("{}'{}'", &name == dependent.data() ? "; follows from the others: " : ", ", name);
   if (dependent.empty()) return finding;
-  finding.detail += singular_at_start_only(scene, scene.start)
-                        ? "; not so at poses near it: the start is singular, move it"
-                        : "; remove it, or leave it out with --drop-redundant or redundant = \"drop\"";
+  const std::string kept_for = why_not_left_out(row_dependence(scene, scene.start, dependent));
+  finding.detail += kept_for.empty()
+                        ? "; remove it, or leave it out with --drop-redundant or redundant = \"drop\""
+                        : "; " + kept_for;
   return finding;
 }
 

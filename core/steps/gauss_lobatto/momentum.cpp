@@ -1,3 +1,4 @@
+#include <cmath>
 #include <diracstep/core/numerics/combination.hpp>
 #include <diracstep/core/steps/gauss_lobatto/momentum.hpp>
 #include <utility>
@@ -35,18 +36,16 @@ void StageMomentum::plan(BlockPattern& layout) const {
 }
 
 void StageMomentum::evaluate(const StagePoints& at, ConstVectorRef x) {
-  for (int i = 0; i < s_; ++i) {
-    const auto v = x.segment(n_ * i, n_);
-    lagrangian_->gradient(at.gauss_time(i), at.gauss.col(i), v, lq_.col(i), lv_.col(i));
-    if (!force_) continue;
-    force_->value(at.gauss_time(i), at.gauss.col(i), v, f_);
+  lagrangian_->gradients(at.at_gauss(x.data()), lq_.data(), lv_.data());
+  for (int i = 0; force_ && i < s_; ++i) {
+    force_->value(at.gauss_time(i), at.gauss.col(i), x.segment(n_ * i, n_), f_);
     lq_.col(i) += f_;
   }
 }
 
 bool StageMomentum::second_derivatives(const StagePoints& at, ConstVectorRef x) {
   const bool taken = !hessians_known_;
-  for (int i = 0; taken && i < s_; ++i) second_derivatives(at, x, i);
+  if (taken) lagrangian_->hessians(at.at_gauss(x.data()), lqq_.data(), lqv_.data(), lvv_.data());
   for (int i = 0; force_ && i < s_; ++i)
     force_->derivatives(at.gauss_time(i), at.gauss.col(i), x.segment(n_ * i, n_), fq_.col(i), fv_.col(i));
   if (taken) hessians_known_ = lagrangian_->structure().quadratic && all_finite();
@@ -78,6 +77,21 @@ void StageMomentum::set_jacobian(const StagePoints& at, const BlockPattern& layo
   jacobian_step_ = at.step.size;
 }
 
+void StageMomentum::place(StageArrays& arrays) {
+  arrays.lagrangian = lagrangian_.get();
+  arrays.lq = lq_.data();
+  arrays.lv = lv_.data();
+  arrays.lqq = lqq_.data();
+  arrays.lqv = lqv_.data();
+  arrays.lvv = lvv_.data();
+}
+
+bool StageMomentum::jacobian_known(const StagePoints& at) {
+  const bool known = hessians_known_ && jacobian_step_ == at.step.size;
+  jacobian_step_ = hessians_known_ ? at.step.size : 0.0;
+  return known;
+}
+
 void StageMomentum::add_block(const StagePoints& at, const BlockPattern& layout, int i, int k,
                               VectorRef& values) {
   const StageWeights& weights = at.weights;
@@ -107,6 +121,27 @@ void StageMomentum::evaluate_start(const StagePoints& at, ConstVectorRef v0) {
   const auto q0 = at.lobatto.col(0);
   lagrangian_->gradient(t, q0, v0, lq_.col(0), lv_.col(0));
   lagrangian_->hessian(t, q0, v0, lqq_.col(0), lqv_.col(0), lvv_.col(0));
+  if (!force_) return;
+  force_->value(t, q0, v0, f_);
+  lq_.col(0) += f_;
+}
+
+void StageMomentum::prepare_sizes(const StagePoints& at, ConstVectorRef x) {
+  if (!hessians_known_) second_derivatives(at, x, 0);
+  if (force_) force_->derivatives(at.gauss_time(0), at.gauss.col(0), x.head(n_), fq_.col(0), fv_.col(0));
+}
+
+void StageMomentum::add_sizes(double h, const Vector& q, const Vector& v, Vector& sizes) const {
+  pattern().for_each([&](Eigen::Index e, int r, int c) {
+    const double by_velocity = std::abs(lvv_(e, 0)) + h * std::abs(lqv_(e, 0)) + h * h * std::abs(lqq_(e, 0));
+    sizes[r] += by_velocity * std::abs(v[c]) + h * std::abs(lqq_(e, 0) * q[c]);
+    sizes[c] += std::abs(lqv_(e, 0)) * (std::abs(q[r]) + h * std::abs(v[r]));
+  });
+  if (!force_) return;
+  force_->pattern().for_each([&](Eigen::Index e, int r, int c) {
+    const double by_velocity = h * std::abs(fv_(e, 0)) + h * h * std::abs(fq_(e, 0));
+    sizes[r] += by_velocity * std::abs(v[c]) + h * std::abs(fq_(e, 0) * q[c]);
+  });
 }
 
 }  // namespace diracstep

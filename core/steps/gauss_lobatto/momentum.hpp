@@ -1,5 +1,6 @@
 #pragma once
 
+#include <diracstep/core/steps/gauss_lobatto/fixed_stages.hpp>
 #include <diracstep/core/steps/gauss_lobatto/points.hpp>
 #include <diracstep/core/system/force.hpp>
 #include <diracstep/core/system/phase_function.hpp>
@@ -38,8 +39,19 @@ class StageMomentum {
   const SparsityPattern& pattern() const { return lagrangian_->pattern(); }  ///< of second derivatives
   auto mass(int stage) const { return lvv_.col(stage); }                     ///< ∂²L/∂v², values
 
-  /// ∂L/∂q and ∂²L/∂q² at the start of the step in place of the first node, to know their size.
+  /// Where its derivatives stand.
+  void place(StageArrays& arrays);
+  /// Whether the part of L in the Jacobian is the one of the last Jacobian.
+  bool jacobian_known(const StagePoints& at);
+
+  /// ∂L/∂q + f and ∂²L/∂q² at the start of the step in place of the first node, to know their size.
   void evaluate_start(const StagePoints& at, ConstVectorRef v0);
+
+  /// The second derivatives at the first node, as they are needed for add_sizes().
+  void prepare_sizes(const StagePoints& at, ConstVectorRef x);
+  /// sizes += those of the terms that make up ∂L/∂v and h (∂L/∂q + f) and may cancel in them, coordinate by
+  /// coordinate, for positions q and velocities v: second derivatives times these.
+  void add_sizes(double h, const Vector& q, const Vector& v, Vector& sizes) const;
 
  private:
   bool all_finite() const;

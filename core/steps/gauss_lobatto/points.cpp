@@ -28,6 +28,17 @@ void StageWeights::scale_to(double h) {
 StagePoints::StagePoints(int stages, int dimension) : weights(stages) {
   gauss.setZero(dimension, stages);
   lobatto.setZero(dimension, stages + 1);
+  gauss_times.setZero(stages);
+  lobatto_times.setZero(stages + 1);
+}
+
+void StagePoints::begin(Interval interval) {
+  step = interval;
+  weights.scale_to(step.size);
+  const GaussLobattoTableau& table = weights.table;
+  for (Eigen::Index i = 0; i < gauss_times.size(); ++i) gauss_times[i] = step.start + table.c[i] * step.size;
+  for (Eigen::Index j = 0; j < lobatto_times.size(); ++j)
+    lobatto_times[j] = step.start + table.lobatto_c[j] * step.size;
 }
 
 }  // namespace diracstep

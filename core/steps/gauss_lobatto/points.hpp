@@ -3,6 +3,7 @@
 #include <diracstep/core/dirac/generating_function.hpp>
 #include <diracstep/core/numerics/types.hpp>
 #include <diracstep/core/steps/gauss_lobatto/tableau.hpp>
+#include <diracstep/core/system/point_columns.hpp>
 
 namespace diracstep {
 
@@ -32,11 +33,22 @@ class StageWeights {
 struct StagePoints {
   StagePoints(int stages, int dimension);
 
-  double gauss_time(int i) const { return step.start + weights.table.c[i] * step.size; }
-  double lobatto_time(int j) const { return step.start + weights.table.lobatto_c[j] * step.size; }
+  /// The times and the weights of this step.
+  void begin(Interval interval);
+
+  double gauss_time(int i) const { return gauss_times[i]; }
+  double lobatto_time(int j) const { return lobatto_times[j]; }
+  /// The Gauss nodes, with what else is given there; `count` Lobatto nodes from `first` on.
+  PointColumns at_gauss(const double* y = nullptr) const {
+    return {static_cast<int>(gauss.cols()), gauss_times.data(), gauss.data(), y};
+  }
+  PointColumns at_lobatto(int first, int count) const {
+    return {count, lobatto_times.data() + first, lobatto.data() + lobatto.rows() * first};
+  }
 
   StageWeights weights;
   Interval step{0.0, 1.0};
+  Vector gauss_times, lobatto_times;
   Columns gauss;    ///< Q_i, i = 1 … s
   Columns lobatto;  ///< Q~_j, j = 0 … s, the first of them q0
 };

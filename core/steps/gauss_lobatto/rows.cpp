@@ -8,14 +8,21 @@
 namespace diracstep {
 
 StageRows::StageRows(std::shared_ptr<const ConstraintRows> rows, int stages, int first, int stride)
-    : rows_(std::move(rows)), s_(stages), n_(rows_->dimension()), first_(first), stride_(stride) {
+    : rows_(std::move(rows)),
+      s_(stages),
+      n_(rows_->dimension()),
+      first_(first),
+      stride_(stride),
+      leading_(rows_->pattern()) {
   const int nonzeros = rows_->pattern().nonzeros(), curved = curvature_pattern().nonzeros();
   at_lobatto_.setZero(nonzeros, s_ + 1);
   at_gauss_.setZero(nonzeros, s_);
   curvature_.setZero(curved, s_);
-  derivative_.setZero(nonzeros);
+  derivative_.setZero(nonzeros, s_);
   sum_.setZero(curved);
-  offset_.setZero(rows_->rows());
+  for (Columns* at_nodes : {&offset_, &positions_, &multipliers_}) at_nodes->setZero(rows_->rows(), s_);
+  lambda_.setZero(rows_->rows());
+  start_curvature_.setZero(rows_->curvature_pattern().nonzeros());
 }
 
 const SparsityPattern& StageRows::curvature_pattern() const {
@@ -34,44 +41,40 @@ void StageRows::plan(BlockPattern& layout) {
     }
 }
 
-void StageRows::evaluate_lobatto(const StagePoints& at, int j) {
-  rows_->coefficients(at.lobatto_time(j), at.lobatto.col(j), at_lobatto_.col(j), offset_);
-}
-
-void StageRows::evaluate_gauss(const StagePoints& at, int j) {
-  rows_->coefficients(at.gauss_time(j), at.gauss.col(j), at_gauss_.col(j), offset_);
+void StageRows::evaluate_lobatto(const StagePoints& at, int first, int count) {
+  rows_->coefficients_at(at.at_lobatto(first, count), at_lobatto_.col(first).data(), offset_.data());
 }
 
 void StageRows::add_impulses(const StagePoints& at, ConstVectorRef x, Columns& impulses) {
   gauss_known_ = false;
+  if (s_ > 1) evaluate_lobatto(at, 1, s_ - 1);
   for (int j = 0; j < s_; ++j) {
-    if (j > 0) evaluate_lobatto(at, j);
     rows_->pattern().transposed_multiply_add(at_lobatto_.col(j).data(), x.data() + first_ + stride_ * j,
                                              impulses.col(j).data());
   }
 }
 
 void StageRows::residual(const StagePoints& at, ConstVectorRef x, VectorRef& f) {
-  const double per_step = 1.0 / at.step.size;
-  for (int j = 0; j < s_; ++j) {
-    auto out = f.segment(first_ + stride_ * j, rows_->rows());
-    if (rows_->holonomic()) {
-      rows_->position(at.lobatto_time(j + 1), at.lobatto.col(j + 1), out);
-      out *= per_step;
-      continue;
-    }
-    evaluate_gauss(at, j);
-    out = offset_;
-    rows_->pattern().multiply_add(at_gauss_.col(j).data(), x.data() + n_ * j, out.data());
+  const int m = rows_->rows();
+  if (rows_->holonomic()) {
+    rows_->positions(at.at_lobatto(1, s_), positions_.data());
+    const double per_step = 1.0 / at.step.size;
+    for (int j = 0; j < s_; ++j)
+      for (int r = 0; r < m; ++r) f[first_ + stride_ * j + r] = per_step * positions_(r, j);
+    return;
   }
+  rows_->coefficients_at(at.at_gauss(), at_gauss_.data(), offset_.data());
   gauss_known_ = true;
+  for (int j = 0; j < s_; ++j) {
+    double* const out = f.data() + first_ + stride_ * j;
+    std::copy_n(offset_.data() + m * j, m, out);
+    rows_->pattern().multiply_add(at_gauss_.col(j).data(), x.data() + n_ * j, out);
+  }
 }
 
 void StageRows::add_to_jacobian(const StagePoints& at, const BlockPattern& layout, ConstVectorRef x,
                                 VectorRef& values) {
-  for (int j = 1; j < s_; ++j)
-    rows_->annihilator_derivative(at.lobatto_time(j), at.lobatto.col(j),
-                                  x.segment(first_ + stride_ * j, rows_->rows()), curvature_.col(j));
+  second_derivatives(at, x);
   for (int i = 0; i < s_; ++i)
     for (int k = 0; k < s_; ++k) {
       const int place = first_layout_ + 3 * (i * s_ + k);
@@ -81,24 +84,44 @@ void StageRows::add_to_jacobian(const StagePoints& at, const BlockPattern& layou
               curvature_.col(1).data(), nullptr, sum_.data());
       layout.add_to(values.data(), place + 1, 1.0, sum_.data());
     }
-  for (int j = 0; j < s_; ++j) add_constraint(at, layout, j, x, values);
+  for (int j = 0; j < s_; ++j) add_constraint(at, layout, j, values);
 }
 
-void StageRows::add_constraint(const StagePoints& at, const BlockPattern& layout, int j, ConstVectorRef x,
-                               VectorRef& values) {
+void StageRows::evaluate_constraint(const StagePoints& at) {
+  if (rows_->holonomic()) return evaluate_lobatto(at, s_, 1);  // no impulse enters there
+  if (!gauss_known_) rows_->coefficients_at(at.at_gauss(), at_gauss_.data(), offset_.data());
+  gauss_known_ = true;
+}
+
+void StageRows::second_derivatives(const StagePoints& at, ConstVectorRef x) {
+  evaluate_constraint(at);
+  if (!rows_->holonomic()) rows_->derivatives(at.at_gauss(x.data()), derivative_.data());
+  if (s_ == 1) return;
+  for (int j = 1; j < s_; ++j) multipliers_.col(j) = x.segment(first_ + stride_ * j, rows_->rows());
+  rows_->annihilator_derivatives(at.at_lobatto(1, s_ - 1), multipliers_.col(1).data(),
+                                 curvature_.col(1).data());
+}
+
+void StageRows::place(StageArrays& arrays) {
+  arrays.rows = rows_.get();
+  arrays.at_lobatto = at_lobatto_.data();
+  arrays.at_gauss = at_gauss_.data();
+  arrays.offset = offset_.data();
+  arrays.curvature = curvature_.data();
+  arrays.derivative = derivative_.data();
+}
+
+void StageRows::add_constraint(const StagePoints& at, const BlockPattern& layout, int j, VectorRef& values) {
   const auto place = [&](int k) { return first_layout_ + 3 * (j * s_ + k) + 2; };
   if (rows_->holonomic()) {
-    if (j + 1 == s_) evaluate_lobatto(at, s_);  // no impulse enters there
     for (int k = 0; k < s_; ++k)
       layout.add_to(values.data(), place(k), at.weights.table.lobatto_a(j + 1, k),
                     at_lobatto_.col(j + 1).data());
     return;
   }
-  if (!gauss_known_) evaluate_gauss(at, j);
   layout.add_to(values.data(), place(j), 1.0, at_gauss_.col(j).data());
-  rows_->derivative(at.gauss_time(j), at.gauss.col(j), x.segment(n_ * j, n_), 1.0, derivative_);
   for (int k = 0; k < s_; ++k)
-    layout.add_to(values.data(), place(k), at.weights.position(k, j), derivative_.data());
+    layout.add_to(values.data(), place(k), at.weights.position(k, j), derivative_.col(j).data());
 }
 
 double StageRows::form_size() const { return largest_entry(at_lobatto_.col(0).data(), at_lobatto_.rows()); }
@@ -116,6 +139,34 @@ double StageRows::impulse_size(ConstVectorRef multipliers) const {
 
 double StageRows::curvature_size() const {
   return s_ == 1 ? 0.0 : largest_entry(curvature_.data(), curvature_.size());
+}
+
+void StageRows::add_impulse_sizes(const StagePoints& at, ConstVectorRef x, const Vector& q, Vector& sizes) {
+  lambda_.setZero();
+  for (int j = 0; j < s_; ++j) lambda_ += x.segment(first_ + stride_ * j, rows_->rows()).cwiseAbs();
+  rows_->pattern().for_each(
+      [&](Eigen::Index e, int r, int c) { sizes[c] += std::abs(at_lobatto_(e, 0) * lambda_[r]); });
+  rows_->annihilator_derivative(at.lobatto_time(0), at.lobatto.col(0), lambda_, start_curvature_);
+  rows_->curvature_pattern().for_each(
+      [&](Eigen::Index e, int r, int c) { sizes[r] += std::abs(start_curvature_[e] * q[c]); });
+}
+
+void StageRows::size_terms(double h, const Vector& q, const Vector& v, Vector& sizes) {
+  leading_.add_up(rows_->pattern(), sizes.data() + first(), [&](Eigen::Index e, int c) {
+    return std::abs(at_lobatto_(e, 0)) * (std::abs(q[c]) / h + std::abs(v[c]));
+  });
+}
+
+double form_size(const std::vector<StageRows>& all) {
+  double largest = 0.0;
+  for (const StageRows& rows : all) largest = std::max(largest, rows.form_size());
+  return largest;
+}
+
+double impulse_size(const std::vector<StageRows>& all, ConstVectorRef multipliers) {
+  double largest = 0.0;
+  for (const StageRows& rows : all) largest = std::max(largest, rows.impulse_size(multipliers));
+  return largest;
 }
 
 }  // namespace diracstep

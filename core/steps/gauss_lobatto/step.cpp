@@ -1,15 +1,17 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <diracstep/core/numerics/combination.hpp>
 #include <diracstep/core/numerics/scales.hpp>
-#include <diracstep/core/steps/gauss_lobatto/compensated_sums.hpp>
 #include <diracstep/core/steps/gauss_lobatto/momentum.hpp>
 #include <diracstep/core/steps/gauss_lobatto/points.hpp>
+#include <diracstep/core/steps/gauss_lobatto/row_scales.hpp>
 #include <diracstep/core/steps/gauss_lobatto/rows.hpp>
 #include <diracstep/core/steps/gauss_lobatto/sizes.hpp>
 #include <diracstep/core/steps/gauss_lobatto/splitting.hpp>
 #include <diracstep/core/steps/gauss_lobatto/step.hpp>
+#include <diracstep/core/steps/gauss_lobatto/step_sums.hpp>
+#include <diracstep/core/system/length_of_rows.hpp>
+#include <functional>
 #include <optional>
 
 namespace diracstep {
@@ -35,8 +37,11 @@ class GaussLobattoStep final : public StepProblem {
         n_(scene.dimension()),
         m_(scene.rows()),
         points_(s, n_),
+        sums_(s, n_, m_),
         momentum_(scene.lagrangian, scene.force, s, dense),
         layout_(size(), size()),
+        row_scales_(s_, scene),
+        length_(length_of_rows(scene)),
         affine_(affine(scene)) {
     int row = n_ * s_;
     for (const auto& block : scene.constraints) {
@@ -46,13 +51,11 @@ class GaussLobattoStep final : public StepProblem {
     last_x_.setZero(size());
     impulses_.setZero(n_, s_);
     p0_.setZero(n_);
-    const auto holonomic = [](const auto& block) { return block->holonomic(); };
-    const auto kinds = std::ranges::count_if(scene.constraints, holonomic);
-    if (n_ + m_ <= largest_split && (kinds == 0 || kinds == std::ssize(scene.constraints)))
-      splitting_.emplace(points_.weights.table, m_, kinds > 0, *scene.lagrangian);
+    if (n_ + m_ <= largest_split) splitting_.emplace(points_.weights.table, rows_, *scene.lagrangian);
     momentum_.plan(layout_);
     for (StageRows& rows : rows_) rows.plan(layout_);
     pattern_ = layout_.assemble(dense);
+    if (dense && !scene.force && rows_.size() <= 1) fixed_ = fixed_stages(arrays());
     blocks_.push_back({"momentum", n_ * s_});
     if (m_ > 0) blocks_.push_back({"constraint", m_ * s_});
   }
@@ -74,7 +77,8 @@ class GaussLobattoStep final : public StepProblem {
   }
 
   bool compensate() override {
-    sums_.emplace(s_, n_);
+    sums_.compensate();
+    fixed_.reset();
     return true;
   }
 
@@ -82,20 +86,38 @@ class GaussLobattoStep final : public StepProblem {
 
   bool has_splitting() const override { return splitting_.has_value(); }
   void solve_splitting(VectorRef f) override {
-    if (!splitting_known_) splitting_->move_to(points_, momentum_, rows_, last_x_);
+    if (!splitting_known_) take_splitting();
     splitting_known_ = true;
-    splitting_->solve(f);
+    if (fixed_)
+      fixed_->solve_splitting(f.data());
+    else
+      splitting_->solve(f);
   }
+  Contraction contract(VectorRef x, VectorRef f, const ContractionLimits& limits) override {
+    const bool at_rest_in_origin = m_ > 0 && blocks_[1].scale <= smallest_scale;  // then scales follow x
+    if (!fixed_ || at_rest_in_origin) return StepProblem::contract(x, f, limits);
+    evaluated_ = false;
+    const auto prepare = [&] {
+      evaluated_at(x.data());
+      take_splitting();
+    };
+    FixedStages::Scales scales{blocks_[0].scale, m_ > 0 ? blocks_[1].scale : 1.0,
+                               sizes_.row_curvature * sizes_.position};
+    const Contraction end = fixed_->contract(x.data(), f.data(), limits, scales, std::ref(prepare));
+    blocks_[0].scale = scales.momentum;
+    if (!scales.moved) evaluated_at(x.data());
+    return end;
+  }
+
   void begin(Interval step, const State& start, const StepMemory& memory) override {
-    points_.step = step;
-    points_.weights.scale_to(step.size);
-    if (sums_) sums_->begin(start.rest);
+    points_.begin(step);
+    sums_.begin(start);
     p0_ = start.p;
     points_.lobatto.col(0) = start.q;
     splitting_known_ = false;
     sizes_.begin(memory, largest_entry(start.q.data(), start.q.size()));
     for (StageRows& rows : rows_) rows.begin(points_);
-    last_impulse_ = memory.known && m_ > 0 ? impulse_scale(memory.multipliers) : 0.0;
+    last_impulse_ = memory.known && m_ > 0 ? impulse_scale(impulse_size(rows_, memory.multipliers)) : 0.0;
     update_scales();
     evaluated_ = false;
   }
@@ -108,63 +130,69 @@ class GaussLobattoStep final : public StepProblem {
 
   void residual(ConstVectorRef x, VectorRef f) override {
     evaluate(x);
-    const Columns& lv = momentum_.momenta();
-    for (int i = 0; i < s_; ++i) {
-      double* const momentum = f.data() + n_ * i;
-      if (sums_) {
-        sums_->momentum_row(i, step_size(), lv.col(i), p0_, momentum_.forces(), impulses_,
-                            f.segment(n_ * i, n_));
-        continue;
-      }
-      for_each_piece(n_, [&](int first, int rows) {
-        for (int k = first; k < first + rows; ++k) momentum[k] = lv(k, i) - p0_[k];
-        add_forces_and_impulses(first, rows, &points_.weights.force(0, i), &points_.weights.impulse(0, i),
-                                momentum, momentum);
-      });
+    if (fixed_) {
+      fixed_->residual(x.data(), f.data());
+      if (m_ > 0) rows_.front().set_gauss_known(true);
+      return;
     }
+    sums_.momentum_rows(points_, momentum_, p0_, impulses_, f);
     for (StageRows& rows : rows_) rows.residual(points_, x, f);
   }
 
   void jacobian(ConstVectorRef x, VectorRef values) override {
     evaluate(x);
     if (momentum_.second_derivatives(points_, x)) sizes_.curvature = curvature_size();
-    momentum_.set_jacobian(points_, layout_, values);
+    if (fixed_) {
+      for (StageRows& rows : rows_) rows.second_derivatives(points_, x);
+      fixed_->jacobian(momentum_.jacobian_known(points_), values.data());
+    } else {
+      momentum_.set_jacobian(points_, layout_, values);
+      for (StageRows& rows : rows_) rows.add_to_jacobian(points_, layout_, x, values);
+    }
     sizes_.row_curvature = 0.0;
-    for (StageRows& rows : rows_) {
-      rows.add_to_jacobian(points_, layout_, x, values);
+    for (const StageRows& rows : rows_) {
       sizes_.row_curvature = std::max(sizes_.row_curvature, rows.curvature_size());
     }
   }
 
+  const double* scales_of_unsolved_rows(ConstVectorRef f, double level) override {
+    return row_scales_.unsolved({points_, momentum_, rows_, p0_, last_x_}, f, level, blocks_, part());
+  }
+
   void finish(ConstVectorRef x, StepEnd& end) override {
     evaluate(x);
-    const StageWeights& weights = points_.weights;
-    const auto q0 = points_.lobatto.col(0);
-    if (sums_) {
-      sums_->end(step_size(), q0, p0_, velocities(x), momentum_.forces(), impulses_, end);
-    } else {
-      end.at.q.resize(n_);
-      end.at.p.resize(n_);
-      if (m_ > 0) end.at.q = points_.lobatto.col(s_);
-      for_each_piece(n_, [&](int first, int rows) {
-        if (m_ == 0)  // nothing else looks there
-          combine_piece(first, rows, n_, s_, &weights.lobatto(0, s_), x.data(), points_.lobatto.data(),
-                        end.at.q.data());
-        add_forces_and_impulses(first, rows, weights.end_force.data(), weights.table.lobatto_b.data(),
-                                p0_.data(), end.at.p.data());
-      });
-    }
-    end.at.v = (end.at.q - q0) / step_size();
+    sums_.end(points_, momentum_, p0_, impulses_, x, end);
+    end.at.v = (end.at.q - points_.lobatto.col(0)) / step_size();
     // The impulse at q0 is that part of λ_0 which enters there.
-    end.impulse = weights.table.lobatto_b[0] * x.segment(n_ * s_, m_);
+    end.impulse = points_.weights.table.lobatto_b[0] * x.segment(n_ * s_, m_);
     measure(x, end.memory);
   }
 
  private:
+  /// The arrays hold what belongs to this x, as far as the residual looks at it.
+  void evaluated_at(const double* x) {
+    std::copy_n(x, size(), last_x_.data());
+    evaluated_ = true;
+    if (m_ > 0) rows_.front().set_gauss_known(true);
+  }
+
+  StageArrays arrays() {
+    StageArrays arrays{};
+    arrays.points = &points_;
+    arrays.p0 = p0_.data();
+    arrays.impulses = impulses_.data();
+    momentum_.place(arrays);
+    for (StageRows& rows : rows_) rows.place(arrays);
+    return arrays;
+  }
+  void take_splitting() {
+    if (!fixed_) return splitting_->move_to(points_, momentum_, rows_, last_x_);
+    for (StageRows& rows : rows_) rows.evaluate_constraint(points_);
+    fixed_->take_splitting(splitting_->inverse_mass(points_, momentum_, last_x_).data());
+  }
+
   double step_size() const { return points_.step.size; }
   int row_of(int j) const { return n_ * s_ + m_ * j; }
-
-  Eigen::Map<const Columns> velocities(ConstVectorRef x) const { return {x.data(), n_, s_}; }
 
   /// Everything the residual is made of, at x, unless x is where it was last taken.
   void evaluate(ConstVectorRef x) {
@@ -172,45 +200,31 @@ class GaussLobattoStep final : public StepProblem {
         std::memcmp(x.data(), last_x_.data(), sizeof(double) * static_cast<std::size_t>(size())) == 0)
       return;
     evaluated_ = true;
-    move_points(x);
-    momentum_.evaluate(points_, x);
+    const double impulse = evaluate_points(x);
     if (m_ == 0) return;
+    blocks_[0].scale = std::max(blocks_[0].scale, part() * impulse_scale(impulse));
+    if (blocks_[1].scale <= smallest_scale)  // at rest in the origin
+      blocks_[1].scale = scale_of(part() * form_size(rows_) * largest_entry(x.data(), n_ * s_));
+  }
+
+  /// What an iteration leaves of the residual is no random error: it is a smooth function of the state and
+  /// drives the energy one way.  So compensated sums are solved for to the last bit.
+  double part() const { return sums_.compensated() ? last_bit : 1.0; }
+
+  /// Gives the largest term of an impulse.
+  double evaluate_points(ConstVectorRef x) {
+    if (fixed_) {
+      std::copy_n(x.data(), size(), last_x_.data());
+      if (m_ > 0) rows_.front().set_gauss_known(false);
+      return fixed_->evaluate(x.data());
+    }
+    last_x_ = x;
+    sums_.move(points_, x);
+    momentum_.evaluate(points_, x);
+    if (m_ == 0) return 0.0;
     impulses_.setZero();
     for (StageRows& rows : rows_) rows.add_impulses(points_, x, impulses_);
-    blocks_[0].scale = std::max(blocks_[0].scale, (sums_ ? last_bit : 1.0) * impulse_scale(x.tail(m_ * s_)));
-  }
-
-  /// to = base + Σ_j force_j ∂L/∂q_j + Σ_j impulse_j Aᵀλ_j in these rows.
-  void add_forces_and_impulses(int first, int rows, const double* force, const double* impulse,
-                               const double* base, double* to) const {
-    combine_piece(first, rows, n_, s_, force, momentum_.forces().data(), base, to);
-    if (m_ > 0) combine_piece(first, rows, n_, s_, impulse, impulses_.data(), to, to);
-  }
-
-  /// q0 + h Σ_k a_ik V_k at the Gauss nodes, and so at those Lobatto nodes that are looked at; x is kept.
-  void move_points(ConstVectorRef x) {
-    const int first_lobatto = m_ > 0 ? 1 : s_ + 1;
-    if (sums_) {
-      last_x_ = x;
-      const ExtendedGaussLobattoTableau& table = sums_->table;
-      const auto start = points_.lobatto.col(0);
-      for (int i = 0; i < s_; ++i)
-        sums_->position(step_size(), table.a.row(i), start, velocities(x), points_.gauss.col(i));
-      for (int j = first_lobatto; j <= s_; ++j)
-        sums_->position(step_size(), table.lobatto_a.row(j), start, velocities(x), points_.lobatto.col(j));
-      return;
-    }
-    const StageWeights& weights = points_.weights;
-    const double* const q0 = points_.lobatto.data();
-    for_each_piece(n_, [&](int first, int rows) {
-      for (int i = 0; i < s_; ++i) {
-        std::copy_n(x.data() + n_ * i + first, rows, last_x_.data() + n_ * i + first);
-        combine_piece(first, rows, n_, s_, &weights.position(0, i), x.data(), q0, &points_.gauss(0, i));
-      }
-      for (int j = first_lobatto; j <= s_; ++j)
-        combine_piece(first, rows, n_, s_, &weights.lobatto(0, j), x.data(), q0, &points_.lobatto(0, j));
-    });
-    last_x_.tail(m_ * s_) = x.tail(m_ * s_);
+    return impulse_size(rows_, x.tail(m_ * s_));
   }
 
   /// Sizes at x, for the next step.
@@ -230,10 +244,8 @@ class GaussLobattoStep final : public StepProblem {
   }
 
   /// Size of the impulses of such multipliers, and of what they lose to the round-off of positions.
-  double impulse_scale(ConstVectorRef multipliers) const {
-    double largest = 0.0;
-    for (const StageRows& rows : rows_) largest = std::max(largest, rows.impulse_size(multipliers));
-    return largest + sizes_.row_curvature * sizes_.position;
+  double impulse_scale(double size_of_impulses) const {
+    return size_of_impulses + sizes_.row_curvature * sizes_.position;
   }
 
   /// Before the first solve: the derivatives at the start, for the round-off scales.
@@ -250,33 +262,32 @@ class GaussLobattoStep final : public StepProblem {
   /// Terms of the momentum rows are momenta, those of the last step where this one is not solved yet; a
   /// velocity of size |q|/h loses ε|q|/h to round-off.
   void update_scales() {
-    const double h = std::abs(step_size()), velocity = sizes_.position / h;
-    blocks_[0].scale = usable_scale(sizes_.momentum(h, largest_entry(p0_.data(), n_)) + last_impulse_);
-    double one_forms = 0.0;
-    for (const StageRows& rows : rows_) one_forms = std::max(one_forms, rows.form_size());
-    if (m_ > 0) blocks_[1].scale = usable_scale(one_forms * velocity);
-    // What an iteration leaves of the residual is no random error: it is a smooth function of the state and
-    // drives the energy one way.  So solve to the last bit.
-    if (sums_)
-      for (ResidualBlock& block : blocks_) block.scale *= last_bit;
+    const double h = std::abs(step_size()),
+                 velocity = std::max(sizes_.position, part_of_length * length_) / h;
+    blocks_[0].scale = scale_of(sizes_.momentum(h, largest_entry(p0_.data(), n_)) + last_impulse_);
+    if (m_ > 0) blocks_[1].scale = scale_of(form_size(rows_) * velocity);
+    for (ResidualBlock& block : blocks_) block.scale *= part();
   }
 
   int s_, n_, m_;
   StagePoints points_;
+  StepSums sums_;
   StageMomentum momentum_;
   std::vector<StageRows> rows_;
   SparsityPattern pattern_;
   BlockPattern layout_;
   std::vector<ResidualBlock> blocks_;
 
-  std::optional<CompensatedSums> sums_;
+  std::unique_ptr<FixedStages> fixed_;  ///< of few coordinates, rows and stages, without a force
 
   Vector p0_, last_x_;
+  StageRowScales row_scales_;
   Columns impulses_;  ///< A(Q~_j)ᵀ λ_j
   StageSizes sizes_;
   double last_impulse_ = 0.0;  ///< size of it with the multipliers of the step before, at this start
-  std::optional<StageSplitting> splitting_;  ///< small scenes with rows of one kind
+  std::optional<StageSplitting> splitting_;  ///< of small scenes
   bool splitting_known_ = false;
+  double length_;           ///< of the rows
   bool affine_;             ///< the residual is affine in the unknowns
   bool evaluated_ = false;  ///< at last_x_
 };

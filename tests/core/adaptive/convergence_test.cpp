@@ -25,8 +25,9 @@ TEST(Convergence, TakesTwoObservedOrdersThatAgreeWithTheStatedOne) {
 
 TEST(Convergence, DoesNotTakeOneAgreement) {
   // Orders 0 and then 5.6: the coarse runs are alike by chance.
-  const Convergence convergence = after(6, 1e-2, {3.7e-1, 3.7e-1, 8e-3});
+  const Convergence convergence = after(6, 1e-1, {3.7e-1, 3.7e-1, 8e-3});
   EXPECT_NEAR(convergence.observed_order(), 5.5, 0.1);
+  EXPECT_LT(convergence.estimate(), 4e-2);
   EXPECT_FALSE(convergence.accepted());
 }
 
@@ -56,6 +57,12 @@ TEST(Convergence, LaysDifferencesThatStopFallingNearZeroToRoundOff) {
   const Convergence convergence = after(4, 1e-16, {1e-10, 1e-14, 1.1e-14, 0.9e-14, 1e-14});
   EXPECT_TRUE(convergence.stagnates());
   EXPECT_NE(convergence.obstacle().find("round-off"), std::string::npos);
+}
+
+TEST(Convergence, ThePrognosisIsThatOfTheBetterOfTwoOrders) {
+  // Orders 0 and then 5.6: the first runs did not resolve the motion.
+  EXPECT_LT(after(6, 1e-2, {3.7e-1, 3.7e-1, 8e-3}).work_to_go(), 2.0);
+  EXPECT_GT(after(6, 1e-2, {3.7e-1, 3.7e-1, 3.6e-1}).work_to_go(), 1e3);
 }
 
 }  // namespace

@@ -91,5 +91,39 @@ TEST(ErrorControl, RefusesMisuse) {
       {"not self-adjoint"});
 }
 
+/// Of two oscillators one is 1500 times as fast; runs that do not resolve it show no order.
+TEST(ErrorControl, AFastPhaseIsResolved) {
+  constexpr double rate = 1478.1566076270233;
+  auto scene = std::make_shared<Scene>();
+  scene->name = "fast phase";
+  scene->coordinates = {"x", "y"};
+  scene->lagrangian = lagrangian<2>([](const auto& q, const auto& v) {
+    return 0.5 * (v[0] * v[0] + v[1] * v[1] - q[0] * q[0] - rate * rate * q[1] * q[1]);
+  });
+  scene->start = {0.0, Vector::Ones(2), Vector::Zero(2)};
+  const ErrorControlReport report = solve(scene, 10.0, {.error = 1e-2});
+  ASSERT_TRUE(report.ok()) << report.refusal;
+  EXPECT_NEAR(report.end.q[0], std::cos(10.0), 1e-2);
+  EXPECT_NEAR(report.end.q[1], std::cos(10.0 * rate), 1e-2);
+  EXPECT_NEAR(report.end.p[1], -rate * std::sin(10.0 * rate), 1e-2 * rate);
+}
+
+/// An ion in a trap, in SI units: momenta of 1e-28 count as those of 1 do.
+TEST(ErrorControl, EstimatesHaveNoUnit) {
+  const auto ion = [](double mass, double rate, double size) {
+    auto scene = std::make_shared<Scene>();
+    scene->name = "ion";
+    scene->coordinates = {"x"};
+    scene->lagrangian = lagrangian<1>(
+        [=](const auto& q, const auto& v) { return 0.5 * mass * (v[0] * v[0] - rate * rate * q[0] * q[0]); });
+    scene->start = {0.0, Vector::Constant(1, size), Vector::Zero(1)};
+    return solve(scene, 3.0 / rate, {.error = 1e-6, .method = "type1/midpoint", .adaptive = false});
+  };
+  const ErrorControlReport unit = ion(1.0, 1.0, 1.0), si = ion(1.67262192e-27, 1e6, 1e-6);
+  ASSERT_TRUE(unit.ok() && si.ok()) << unit.refusal << si.refusal;
+  EXPECT_NEAR(si.estimate / unit.estimate, 1.0, 1e-3);
+  EXPECT_EQ(si.runs.size(), unit.runs.size());
+}
+
 }  // namespace
 }  // namespace diracstep

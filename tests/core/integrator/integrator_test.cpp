@@ -356,8 +356,8 @@ TEST(Plan, LeavesOutWhatTheSceneDoesNotNeed) {
 
 TEST(Plan, NamesTheUnknownsAndTheSolver) {
   const IntegratorOptions options{.method = "type1/trapezoidal", .step = 0.1};
-  EXPECT_EQ(decision(testing::unconstrained(), options, "unknowns"), "q1 (3)");
-  EXPECT_EQ(decision(testing::mixed(), options, "unknowns"), "q1 (3), multipliers (2)");
+  EXPECT_EQ(decision(testing::unconstrained(), options, "unknowns"), "q1 - q0 (3)");
+  EXPECT_EQ(decision(testing::mixed(), options, "unknowns"), "q1 - q0 (3), multipliers (2)");
   EXPECT_EQ(decision(testing::mixed(), {.method = "type1/midpoint", .step = 0.1}, "unknowns"),
             "stage velocities (3), multipliers (2)");
   EXPECT_EQ(decision(testing::mixed(), options, "Jacobian"), "full");

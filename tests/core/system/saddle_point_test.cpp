@@ -37,7 +37,7 @@ class SaddlePoint : public ::testing::TestWithParam<bool> {};
 TEST_P(SaddlePoint, PendulumVelocityIsTheTangentialPartOfTheMomentum) {
   const Scene scene = pendulum();
   VelocityProblem problem(scene, GetParam());
-  problem.begin(0.0, Vector{{0.6, -0.8}}, Vector{{3.0, 1.0}});
+  problem.begin(0.0, Vector{{0.6, -0.8}}, Vector{{3.0, 1.0}}, Vector::Zero(2));
   // p = v − 2μ q with v ⊥ q: p·q = 1, so μ = −1/2 and v = p − q.
   EXPECT_LT((solution_of(problem) - Vector{{2.4, 1.8, -0.5}}).lpNorm<Eigen::Infinity>(), 1e-14);
 }
@@ -66,7 +66,7 @@ TEST_P(SaddlePoint, BeadOnATurningLineFeelsCoriolisForce) {
   EXPECT_NEAR(x[2], force, 1e-13);
   EXPECT_LT((x.head(2) - Vector{{0.0, -9.81}} - force * across).norm(), 1e-13);
   VelocityProblem velocity(scene, GetParam());
-  velocity.begin(t, r * along, rate * along - 5.0 * across);
+  velocity.begin(t, r * along, rate * along - 5.0 * across, Vector::Zero(2));
   EXPECT_LT((solution_of(velocity).head(2) - rate * along - r * w * across).norm(), 1e-13);
 }
 
@@ -133,7 +133,7 @@ TEST_P(SaddlePoint, JacobiansAgreeWithDifferences) {
   for (const auto& rows : {testing::moving_affine(), testing::moving_holonomic()}) {
     const Scene scene = driven(rows);
     VelocityProblem velocity(scene, GetParam());
-    velocity.begin(0.7, q, v);
+    velocity.begin(0.7, q, v, v);
     EXPECT_LT(testing::jacobian_error(velocity, x), 1e-8);
     AccelerationProblem acceleration(scene, GetParam());
     acceleration.begin(0.7, q, v);
@@ -147,7 +147,7 @@ TEST_P(SaddlePoint, ProjectionLeavesAMomentumOfTheDistributionAsItIs) {
     Vector lq(3), p(3);
     scene->lagrangian->gradient(0.0, start.q, start.v, lq, p);
     VelocityProblem problem(*scene, GetParam());
-    problem.begin(0.0, start.q, p);
+    problem.begin(0.0, start.q, p, start.v);
     const Vector x = solution_of(problem);
     EXPECT_LT((x.head(3) - start.v).lpNorm<Eigen::Infinity>(), 1e-14) << scene->name;
     EXPECT_TRUE(x.tail(scene->rows()).isZero(1e-14)) << scene->name;

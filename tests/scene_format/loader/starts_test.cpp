@@ -259,7 +259,46 @@ step = 0.1
 )toml")
                      .scene;
   EXPECT_EQ(redundant_rows(scene, scene.start).size(), 1u);
-  EXPECT_TRUE(singular_at_start_only(scene, scene.start));
+  EXPECT_EQ(row_dependence(scene, scene.start, redundant_rows(scene, scene.start)),
+            RowDependence::at_start_only);
+}
+
+/// Three bars on a line, from the origin to a, from a to b, and from the origin to b: the third one-form
+/// depends on the others at every pose, and without the row the bars would fold.
+TEST(RedundantRows, RowsThatTouchAreNeitherLeftOutNorASingularStart) {
+  const std::string text = R"toml(
+name = "bars"
+lagrangian = "(v_xa^2 + v_ya^2 + v_xb^2 + v_yb^2)/2 - ya - yb"
+[coordinates]
+xa = {}
+ya = {}
+xb = {}
+yb = {}
+[[rows]]
+name = "inner"
+equation = "xa^2 + ya^2 = 1"
+[[rows]]
+name = "outer"
+equation = "(xb - xa)^2 + (yb - ya)^2 = 1"
+[[rows]]
+name = "both"
+equation = "xb^2 + yb^2 = 4"
+[start]
+xa = 0.6
+ya = -0.8
+xb = 1.2
+yb = -1.6
+[span]
+end = 1
+step = 0.1
+)toml";
+  const CatalogueScene entry = scene_from_text("bars.toml", text);
+  const Scene& scene = *entry.scene;
+  EXPECT_EQ(redundant_rows(scene, scene.start).size(), 1u);
+  EXPECT_EQ(row_dependence(scene, scene.start, redundant_rows(scene, scene.start)), RowDependence::touching);
+  for (const char* drop : {"", "redundant = \"drop\"\n"})
+    EXPECT_NE(refusal(drop + text).find("without them other motions are possible"), std::string::npos)
+        << drop;
 }
 
 }  // namespace

@@ -215,7 +215,7 @@ TEST(EnergyCheck, NamesTheWorstPoint) {
 
 /// What the methods below do on a case, a letter each: A accurate, B bounded, t told (a reported failure, or
 /// a doubt the user is told of), r refused by Misuse.  Where it is chance, both letters stand.  W, a wrong
-/// number without a word, stands at one case alone: the knife edge at a hundred times its step.
+/// number without a word, stands nowhere.
 const std::vector<StabilityMethod> tabled_methods{
     {"type1/midpoint", 2}, {"type1/gl:3", 6}, {"type1/trapezoidal", 2}, {"type2/euler", 1}};
 const std::map<std::string, std::vector<std::string>> expected{
@@ -242,7 +242,7 @@ const std::map<std::string, std::vector<std::string>> expected{
     {"n_four_bar h=0.002", {"A", "A", "A", "B"}},
     {"n_four_bar 0.1 before flat", {"A", "A", "A", "B"}},
     {"n_four_bar 0.0001 before flat", {"A", "A", "A", "B"}},
-    {"n_four_bar 1e-08 before flat", {"t", "t", "t", "t"}},
+    {"n_four_bar 1e-08 before flat", {"A", "A", "A", "B"}},
     {"n_four_bar 1e-12 before flat", {"r", "r", "r", "r"}},
     {"n_four_bar 0 before flat", {"r", "r", "r", "r"}},
     {"kepler from pericentre 0.01", {"t", "B", "t", "t"}},
@@ -292,7 +292,7 @@ const std::map<std::string, std::vector<std::string>> expected{
     {"knife_edge step*1e-3", {"A", "A", "A", "A"}},
     {"knife_edge step*1e0", {"B", "A", "B", "t"}},
     {"knife_edge step*1e1", {"t", "B", "t", "t"}},
-    {"knife_edge step*1e2", {"W", "t", "W", "t"}},
+    {"knife_edge step*1e2", {"t", "t", "t", "t"}},
     {"kepler_e06 step*1e-12", {"A", "A", "A", "A"}},
     {"kepler_e06 step*1e-9", {"A", "A", "A", "A"}},
     {"kepler_e06 step*1e-6", {"A", "A", "A", "A"}},

@@ -1,0 +1,296 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <diracstep/core/numerics/contraction_loop.hpp>
+#include <diracstep/core/numerics/scales.hpp>
+#include <diracstep/core/numerics/small_lu.hpp>
+#include <diracstep/core/steps/gauss_lobatto/fixed_stages.hpp>
+#include <diracstep/core/steps/gauss_lobatto/full_blocks.hpp>
+#include <diracstep/core/steps/gauss_lobatto/stage_sums.hpp>
+#include <functional>
+
+namespace diracstep::detail {
+
+/// FixedStages of n coordinates, m rows and s stages.
+template <int n, int m, int s>
+class Stages final : public FixedStages {
+  static constexpr int rows = m > 0 ? m : 1, unknowns = s * (n + m), velocities = s * n;
+  using Square = std::array<double, n * n>;
+  using Forms = std::array<double, rows * n>;  // m×n by columns
+
+ public:
+  explicit Stages(const StageArrays& arrays)
+      : a_(arrays),
+        weights_(arrays.points->weights),
+        second_(arrays.lagrangian->pattern()),
+        forms_pattern_(m > 0 ? arrays.rows->pattern() : SparsityPattern::dense(1, n)),
+        curvature_pattern_(m > 0 ? arrays.rows->curvature_pattern() : SparsityPattern::dense(n, n)),
+        separable_(arrays.lagrangian->structure().separable),
+        diagonal_mass_(arrays.lagrangian->structure().y_hessian_diagonal),
+        holonomic_(m > 0 && arrays.rows->holonomic()),
+        response_(s * m) {
+    const GaussLobattoTableau& table = weights_.table;
+    for (int j = 0; j < s; ++j)
+      for (int k = 0; k < s; ++k) {
+        by_constraint_[j * s + k] = holonomic_ ? table.lobatto_a(j + 1, k) : (j == k ? 1.0 : 0.0);
+        by_impulse_[j * s + k] = table.e(j, k);
+      }
+    for (int j = 0; j < s; ++j)
+      for (int l = 0; l < s; ++l)
+        for (int k = 0; k < s; ++k) mix_[j * s + l] += by_constraint_[j * s + k] * by_impulse_[k * s + l];
+  }
+
+  double evaluate(const double* x) override {
+    std::uint64_t largest = 0;
+    StagePoints& at = *a_.points;
+    const double* const q0 = at.lobatto.data();
+    sum_stages<n, s>(x, weights_.position.data(), q0, 0, at.gauss.data());
+    a_.lagrangian->gradients(at.at_gauss(x), a_.lq, a_.lv);
+    if constexpr (m > 0) {
+      sum_stages<n, s>(x, weights_.lobatto.data() + s, q0, 0, at.lobatto.data() + n);
+      const int entries = forms_pattern_.entries();
+      if (s > 1) a_.rows->coefficients_at(at.at_lobatto(1, s - 1), a_.at_lobatto + entries, a_.offset);
+      for (int j = 0; j < s; ++j) {
+        forms_pattern_.expand(a_.at_lobatto + entries * j, lobatto_forms_[j].data());
+        impulse(lobatto_forms_[j], x + velocities + m * j, a_.impulses + n * j, largest);
+      }
+    }
+    return std::bit_cast<double>(largest);
+  }
+
+  void residual(const double* x, double* f) override {
+    std::array<double, velocities> row;
+    for (int i = 0; i < s; ++i)
+      for (int r = 0; r < n; ++r) row[i * n + r] = a_.lv[i * n + r] - a_.p0[r];
+    sum_stages<n, s>(a_.lq, weights_.force.data(), row.data(), n, row.data());
+    if constexpr (m > 0) sum_stages<n, s>(a_.impulses, weights_.impulse.data(), row.data(), n, row.data());
+    copy<velocities>(row.data(), f);
+    if constexpr (m > 0) constraint(x, f + velocities);
+  }
+
+  Contraction contract(double* x, double* f, const ContractionLimits& limits, Scales& scales,
+                       const std::function<void()>& prepare) override {
+    std::array<double, 4> norms{};
+    bool prepared = false;
+    const auto evaluate = [&] {
+      scales.moved = false;
+      scales.momentum = std::max(scales.momentum, Stages::evaluate(x) + scales.beside_impulses);
+      Stages::residual(x, f);
+      norms[0] = largest_or_infinite(f, velocities);
+      double largest = norms[0] / scales.momentum;
+      if constexpr (m > 0) {
+        norms[1] = largest_or_infinite(f + velocities, s * m);
+        largest = std::max(largest, norms[1] / scales.constraint);
+      }
+      return largest;
+    };
+    const auto correct = [&] {
+      if (!prepared) prepare();
+      prepared = scales.moved = true;
+      Stages::solve_splitting(f);
+      for (int k = 0; k < unknowns; ++k) x[k] -= f[k];
+    };
+    Contraction end = diracstep::contract(limits, evaluate, correct);
+    end.residual_norms = norms;
+    return end;
+  }
+
+  void jacobian(bool same, double* values) override {
+    if (!same) take_block_of_lagrangian();
+    const double* from = block_.data();
+    for (int k = 0; k < velocities; ++k, from += velocities) copy<velocities>(from, values + unknowns * k);
+    if constexpr (m > 0) {
+      if (s > 1) add_curvature(values);
+      add_multipliers(values);
+      add_constraint(values);
+    }
+  }
+
+  void take_splitting(const double* inverse_mass) override {
+    copy<n * n>(inverse_mass, inverse_mass_.data());
+    if constexpr (m > 0) {
+      expand_constraint(constraint_forms_);
+      for (int l = 0; l < s; ++l)
+        for (int b = 0; b < m; ++b)
+          for (int r = 0; r < n; ++r) {
+            double sum = 0.0;
+            for (int c = 0; c < n; ++c) sum += inverse_mass_[r + n * c] * lobatto_forms_[l][b + m * c];
+            through_mass_[l][r + n * b] = sum;
+          }
+      std::array<double, s * m * s * m> response;
+      for (int l = 0; l < s; ++l)
+        for (int b = 0; b < m; ++b)
+          for (int j = 0; j < s; ++j)
+            for (int a = 0; a < m; ++a) {
+              double sum = 0.0;
+              for (int r = 0; r < n; ++r)
+                sum += constraint_forms_[j][a + m * r] * through_mass_[l][r + n * b];
+              response[(m * l + b) * s * m + m * j + a] = mix_[j * s + l] * sum;
+            }
+      regular_ = response_.factor(response.data());
+    }
+  }
+
+  void solve_splitting(double* f) override {
+    std::array<double, velocities> v;
+    if (diagonal_mass_) {
+      for (int i = 0; i < s; ++i)
+        for (int r = 0; r < n; ++r) v[i * n + r] = inverse_mass_[r + n * r] * f[i * n + r];
+    } else {
+      for (int i = 0; i < s; ++i)
+        for (int r = 0; r < n; ++r) {
+          double sum = 0.0;
+          for (int c = 0; c < n; ++c) sum += inverse_mass_[r + n * c] * f[i * n + c];
+          v[i * n + r] = sum;
+        }
+    }
+    if constexpr (m > 0) {
+      double* const multipliers = f + velocities;
+      constexpr std::array<double, velocities> zero{};
+      std::array<double, velocities> mixed = v;
+      if (holonomic_) sum_stages<n, s>(v.data(), by_constraint_.data(), zero.data(), n, mixed.data());
+      for (int j = 0; j < s; ++j)
+        for (int a = 0; a < m; ++a)
+          for (int r = 0; r < n; ++r)
+            multipliers[m * j + a] -= constraint_forms_[j][a + m * r] * mixed[n * j + r];
+      if (!regular_) multipliers[0] = std::nan("");
+      response_.solve(multipliers);
+      for (int l = 0; l < s; ++l)
+        for (int r = 0; r < n; ++r) {
+          double sum = 0.0;
+          for (int b = 0; b < m; ++b) sum += through_mass_[l][r + n * b] * multipliers[m * l + b];
+          mixed[n * l + r] = sum;
+        }
+      sum_stages<n, s>(mixed.data(), by_impulse_.data(), v.data(), n, v.data());
+    }
+    copy<velocities>(v.data(), f);
+  }
+
+ private:
+  /// Aᵀλ, and the bits of its largest term, which have the order of positive doubles.
+  static void impulse(const Forms& forms, const double* lambda, double* to, std::uint64_t& largest) {
+    for (int r = 0; r < n; ++r) {
+      double sum = 0.0;
+      for (int a = 0; a < m; ++a) {
+        const double term = forms[a + m * r] * lambda[a];
+        largest = std::max(largest, std::bit_cast<std::uint64_t>(term) & ~(std::uint64_t{1} << 63U));
+        sum += term;
+      }
+      to[r] = sum;
+    }
+  }
+
+  void constraint(const double* x, double* f) {
+    const StagePoints& at = *a_.points;
+    if (holonomic_) {
+      a_.rows->positions(at.at_lobatto(1, s), f);
+      const double per_step = 1.0 / at.step.size;
+      for (int k = 0; k < s * m; ++k) f[k] *= per_step;
+      return;
+    }
+    a_.rows->coefficients_at(at.at_gauss(), a_.at_gauss, f);
+    for (int j = 0; j < s; ++j) {
+      Forms& forms = constraint_forms_now_[j];
+      forms_pattern_.expand(a_.at_gauss + forms_pattern_.entries() * j, forms.data());
+      for (int a = 0; a < m; ++a)
+        for (int r = 0; r < n; ++r) f[m * j + a] += forms[a + m * r] * x[n * j + r];
+    }
+  }
+
+  /// A where the constraint stands.
+  void expand_constraint(std::array<Forms, s>& forms) const {
+    const double* const from = holonomic_ ? a_.at_lobatto + forms_pattern_.entries() : a_.at_gauss;
+    for (int j = 0; j < s; ++j) forms_pattern_.expand(from + forms_pattern_.entries() * j, forms[j].data());
+  }
+
+  double& entry(int i, int r, int k, int c) { return block_[(k * n + c) * velocities + i * n + r]; }
+
+  /// The part of L in the rows of the momentum.
+  void take_block_of_lagrangian() {
+    std::array<Square, s> qq, qv, vv;
+    for (int i = 0; i < s; ++i) {
+      second_.expand(a_.lqq + second_.entries() * i, qq[i].data());
+      second_.expand(a_.lqv + second_.entries() * i, qv[i].data());
+      second_.expand(a_.lvv + second_.entries() * i, vv[i].data());
+    }
+    for (int k = 0; k < s; ++k)
+      for (int i = 0; i < s; ++i) {
+        Square sum{};
+        const double* const stiffness = &weights_.stiffness(0, i * s + k);
+        for (int j = 0; j < s; ++j)
+          for (int e = 0; e < n * n; ++e) sum[e] += stiffness[j] * qq[j][e];
+        if (!separable_) {
+          const double force = weights_.force(k, i), position = weights_.position(k, i);
+          for (int c = 0; c < n; ++c)
+            for (int r = 0; r < n; ++r)
+              sum[r + n * c] += force * qv[k][r + n * c] + position * qv[i][c + n * r];
+        }
+        if (i == k)
+          for (int e = 0; e < n * n; ++e) sum[e] += vv[i][e];
+        for (int c = 0; c < n; ++c)
+          for (int r = 0; r < n; ++r) entry(i, r, k, c) = sum[r + n * c];
+      }
+  }
+
+  void add_curvature(double* values) {
+    std::array<Square, s> curvature;
+    for (int j = 1; j < s; ++j)
+      curvature_pattern_.expand(a_.curvature + curvature_pattern_.entries() * j, curvature[j].data());
+    for (int k = 0; k < s; ++k)
+      for (int i = 0; i < s; ++i) {
+        Square sum{};
+        const double* const weight = &weights_.row_curvature(0, i * s + k);
+        for (int j = 1; j < s; ++j)
+          for (int e = 0; e < n * n; ++e) sum[e] += weight[j] * curvature[j][e];
+        for (int c = 0; c < n; ++c)
+          for (int r = 0; r < n; ++r) values[(k * n + c) * unknowns + i * n + r] += sum[r + n * c];
+      }
+  }
+
+  void add_multipliers(double* values) {
+    double* column = values + unknowns * velocities;
+    for (int k = 0; k < s; ++k)
+      for (int a = 0; a < m; ++a, column += unknowns) {
+        for (int i = 0; i < s; ++i)
+          for (int r = 0; r < n; ++r)
+            column[i * n + r] = weights_.impulse(k, i) * lobatto_forms_[k][a + m * r];
+        std::fill_n(column + velocities, s * m, 0.0);
+      }
+  }
+
+  void add_constraint(double* values) {
+    expand_constraint(constraint_forms_now_);
+    std::array<Forms, s> derivative{};
+    if (!holonomic_)
+      for (int j = 0; j < s; ++j)
+        forms_pattern_.expand(a_.derivative + forms_pattern_.entries() * j, derivative[j].data());
+    for (int k = 0; k < s; ++k)
+      for (int r = 0; r < n; ++r) {
+        double* const column = values + (k * n + r) * unknowns + velocities;
+        for (int j = 0; j < s; ++j)
+          for (int a = 0; a < m; ++a)
+            column[m * j + a] = by_constraint_[j * s + k] * constraint_forms_now_[j][a + m * r] +
+                                (holonomic_ ? 0.0 : weights_.position(k, j) * derivative[j][a + m * r]);
+      }
+  }
+
+  StageArrays a_;
+  const StageWeights& weights_;
+  FullBlocks<n, n> second_;
+  FullBlocks<rows, n> forms_pattern_;
+  FullBlocks<n, n> curvature_pattern_;
+  bool separable_, diagonal_mass_, holonomic_, regular_ = true;
+  std::array<double, s * s> by_constraint_{}, by_impulse_{}, mix_{};  ///< C, e and C e, by rows
+  std::array<Forms, s> lobatto_forms_{}, constraint_forms_now_{};     ///< at the last point
+  std::array<Forms, s> constraint_forms_{};                           ///< of the splitting
+  std::array<std::array<double, n * rows>, s> through_mass_{};        ///< M⁻¹ A(Q~_l)ᵀ
+  Square inverse_mass_{};
+  std::array<double, velocities * velocities> block_{};
+  SmallLu<s * m> response_;
+};
+
+}  // namespace diracstep::detail
