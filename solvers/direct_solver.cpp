@@ -10,11 +10,9 @@ namespace diracstep {
 
 namespace {
 
-/// With a Jacobian of another point the last correction has to be this small beside the unknowns.
-constexpr double linear_step_tolerance = 1e-14;
 /// Without KINSOL around them so many fixed-point iterations cost what Newton's method does; they are judged
 /// by so many solves at a time.
-constexpr int quick = 7, solves_to_judge = 12;
+constexpr int quick_directly = 7, direct_solves_to_judge = 12;
 /// Of a matrix of so many entries, a step takes one Jacobian and its factors cost what two or three residuals
 /// do.
 constexpr int few_entries = 600;
@@ -60,7 +58,7 @@ class DirectSolver final : public NonlinearSolver {
   }
   void restore(SnapshotReader& from) override {
     factors_.restore(from);
-    judged_solves_ = static_cast<int>(from.whole_number("judged solves", solves_to_judge));
+    judged_solves_ = static_cast<int>(from.whole_number("judged solves", direct_solves_to_judge));
     judged_iterations_ =
         static_cast<int>(from.whole_number("judged iterations", std::numeric_limits<int>::max()));
     given_up_ = from.flag("fixed-point iteration given up");
@@ -113,8 +111,8 @@ class DirectSolver final : public NonlinearSolver {
   /// Newton's method from now on, where the fixed-point iteration has turned out to be slow.
   void judge(int iterations) {
     judged_iterations_ += report_.ok() ? iterations : max_fixed_point;
-    if (++judged_solves_ < solves_to_judge) return;
-    given_up_ = judged_iterations_ > quick * solves_to_judge;
+    if (++judged_solves_ < direct_solves_to_judge) return;
+    given_up_ = judged_iterations_ > quick_directly * direct_solves_to_judge;
     judged_solves_ = judged_iterations_ = 0;
   }
 
@@ -156,9 +154,7 @@ class DirectSolver final : public NonlinearSolver {
   bool small_correction() const {
     const double size = largest_entry(guess_.data(), guess_.size());
     const double unit = size > 0.0 && std::isfinite(size) ? size : 1.0;
-    const double tolerance =
-        factors_.exact() ? options_.step_tolerance : std::min(options_.step_tolerance, linear_step_tolerance);
-    return largest_entry(f_.data(), f_.size()) <= tolerance * unit;
+    return largest_entry(f_.data(), f_.size()) <= factors_.step_tolerance(options_.step_tolerance) * unit;
   }
 
   bool factor(ConstVectorRef x, double norm) {

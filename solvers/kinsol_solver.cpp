@@ -24,9 +24,6 @@ constexpr double no_limit = 1e100;
 constexpr double round_off = 16.0;
 /// The row that a norm is of is no larger than that norm times its scale, but for rounding.
 constexpr double at_rounding = 1e-12;
-/// With a Jacobian of another point the error falls by a mere factor in each iteration, so that the last
-/// correction has to be this small.
-constexpr double linear_step_tolerance = 1e-14;
 
 /// A fixed-point iteration of so many iterations costs what Newton's method does.  It is judged by its first
 /// solves, once there is a history to guess from.
@@ -116,10 +113,7 @@ class KinsolSolver final : public NonlinearSolver {
  private:
   void* memory() const { return kinsol_.get(); }
 
-  double step_tolerance() const {
-    const double asked = options_.step_tolerance;
-    return factors_.exact() ? asked : std::min(asked, linear_step_tolerance);
-  }
+  double step_tolerance() const { return factors_.step_tolerance(options_.step_tolerance); }
 
   Eigen::Map<Vector> unknowns() const { return {data_of(x_.get()), guess_.size()}; }
 

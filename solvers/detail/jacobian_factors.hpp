@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <diracstep/core/numerics/nonlinear_solver.hpp>
 #include <diracstep/solvers/detail/linear_solver.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
@@ -26,6 +27,10 @@ class JacobianFactors {
   int evaluations() const { return evaluations_; }
   /// Whether Newton's method converges quadratically with these factors.
   bool exact() const { return policy_ == JacobianPolicy::fresh || constant_; }
+  /// How small beside the unknowns a correction is that ends Newton's method, where `asked` ends it with
+  /// exact factors.  With a Jacobian of another point the error falls by a mere factor in each iteration, so
+  /// that the last correction has to be small itself.
+  double step_tolerance(double asked) const { return exact() ? asked : std::min(asked, 1e-14); }
   /// Whether the last iteration took a Jacobian of its own point.
   bool current() const { return current_point_; }
   /// Drops every factor and pivot.
