@@ -53,11 +53,7 @@ IntegratorOptions stepping_from(const diracstep_model& model, const diracstep_op
 }
 
 StepControl control_from(const diracstep_options& options) {
-  const std::string control = options.control != nullptr ? options.control : "integrating";
-  if (control == "integrating") return StepControl::integrating;
-  if (control == "in-step") return StepControl::in_step;
-  if (control == "irreversible") return StepControl::irreversible;
-  throw Misuse("control: '" + control + "' is not one of integrating, in-step, irreversible");
+  return step_control(options.control != nullptr ? options.control : "integrating");
 }
 
 double end_from(const diracstep_model& model, const diracstep_options& options) {

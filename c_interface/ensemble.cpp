@@ -20,7 +20,7 @@ std::vector<Start> starts_of(const diracstep_model& model, const diracstep_ensem
   return starts;
 }
 
-void require_sense(const diracstep_ensemble& ensemble, const diracstep_points& ends) {
+void require_room_for_all(const diracstep_ensemble& ensemble, const diracstep_points& ends) {
   if (ensemble.members < 0 || ensemble.steps < 0)
     throw Misuse("members = " + std::to_string(ensemble.members) +
                  ", steps = " + std::to_string(ensemble.steps) + "; 0 or more are needed");
@@ -32,7 +32,7 @@ void require_sense(const diracstep_ensemble& ensemble, const diracstep_points& e
 void run(const diracstep_model& model, const diracstep_options& options, const diracstep_ensemble& ensemble,
          diracstep_points& ends, diracstep_table* failures) {
   const CatalogueScene& entry = entry_of(model);
-  require_sense(ensemble, ends);
+  require_room_for_all(ensemble, ends);
   if (options.eps > 0.0 || options.pushed != 0)
     throw Misuse("ensembles need steps of fixed size, and no push");
   IntegratorOptions stepping = stepping_from(model, options);

@@ -1,6 +1,8 @@
 #include <diracstep/c_interface/handles.hpp>
 #include <diracstep/c_interface/pushed_force.hpp>
+#include <diracstep/core/adaptive/rate_survey.hpp>
 #include <diracstep/core/runs/step_loop.hpp>
+#include <diracstep/solvers/kinsol_solver.hpp>
 
 using namespace diracstep;
 using namespace diracstep::c_interface;
@@ -95,6 +97,9 @@ int diracstep_plan(const diracstep_integrator* integrator, diracstep_table* tabl
   return guarded([&] {
     const diracstep_integrator& from = given(integrator, "the integrator");
     std::vector<PlanLine> lines = std::visit([](const auto& made) { return made.plan(); }, from.stepper);
+    const Integrator& stepping = from.stepping();
+    if (from.end != from.scene->start.time)
+      lines.push_back(variable_steps_line(from.scene, kinsol(), from.end, stepping.options().step, "eps"));
     lines.insert(lines.end(), from.notes.begin(), from.notes.end());
     std::vector<std::string> cells;
     for (const PlanLine& line : lines) cells.insert(cells.end(), {line.item, line.decision, line.reason});

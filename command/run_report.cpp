@@ -2,7 +2,7 @@
 
 #include <cmath>
 #include <diracstep/command/run_report.hpp>
-#include <diracstep/files/json.hpp>
+#include <diracstep/reports/json.hpp>
 #include <diracstep/reports/report.hpp>
 #include <diracstep/validation/studies/convergence_study.hpp>
 #include <utility>
@@ -11,23 +11,21 @@ namespace diracstep::command {
 
 namespace {
 
-Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
-
 Json by_name(const std::vector<std::string>& names, const Vector& values) {
   Json json = Json::object();
   for (std::size_t i = 0; i < names.size(); ++i)
-    json.add(names[i], number(values[static_cast<Eigen::Index>(i)]));
+    add_member(json, names[i], values[static_cast<Eigen::Index>(i)]);
   return json;
 }
 
 Json end_json(const RunResult& result, const Scene& scene) {
   if (!result.has_end()) return nullptr;
-  return {{"t", number(result.end.time)},
+  return {{"t", Json(result.end.time)},
           {"q", by_name(scene.coordinates, result.end.q)},
           {"v", by_name(scene.coordinates, result.end.v)},
           {"p", by_name(scene.coordinates, result.end.p)},
           {"lambda", by_name(scene.row_names(), result.end.lambda)},
-          {"energy", number(result.end.energy)}};
+          {"energy", Json(result.end.energy)}};
 }
 
 /// Of a large scene the first few coordinates and rows are shown, and the last one.
@@ -82,9 +80,9 @@ Json invariants_json(const RunResult& result) {
   Json json = Json::array();
   for (const InvariantEnds& ends : result.invariants)
     json.push_back({{"name", ends.name},
-                    {"start", number(ends.start)},
-                    {"end", number(ends.end)},
-                    {"stated", ends.stated ? number(*ends.stated) : Json(nullptr)}});
+                    {"start", Json(ends.start)},
+                    {"end", Json(ends.end)},
+                    {"stated", ends.stated ? Json(*ends.stated) : Json(nullptr)}});
   return json;
 }
 
@@ -126,9 +124,9 @@ Json variable_json(const VariableSteps& steps) {
   const ControlReport& report = steps.report;
   return {{"eps", steps.eps},
           {"control", name(steps.control)},
-          {"smallest_step", number(report.smallest_step)},
+          {"smallest_step", Json(report.smallest_step)},
           {"largest_step", report.largest_step},
-          {"rate_ratio", number(report.fastest / report.slowest)},
+          {"rate_ratio", Json(report.fastest / report.slowest)},
           {"resets", report.resets},
           {"side_steps", report.side_steps},
           {"accelerations", report.accelerations}};
@@ -138,8 +136,8 @@ Json search_json(const ErrorControlReport& search) {
   Json json{{"adaptive", search.adaptive},
             {"reason", search.reason},
             {"step", search.step},
-            {"estimate", number(search.estimate)},
-            {"observed_order", number(search.observed_order)},
+            {"estimate", Json(search.estimate)},
+            {"observed_order", Json(search.observed_order)},
             {"division", search.division.empty() ? Json(nullptr) : Json(search.division)},
             {"warning", search.warning.empty() ? Json(nullptr) : Json(search.warning)},
             {"refusal", search.refusal.empty() ? Json(nullptr) : Json(search.refusal)},
@@ -149,9 +147,9 @@ Json search_json(const ErrorControlReport& search) {
     json["runs"].push_back({{"step", run.step},
                             {"steps", run.steps},
                             {"solves", run.solves},
-                            {"difference", number(run.difference)},
-                            {"estimate", number(run.estimate)},
-                            {"observed_order", number(run.observed_order)},
+                            {"difference", Json(run.difference)},
+                            {"estimate", Json(run.estimate)},
+                            {"observed_order", Json(run.observed_order)},
                             {"status", run.failure.empty() ? "ok" : run.failure}});
   return json;
 }
@@ -205,13 +203,13 @@ std::string run_json(const RunResult& result, const CatalogueScene& entry, const
             {"step", result.variable || (result.search && result.search->adaptive) ? Json(nullptr)
                                                                                    : Json(options.step)},
             {"status", status(result)}};
-  for (const auto& [key, value] : entry.parameters) json["parameters"][key] = number(value);
+  for (const auto& [key, value] : entry.parameters) json["parameters"][key] = Json(value);
   json["doubt"] = result.doubt.empty() ? Json(nullptr) : Json(result.doubt);
   json["end"] = end_json(result, *entry.scene);
-  json["error_q"] = number(check.error_q);
-  json["error_p"] = number(check.error_p);
-  json["constraint"] = number(check.constraint);
-  json["energy_error"] = number(check.energy_error);
+  json["error_q"] = Json(check.error_q);
+  json["error_p"] = Json(check.error_p);
+  json["constraint"] = Json(check.constraint);
+  json["energy_error"] = Json(check.energy_error);
   json["invariants"] = invariants_json(result);
   json["steps"] = result.work.steps;
   json["newton_iterations"] = result.work.iterations;
@@ -222,7 +220,7 @@ std::string run_json(const RunResult& result, const CatalogueScene& entry, const
   json["points"] = result.lines;
   if (result.variable) json["adaptive"] = variable_json(*result.variable);
   if (result.search) json["error_control"] = search_json(*result.search);
-  return json.dump(2) + '\n';
+  return to_text(json, 2) + '\n';
 }
 
 }  // namespace diracstep::command

@@ -1,10 +1,7 @@
 #include <fmt/format.h>
 
-#include <array>
 #include <cmath>
 #include <diracstep/command/variable_steps.hpp>
-#include <diracstep/core/adaptive/rate_survey.hpp>
-#include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/reports/report.hpp>
 #include <utility>
 
@@ -12,28 +9,9 @@ namespace diracstep::command {
 
 namespace {
 
-constexpr std::array<std::pair<const char*, StepControl>, 3> controls{
-    {{"integrating", StepControl::integrating},
-     {"in-step", StepControl::in_step},
-     {"irreversible", StepControl::irreversible}}};
-
-constexpr double few = 20.0;  // times the steps of the scene's own size that variable ones may take
-
 std::string short_number(double value) { return std::isnan(value) ? "" : fmt::format("{:.2e}", value); }
 
 }  // namespace
-
-StepControl step_control(const std::string& text) {
-  for (const auto& [name, control] : controls)
-    if (text == name) return control;
-  throw Misuse(fmt::format("--control: '{}' is not one of integrating, in-step, irreversible", text));
-}
-
-const char* name(StepControl control) {
-  for (const auto& [name, value] : controls)
-    if (control == value) return name;
-  return "";
-}
 
 std::string summary(const VariableSteps& steps) {
   const ControlReport& report = steps.report;
@@ -66,27 +44,6 @@ std::string search_table(const ErrorControlReport& search) {
   for (const std::string& reason : {search.method_reason, search.reason})
     if (!reason.empty()) head += "; " + reason;
   return fmt::format("{}\n{}", head, aligned(rows));
-}
-
-PlanLine rate_line(const Scene& given, const SolverFactory& solvers, double end, double step) {
-  const auto scene = completed(std::make_shared<const Scene>(given));
-  if (!has_accelerations(*scene))
-    return {"variable steps", "not offered", "L is linear in v: no accelerations to choose them by"};
-  const RateSurvey survey = survey_rate(*scene, solvers, end);
-  if (!survey.failure.empty()) return {"variable steps", "not known", survey.failure};
-  const std::string reason =
-      fmt::format("max ω / min ω = {:.2g} over the first {:.3g} of {:.3g} units of time", survey.ratio(),
-                  survey.covered, std::abs(end - scene->start.time));
-  // The survey takes four accelerations a step, and larger steps than a run.
-  const double span = std::abs(end - scene->start.time);
-  const double wanted = 1.5 * static_cast<double>(survey.accelerations) / 4.0 * span / survey.covered;
-  if (wanted > few * span / std::abs(step))
-    return {
-        "variable steps", "left out",
-        fmt::format("they would take about {:.1g} steps, {:.1g} of the scene's own size lead to the end; {}",
-                    wanted, span / std::abs(step), reason)};
-  if (survey.variable_steps_pay()) return {"variable steps", "pay: --adaptive", reason};
-  return {"variable steps", "left out", reason + ", they pay above 5"};
 }
 
 }  // namespace diracstep::command

@@ -13,6 +13,11 @@ class CallbackError : public Error {
   using Error::Error;
 };
 
+/// Throws Misuse, which names the plugin or program, where what it has registered is not fit for use.
+inline void require(bool condition, const std::string& owner, const std::string& what) {
+  if (!condition) throw Misuse(owner + ": " + what);
+}
+
 /// Calls `callback()`, which returns 0 or an error number.  `explain(status)` tells what the number means.
 template <class Callback, class Explain>
 void call(const std::string& owner, const char* what, Callback callback, Explain explain) {

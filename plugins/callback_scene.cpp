@@ -20,10 +20,6 @@ struct Origin {
   std::shared_ptr<DifferenceQuality> speed_quality = {};  ///< of momenta
 };
 
-void require(bool condition, const std::string& owner, const std::string& what) {
-  if (!condition) throw Misuse(owner + ": " + what);
-}
-
 /// The k-th of the names given, which none of them may lack.
 std::string name_of(const char* const* names, int k, const std::string& owner, const char* what) {
   require(names[k] != nullptr, owner, std::string(what) + " " + std::to_string(k + 1) + " has no name");

@@ -18,10 +18,6 @@ constexpr int max_inner_columns = 1000;
 
 std::string text_or(const char* text, const char* otherwise) { return text != nullptr ? text : otherwise; }
 
-void require(bool condition, const std::string& owner, const std::string& what) {
-  if (!condition) throw Misuse(owner + ": " + what);
-}
-
 void require_version(const diracstep_plugin& plugin, const std::string& owner) {
   const auto differ = [&](const char* what, unsigned theirs, unsigned ours) {
     require(theirs == ours, owner,

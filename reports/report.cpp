@@ -114,8 +114,7 @@ std::string comparison_table(const Study& study) {
   return aligned(cells);
 }
 
-Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
-Json number(const std::optional<double>& value) { return value ? number(*value) : Json(nullptr); }
+Json number(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
 
 Json row_json(const StudyRow& row, Momentum momentum) {
   Json json{{"method", row.method}};
@@ -386,7 +385,7 @@ Json studies_document(const std::vector<Study>& studies) {
   return json;
 }
 
-std::string studies_json(const std::vector<Study>& studies) { return studies_document(studies).dump(2); }
+std::string studies_json(const std::vector<Study>& studies) { return to_text(studies_document(studies), 2); }
 
 std::string time_cell(double seconds) {
   if (!std::isfinite(seconds) || seconds <= 0.0) return "-";

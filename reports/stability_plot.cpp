@@ -13,15 +13,15 @@ namespace diracstep {
 
 namespace {
 
-constexpr std::array<std::string_view, 7> colours{"#0072B2", "#D55E00", "#009E73", "#CC79A7",
-                                                  "#E69F00", "#56B4E9", "#000000"};
-constexpr std::array<int, 5> markers{7, 5, 9, 13, 11};
-constexpr std::array<std::string_view, 3> dashes{"solid", "(9,5)", "(2,4)"};
+constexpr std::array<std::string_view, 7> stability_colours{"#0072B2", "#D55E00", "#009E73", "#CC79A7",
+                                                            "#E69F00", "#56B4E9", "#000000"};
+constexpr std::array<int, 5> stability_markers{7, 5, 9, 13, 11};
+constexpr std::array<std::string_view, 3> stability_dashes{"solid", "(9,5)", "(2,4)"};
 constexpr std::size_t fewest_cases = 3;
-constexpr double smallest_drawn = 1e-17, largest_drawn = 1e12;
+constexpr double growth_floor = 1e-17, largest_growth = 1e12;
 constexpr double smallest_growth = 1e-6;
 
-constexpr std::string_view style = R"(set encoding utf8
+constexpr std::string_view stability_style = R"(set encoding utf8
 set logscale xy
 set format x '10^{%L}'
 set format y '10^{%L}'
@@ -38,8 +38,8 @@ struct Curve {
   int others = 0;         // methods with the same data
 
   void add(double x, double y) {
-    if (x > 0.0 && std::isfinite(y) && y <= largest_drawn)
-      data += fmt::format("{:.6e} {:.6e}\n", x, std::max(y, smallest_drawn));
+    if (x > 0.0 && std::isfinite(y) && y <= largest_growth)
+      data += fmt::format("{:.6e} {:.6e}\n", x, std::max(y, growth_floor));
   }
 };
 
@@ -51,8 +51,9 @@ struct Picture {
 
 std::string look(std::size_t k) {
   return fmt::format("linewidth 2 dashtype {} pointtype {} pointsize 0.8 linecolor '{}'",
-                     dashes[k / colours.size() % dashes.size()], markers[k % markers.size()],
-                     colours[k % colours.size()]);
+                     stability_dashes[k / stability_colours.size() % stability_dashes.size()],
+                     stability_markers[k % stability_markers.size()],
+                     stability_colours[k % stability_colours.size()]);
 }
 
 std::string key(const Curve& curve) {
@@ -60,7 +61,7 @@ std::string key(const Curve& curve) {
 }
 
 std::string script(const Picture& picture) {
-  std::string text(style);
+  std::string text(stability_style);
   text += fmt::format(
       "set title {} noenhanced offset 0,-0.3\nset xlabel {} noenhanced\nset ylabel {} noenhanced\n",
       gnuplot_text(picture.title), gnuplot_text(picture.x_label), gnuplot_text(picture.y_label));
@@ -98,7 +99,7 @@ void merge_equal(std::vector<Curve>& curves) {
 }
 
 /// Rounded, so that curves that differ by round-off are found equal.
-double rounded(double growth) {
+double rounded_growth(double growth) {
   return std::isfinite(growth) ? std::stod(fmt::format("{:.3e}", growth)) : growth;
 }
 
@@ -108,7 +109,7 @@ std::vector<Curve> growth_curves(const std::vector<LinearStability>& linear,
   for (const LinearStability& stability : linear) {
     curves.push_back({label(stability.method, stability.order)});
     for (const GrowthPoint& point : stability.growth)
-      curves.back().add(point.step, std::max(rounded(value(point)), smallest_growth));
+      curves.back().add(point.step, std::max(rounded_growth(value(point)), smallest_growth));
   }
   merge_equal(curves);
   return curves;

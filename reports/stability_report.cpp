@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <diracstep/files/json.hpp>
+#include <diracstep/reports/json.hpp>
 #include <diracstep/reports/report.hpp>
 #include <diracstep/reports/stability_report.hpp>
 
@@ -11,8 +11,6 @@ namespace diracstep {
 namespace {
 
 using Cells = std::vector<std::string>;
-
-Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
 std::string cell(double value) { return std::isfinite(value) ? fmt::format("{:.1e}", value) : "-"; }
 
@@ -30,34 +28,34 @@ Json growth_json(const LinearStability& stability) {
   Json growth = Json::array();
   for (const GrowthPoint& point : stability.growth)
     growth.push_back(
-        {{"step", point.step}, {"oscillator", number(point.oscillator)}, {"damping", number(point.damping)}});
+        {{"step", point.step}, {"oscillator", Json(point.oscillator)}, {"damping", Json(point.damping)}});
   return growth;
 }
 
 Json ida_json(const IdaBeside& ida) {
   return {{"rtol", ida.rtol},
           {"status", ida.status},
-          {"error", number(ida.error)},
-          {"deviation", number(ida.deviation)},
-          {"constraint", number(ida.constraint)},
-          {"cpu_seconds", number(ida.cpu_seconds)}};
+          {"error", Json(ida.error)},
+          {"deviation", Json(ida.deviation)},
+          {"constraint", Json(ida.constraint)},
+          {"cpu_seconds", Json(ida.cpu_seconds)}};
 }
 
 Json row_json(const StabilityRow& row) {
   Json json{{"method", row.method},    {"order", row.order}, {"outcome", name(row.outcome)},
-            {"message", row.message},  {"steps", row.steps}, {"t_reached", number(row.t_reached)},
+            {"message", row.message},  {"steps", row.steps}, {"t_reached", Json(row.t_reached)},
             {"watches", Json::array()}};
   for (const WatchResult& watch : row.watches)
     json["watches"].push_back({{"name", watch.name},
-                               {"band", number(watch.band)},
-                               {"drift", number(watch.drift)},
-                               {"drift_half_width", number(watch.drift_half_width)},
-                               {"bounded_until", number(watch.bounded_until)}});
-  json["constraint"] = number(row.constraint);
-  json["error"] = number(row.error);
+                               {"band", Json(watch.band)},
+                               {"drift", Json(watch.drift)},
+                               {"drift_half_width", Json(watch.drift_half_width)},
+                               {"bounded_until", Json(watch.bounded_until)}});
+  json["constraint"] = Json(row.constraint);
+  json["error"] = Json(row.error);
   json["failed_solves"] = row.failed_solves;
   json["newton_iterations"] = row.newton_iterations;
-  json["cpu_seconds"] = number(row.cpu_seconds);
+  json["cpu_seconds"] = Json(row.cpu_seconds);
   json["ida"] = row.ida ? ida_json(*row.ida) : Json(nullptr);
   return json;
 }
@@ -77,7 +75,7 @@ Json case_json(const StabilityResult& result) {
             {"t_end", that.t_end},
             {"accuracy", that.accuracy},
             {"reference", has_reference(that) ? Json(that.scene.reference.how) : Json(nullptr)}};
-  for (const auto& [key, value] : that.scene.parameters) json["parameters"][key] = number(value);
+  for (const auto& [key, value] : that.scene.parameters) json["parameters"][key] = Json(value);
   for (const char* key : {"rows", "ida"}) json[key] = Json::array();
   for (const StabilityRow& row : result.rows) json["rows"].push_back(row_json(row));
   for (const IdaBeside& ida : result.ida) json["ida"].push_back(ida_json(ida));
@@ -225,11 +223,11 @@ std::string stability_json(const std::vector<LinearStability>& linear,
   for (const LinearStability& stability : linear)
     json["linear"].push_back({{"method", stability.method},
                               {"order", stability.order},
-                              {"oscillator_limit", number(stability.oscillator_limit)},
-                              {"damping_limit", number(stability.damping_limit)},
+                              {"oscillator_limit", Json(stability.oscillator_limit)},
+                              {"damping_limit", Json(stability.damping_limit)},
                               {"growth", growth_json(stability)}});
   for (const StabilityResult& result : results) json["cases"].push_back(case_json(result));
-  return json.dump(2);
+  return to_text(json, 2);
 }
 
 std::string stability_markdown(const std::vector<LinearStability>& linear,

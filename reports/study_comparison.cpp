@@ -3,17 +3,16 @@
 #include <algorithm>
 #include <cmath>
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/reports/json.hpp>
 #include <diracstep/reports/report.hpp>
 #include <diracstep/reports/study_comparison.hpp>
 #include <map>
-#include <nlohmann/json.hpp>
 #include <tuple>
 
 namespace diracstep {
 
 namespace {
 
-using Json = nlohmann::json;
 using Key = std::tuple<std::string, std::string, int, double>;  ///< scene, method, order, and error or step
 
 constexpr double time_noise = 1.25, error_noise = 1.05, round_off = 1e-12;

@@ -1,6 +1,6 @@
 #pragma once
 
-#include <diracstep/files/json.hpp>
+#include <diracstep/reports/json.hpp>
 #include <diracstep/validation/studies/convergence_study.hpp>
 #include <vector>
 

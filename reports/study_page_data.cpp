@@ -94,7 +94,7 @@ std::string study_page_data(const std::vector<PageEntry>& entries) {
                               {"colour", style.colour},
                               {"marker", style.marker}});
   for (const PageEntry& entry : entries) json["histories"].push_back(history_json(entry));
-  return json.dump();
+  return to_text(json);
 }
 
 }  // namespace diracstep

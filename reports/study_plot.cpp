@@ -27,7 +27,7 @@ constexpr double summary_error = 1e-6;
 constexpr double shown_near_reference = 10.0;
 constexpr std::size_t max_trails = 8;  // of bodies in one picture
 
-constexpr std::string_view style = R"(set encoding utf8
+constexpr std::string_view study_style = R"(set encoding utf8
 set logscale xy
 set format x '10^{%L}'
 set format y '10^{%L}'
@@ -39,7 +39,7 @@ set grid xtics ytics linetype 1 linewidth 0.7 linecolor '#D9D9D9' dashtype solid
 set key outside right center Left reverse samplen 2.4 spacing 1.3 width 1 noenhanced
 )";
 
-struct Curve {
+struct StudyCurve {
   std::string label, look;
   std::string data = {};  // lines "x y"
 
@@ -60,8 +60,8 @@ std::string axes(const std::string& title, const std::string& x, const std::stri
       gnuplot_text(title), gnuplot_text(x), gnuplot_text(y));
 }
 
-std::string plotted(std::vector<Curve> curves) {
-  std::erase_if(curves, [](const Curve& curve) { return curve.data.empty(); });
+std::string plotted(std::vector<StudyCurve> curves) {
+  std::erase_if(curves, [](const StudyCurve& curve) { return curve.data.empty(); });
   std::string data, plots;
   for (std::size_t i = 0; i < curves.size(); ++i) {
     data += fmt::format("$curve{} << EOD\n{}EOD\n", i, curves[i].data);
@@ -77,7 +77,7 @@ double smallest_drawn(const Study& study) {
 }
 
 /// A level line where the reference ends, if the picture goes down to it.
-std::string reference_line(const Study& study, const std::vector<Curve>& curves) {
+std::string reference_line(const Study& study, const std::vector<StudyCurve>& curves) {
   const double own = smallest_drawn(study);
   const bool near = std::ranges::any_of(study.rows, [&](const StudyRow& row) {
     return row.ok() && row.error() > 0.0 && row.error() < shown_near_reference * own;
@@ -103,14 +103,15 @@ using Abscissa = std::function<double(const StudyRow&)>;
 
 using Choice = std::function<bool(const StudyRow&)>;
 
-void add_rows(Curve& curve, const Study& study, const Choice& chosen, const Abscissa& x) {
+void add_rows(StudyCurve& curve, const Study& study, const Choice& chosen, const Abscissa& x) {
   for (const StudyRow& row : study.rows)
     if (row.ok() && chosen(row) && row.error() > smallest_drawn(study) && row.error() <= largest_drawn)
       curve.add(x(row), row.error());
 }
 
-std::vector<Curve> curves_of(const Study& study, const std::vector<SeriesStyle>& styles, const Abscissa& x) {
-  std::vector<Curve> all;
+std::vector<StudyCurve> curves_of(const Study& study, const std::vector<SeriesStyle>& styles,
+                                  const Abscissa& x) {
+  std::vector<StudyCurve> all;
   for (const SeriesStyle& s : styles) {
     all.push_back(
         {s.label(), fmt::format("with linespoints linewidth 2 dashtype {} pointtype {} "
@@ -125,7 +126,7 @@ std::vector<Curve> curves_of(const Study& study, const std::vector<SeriesStyle>&
 }
 
 /// A curve of IDA for each formulation it runs in.
-void add_baselines(std::vector<Curve>& curves, const Study& study, const Abscissa& x) {
+void add_baselines(std::vector<StudyCurve>& curves, const Study& study, const Abscissa& x) {
   std::vector<std::string> formulations;
   for (const StudyRow& row : study.rows)
     if (row.method == ida_method && std::ranges::find(formulations, row.formulation) == formulations.end())
@@ -151,13 +152,14 @@ std::vector<double> component(const std::vector<Vector>& points, int i) {
   return values;
 }
 
-Curve curve(std::string label, std::size_t k, const std::vector<double>& x, const std::vector<double>& y) {
-  Curve drawn{std::move(label), line_look(k)};
+StudyCurve curve(std::string label, std::size_t k, const std::vector<double>& x,
+                 const std::vector<double>& y) {
+  StudyCurve drawn{std::move(label), line_look(k)};
   for (std::size_t i = 0; i < std::min(x.size(), y.size()); ++i) drawn.add(x[i], y[i]);
   return drawn;
 }
 
-Curve logarithmic(std::string label, std::size_t k, const History& history, std::vector<double> values) {
+StudyCurve logarithmic(std::string label, std::size_t k, const History& history, std::vector<double> values) {
   for (double& value : values) value = std::max(std::abs(value), drawn_zero);
   return curve(std::move(label), k, history.time, values);
 }
@@ -171,11 +173,12 @@ std::string run_title(const History& history, const std::string& scene) {
 }
 
 std::string history_script(const History& history, const std::string& title, const std::string& time) {
-  std::vector<Curve> curves{logarithmic("total energy", 0, history, history.energy)};
+  std::vector<StudyCurve> curves{logarithmic("total energy", 0, history, history.energy)};
   if (!history.constraint.empty()) curves.push_back(logarithmic("rows", 1, history, history.constraint));
   for (const History::Change& invariant : history.invariants)
     curves.push_back(logarithmic(invariant.name, curves.size(), history, invariant.values));
-  return std::string(style) + "unset logscale x\nunset mxtics\nset format x '%g'\nset yrange [1e-16:*]\n" +
+  return std::string(study_style) +
+         "unset logscale x\nunset mxtics\nset format x '%g'\nset yrange [1e-16:*]\n" +
          tics("x", history.time.front(), history.time.back()) +
          axes(title, time, "relative change, or violation [1]") + plotted(curves);
 }
@@ -183,14 +186,14 @@ std::string history_script(const History& history, const std::string& title, con
 std::string error_script(const History& history, const std::string& title, const std::string& time,
                          const std::vector<SeriesStyle>& styles) {
   const auto style_of = std::ranges::find(styles, history.method, &SeriesStyle::method);
-  Curve error{"error",
-              fmt::format("with lines linewidth 1.5 linecolor '{}'",
-                          colours[style_of == styles.end() ? 0 : style_of->colour % colours.size()])};
+  StudyCurve error{"error",
+                   fmt::format("with lines linewidth 1.5 linecolor '{}'",
+                               colours[style_of == styles.end() ? 0 : style_of->colour % colours.size()])};
   for (std::size_t i = 0; i < history.time.size(); ++i)
     if (history.time[i] > history.time.front() && history.error[i] > 0.0)
       error.add(history.time[i] - history.time.front(), history.error[i]);
   if (error.data.empty()) return {};
-  return std::string(style) + axes(title, time, "error over largest q, p [1]") +
+  return std::string(study_style) + axes(title, time, "error over largest q, p [1]") +
          fmt::format("set key off\n{}", plotted({error}));
 }
 
@@ -209,7 +212,7 @@ std::string plane_script(const History& history) {
   const Motion& motion = history.motion;
   const auto& x = motion.coordinates[static_cast<std::size_t>(motion.bodies[0].x)];
   const auto& y = motion.coordinates[static_cast<std::size_t>(motion.bodies[0].y)];
-  std::vector<Curve> curves;
+  std::vector<StudyCurve> curves;
   const std::size_t every = (motion.bodies.size() + max_trails - 1) / max_trails;
   for (std::size_t i = every - 1; i < motion.bodies.size(); i += every) {
     const Motion::Body& body = motion.bodies[i];
@@ -226,7 +229,7 @@ std::string plane_script(const History& history) {
 
 /// The elements over their number at a few times.
 std::string profile_script(const History& history) {
-  std::vector<Curve> curves;
+  std::vector<StudyCurve> curves;
   std::vector<double> number;
   for (const auto& c : history.motion.coordinates) number.push_back(c.index + 1);
   constexpr std::size_t times = 5;
@@ -243,7 +246,7 @@ std::string profile_script(const History& history) {
 }
 
 std::string curves_script(const History& history, const std::string& time) {
-  std::vector<Curve> curves;
+  std::vector<StudyCurve> curves;
   for (std::size_t i = 0; i < history.motion.coordinates.size(); ++i) {
     const auto& c = history.motion.coordinates[i];
     curves.push_back(curve(in_unit(c.name, c.unit), i, history.track_time,
@@ -254,7 +257,7 @@ std::string curves_script(const History& history, const std::string& time) {
 }
 
 std::string motion_script(const History& history, const std::string& time) {
-  const std::string linear = std::string(style) + "unset logscale\nunset mxtics\nset format '%g'\n";
+  const std::string linear = std::string(study_style) + "unset logscale\nunset mxtics\nset format '%g'\n";
   switch (history.motion.form) {
     case Motion::Form::plane:
       return linear + plane_script(history);
@@ -277,21 +280,22 @@ std::string first_failure(std::initializer_list<std::string> failures) {
 std::string draw_work_precision(const Study& study, const std::string& time_unit,
                                 const std::vector<SeriesStyle>& styles,
                                 const std::filesystem::path& directory) {
-  std::vector<Curve> work = curves_of(study, styles, [](const auto& row) { return row.cpu_seconds.median; });
+  std::vector<StudyCurve> work =
+      curves_of(study, styles, [](const auto& row) { return row.cpu_seconds.median; });
   add_baselines(work, study, [](const auto& row) { return row.cpu_seconds.median; });
   const auto steps = curves_of(study, styles, [](const auto& row) { return std::abs(row.step); });
-  const auto drawn = std::ranges::count_if(work, [](const Curve& c) { return !c.data.empty(); });
+  const auto drawn = std::ranges::count_if(work, [](const StudyCurve& c) { return !c.data.empty(); });
   if (drawn == 0) return study.scene + ": no run succeeded, so there is nothing to draw";
   const std::size_t height = std::max<std::size_t>(480, 90 + 28 * static_cast<std::size_t>(drawn));
   const std::string title = fmt::format("{}: t = {:g} … {:g}", study.scene, study.t_start, study.t_end);
   const std::string stem = (directory / file_name(study.scene)).string(), error = "relative error of q and p";
   const bool two_steps =  // an order takes two
-      std::ranges::any_of(steps, [](const Curve& c) { return std::ranges::count(c.data, '\n') > 1; });
+      std::ranges::any_of(steps, [](const StudyCurve& c) { return std::ranges::count(c.data, '\n') > 1; });
   return first_failure(
-      {render(std::string(style) + axes(title, "CPU time [s]", error + " at the end [1]") +
+      {render(std::string(study_style) + axes(title, "CPU time [s]", error + " at the end [1]") +
                   reference_line(study, work) + plotted(work),
               stem, 980, height),
-       two_steps ? render(std::string(style) +
+       two_steps ? render(std::string(study_style) +
                               axes(title, in_unit("step size", time_unit), error + " at the end [1]") +
                               reference_line(study, steps) + plotted(steps),
                           stem + "-orders", 980, height)
@@ -322,7 +326,7 @@ std::string draw_summary(const std::vector<Study>& studies, const std::filesyste
   if (ida.empty() && erk.empty())
     return "no study reaches 1e-6 on both sides, so there is no summary to draw";
   const std::string script =
-      std::string(style) +
+      std::string(study_style) +
       fmt::format(
           "unset logscale y\nset format y '%s'\nset format x '%g'\nset xrange [*<0.5:2<*]\nset yrange "
           "[{}:-0.7]\nset ytics ({}) "

@@ -7,13 +7,11 @@
 #include <diracstep/files/input_file.hpp>
 #include <diracstep/files/output_file.hpp>
 #include <diracstep/reports/build_facts.hpp>
-#include <nlohmann/json.hpp>
+#include <diracstep/reports/json.hpp>
 
 namespace diracstep {
 
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 constexpr std::string_view magic = "diracstep checkpoint 2\n";
 constexpr std::size_t sum_size = sizeof(std::uint64_t);
@@ -55,7 +53,7 @@ std::string encoded(const Checkpoint& checkpoint) {
   for (const auto& [key, value] : checkpoint.run) json["run"][key] = value;
   json["state"] = state.size();
   std::string text(magic);
-  text += json.dump(-1, ' ', false, Json::error_handler_t::replace) + '\n';
+  text += to_text(json) + '\n';
   text += state;
   const std::uint64_t sum = check_sum(text);
   return text.append(reinterpret_cast<const char*>(&sum), sum_size);

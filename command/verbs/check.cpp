@@ -9,7 +9,7 @@
 #include <diracstep/command/verbs.hpp>
 #include <diracstep/command/verbs/published_check.hpp>
 #include <diracstep/core/numerics/errors.hpp>
-#include <diracstep/files/json.hpp>
+#include <diracstep/reports/json.hpp>
 #include <diracstep/reports/report.hpp>
 #include <diracstep/validation/laws/count_allocations.hpp>
 #include <diracstep/validation/laws/method_check.hpp>
@@ -20,7 +20,7 @@ namespace diracstep::command {
 
 namespace {
 
-struct Options {
+struct CheckArguments {
   std::vector<std::string> names;
   std::vector<std::string> set;
   bool scenes = false;
@@ -37,7 +37,7 @@ bool is_method(const std::string& name) {
 }
 
 /// The names given; without any all that the plugins bring, and without plugins every method.
-Wanted wanted(const Options& options, const Session& session) {
+Wanted wanted(const CheckArguments& options, const Session& session) {
   Wanted wanted;
   for (const std::string& name : options.names)
     (is_method(name) ? wanted.methods : wanted.scenes).push_back(name);
@@ -108,7 +108,7 @@ std::string as_text(const CatalogueScene& entry, const Examination& examination)
 /// Looks at one thing after the other and collects what is to be printed.
 class Examiner {
  public:
-  Examiner(const Options& options, Session& session) : options_(options), session_(session) {}
+  Examiner(const CheckArguments& options, Session& session) : options_(options), session_(session) {}
 
   void look_at(const Wanted& wanted) {
     if (!wanted.methods.empty() || !wanted.rules.empty()) order_scenes_ = order_scenes();
@@ -129,9 +129,9 @@ class Examiner {
   void print_all() {
     if (!options_.json) return;
     if (document_.empty() && scenes_.size() == 1 && options_.names.size() == 1)
-      return print(scenes_.front().dump(2) + '\n');
-    if (!scenes_.empty()) document_.add("scenes", scenes_);
-    print(document_.dump(2) + '\n');
+      return print(to_text(scenes_.front(), 2) + '\n');
+    if (!scenes_.empty()) document_["scenes"] = scenes_;
+    print(to_text(document_, 2) + '\n');
   }
 
  private:
@@ -149,7 +149,7 @@ class Examiner {
     if (!options_.json) print(as_text(entry, examination));
   }
 
-  const Options& options_;
+  const CheckArguments& options_;
   Session& session_;
   std::vector<OrderScene> order_scenes_;
   Progress progress_;
@@ -157,7 +157,7 @@ class Examiner {
   std::vector<Json> scenes_;
 };
 
-void check(const Options& options, Session& session) {
+void check(const CheckArguments& options, Session& session) {
   catch_interrupts();
   if (options.scenes && !options.names.empty()) throw Misuse("check takes either names or --scenes");
   if (options.scenes) return check_published_cases(options.json, session);
@@ -178,7 +178,7 @@ void add_check(CLI::App& app, Session& session) {
       "check",
       "Conformance of methods, built in or from a plugin: derivatives, laws, orders, behaviour;\n"
       "examination of scenes: rows, start, derivatives, regularity");
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<CheckArguments>();
   verb->add_option("NAME", options->names,
                    "Methods, scene files NAME.toml, or scenes; without any all that the plugins\n"
                    "bring, and without plugins every method")

@@ -8,7 +8,7 @@
 #include <diracstep/command/verbs/published_orders.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/numerics/near_names.hpp>
-#include <diracstep/files/json.hpp>
+#include <diracstep/reports/json.hpp>
 #include <diracstep/reports/report.hpp>
 #include <diracstep/validation/studies/convergence_study.hpp>
 #include <iterator>
@@ -18,7 +18,7 @@ namespace diracstep::command {
 
 namespace {
 
-struct Options {
+struct ListArguments {
   std::string what;
   bool measure = false, parameters = false;
   bool json = false;
@@ -221,7 +221,7 @@ AllMeasured measure_all(const Session& session) {
   return measured;
 }
 
-void list(const Options& options, Session& session) {
+void list(const ListArguments& options, Session& session) {
   const std::vector<std::string> known{"scenes", "methods", "plugins"};
   if (!options.what.empty() && std::ranges::find(known, options.what) == known.end())
     throw Misuse(fmt::format("list: '{}' is not one of {}{}", options.what, fmt::join(known, ", "),
@@ -244,7 +244,7 @@ void list(const Options& options, Session& session) {
     json["plugins"] = plugin_json(session);
     tables.push_back(plugin_table(session));
   }
-  print(options.json ? json.dump(2) + '\n' : fmt::format("{}", fmt::join(tables, "\n")));
+  print(options.json ? to_text(json, 2) + '\n' : fmt::format("{}", fmt::join(tables, "\n")));
   if (!interrupted()) return;
   say("interrupted");
   session.exit_status = failed;
@@ -254,7 +254,7 @@ void list(const Options& options, Session& session) {
 
 void add_list(CLI::App& app, Session& session) {
   CLI::App* verb = app.add_subcommand("list", "Scenes, methods and plugins");
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<ListArguments>();
   verb->add_option("WHAT", options->what, "scenes, methods or plugins; everything without it");
   verb->add_flag("--parameters", options->parameters, "Below each scene its parameters, which --set changes");
   verb->add_flag("--measure", options->measure, "Measure the orders now, on scenes with a closed form");

@@ -4,7 +4,7 @@
 #include <cstdio>
 #include <diracstep/command/verbs.hpp>
 #include <diracstep/core/numerics/errors.hpp>
-#include <diracstep/files/json.hpp>
+#include <diracstep/reports/json.hpp>
 #include <diracstep/scene_format/loader/scene_template.hpp>
 #include <memory>
 #include <string>
@@ -14,7 +14,7 @@ namespace diracstep::command {
 
 namespace {
 
-struct Options {
+struct NewArguments {
   std::string name;
   bool json = false;
 };
@@ -30,11 +30,11 @@ void write_new(const std::string& path, const std::string& text) {
   throw Error(fmt::format("'{}' could not be written in full", path));
 }
 
-void make(const Options& options) {
+void make(const NewArguments& options) {
   const std::string path = options.name + ".toml";
   write_new(path, scene_template(options.name));
   if (options.json)
-    print(Json{{"file", path}}.dump(2) + '\n');
+    print(to_text(Json{{"file", path}}, 2) + '\n');
   else
     print(fmt::format("{0} written; next: diracstep check {0}, diracstep run {0}\n", path));
 }
@@ -43,7 +43,7 @@ void make(const Options& options) {
 
 void add_new(CLI::App& app, Session&) {
   CLI::App* verb = app.add_subcommand("new", "A commented scene template, NAME.toml");
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<NewArguments>();
   verb->add_option("NAME", options->name, "Name of the scene: letters, digits and _")->required();
   verb->add_flag("--json", options->json, "One JSON document on standard output");
   verb->footer("Example:  diracstep new my_pendulum");

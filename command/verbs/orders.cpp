@@ -6,9 +6,9 @@
 #include <diracstep/command/interrupt.hpp>
 #include <diracstep/command/verbs.hpp>
 #include <diracstep/core/numerics/errors.hpp>
-#include <diracstep/files/json.hpp>
 #include <diracstep/files/output_file.hpp>
 #include <diracstep/files/paths.hpp>
+#include <diracstep/reports/json.hpp>
 #include <diracstep/validation/laws/order_table.hpp>
 #include <memory>
 
@@ -16,7 +16,7 @@ namespace diracstep::command {
 
 namespace {
 
-struct Options {
+struct OrdersArguments {
   std::string out;
   bool json = false;
 };
@@ -45,11 +45,9 @@ constexpr const char* explanation =
     "is 10\n"
     "(`tests/core/methods/composition_test.cpp`, with all order conditions).\n\n";
 
-Json number(double x) { return std::isfinite(x) ? Json(x) : Json(); }
-
 Json as_json(const RuleRow& row) {
   Json json{{"method", row.method}, {"order", row.order}, {"measured", Json::array()}};
-  for (const OrderMeasurement& measured : row.measured) json["measured"].push_back(number(measured.order));
+  for (const OrderMeasurement& measured : row.measured) json["measured"].push_back(measured.order);
   json["holds"] = holds(row);
   return json;
 }
@@ -57,15 +55,15 @@ Json as_json(const RuleRow& row) {
 Json as_json(const OrderTableRow& row, const std::vector<OrderScene>& scenes) {
   Json json{{"method", row.method}, {"order", row.order}, {"measured", Json::object()}};
   for (std::size_t k = 0; k < scenes.size(); ++k)
-    json["measured"][scenes[k].constraint_class] = number(row.measured[k].order);
-  json["reversal_defect"] = number(row.reversal_defect);
-  json["symplecticity_defect"] = number(row.symplecticity_defect);
-  json["membership_residual"] = number(row.membership_residual);
+    json["measured"][scenes[k].constraint_class] = row.measured[k].order;
+  json["reversal_defect"] = row.reversal_defect;
+  json["symplecticity_defect"] = row.symplecticity_defect;
+  json["membership_residual"] = row.membership_residual;
   json["holds"] = holds(row);
   return json;
 }
 
-void orders(const Options& options, Session& session) {
+void orders(const OrdersArguments& options, Session& session) {
   if (!options.out.empty()) require_outputs({{"--out", options.out}}, {});
   catch_interrupts();
   const std::vector<OrderScene> scenes = order_scenes();
@@ -92,9 +90,9 @@ void orders(const Options& options, Session& session) {
   for (const CircuitRow& row : circuits)
     json["circuits"].push_back({{"method", row.method},
                                 {"order", row.order},
-                                {"measured", number(row.measured.order)},
+                                {"measured", row.measured.order},
                                 {"holds", holds(row)}});
-  print(options.json ? json.dump(2) + '\n' : table);
+  print(options.json ? to_text(json, 2) + '\n' : table);
   for (const OrderTableRow& row : rows)
     if (!holds(row)) {
       say(fmt::format("{} composed to order {}: claim and measurement differ", row.method, row.order));
@@ -112,7 +110,7 @@ void orders(const Options& options, Session& session) {
 void add_orders(CLI::App& app, Session& session) {
   CLI::App* verb =
       app.add_subcommand("orders", "Claimed and measured order of every method on every constraint class");
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<OrdersArguments>();
   verb->add_option("--out", options->out, "Also write the table, with its explanation, as Markdown");
   verb->add_flag("--json", options->json, "One JSON document on standard output");
   verb->footer("Example:  diracstep orders --out docs/orders.md");

@@ -3,10 +3,10 @@
 #include <CLI/App.hpp>
 #include <cmath>
 #include <diracstep/command/arguments.hpp>
-#include <diracstep/command/variable_steps.hpp>
 #include <diracstep/command/verbs.hpp>
+#include <diracstep/core/adaptive/rate_survey.hpp>
 #include <diracstep/core/integrator/integrator.hpp>
-#include <diracstep/files/json.hpp>
+#include <diracstep/reports/json.hpp>
 #include <diracstep/reports/report.hpp>
 #include <diracstep/scene_format/scene_catalogue.hpp>
 #include <memory>
@@ -16,7 +16,7 @@ namespace diracstep::command {
 
 namespace {
 
-struct Options {
+struct PlanArguments {
   std::string scene;
   MethodChoice method;
   bool adaptive = false;
@@ -33,7 +33,7 @@ std::string as_json(const Integrator& integrator, const std::vector<PlanLine>& l
   json["plan"] = Json::array();
   for (const PlanLine& line : lines)
     json["plan"].push_back({{"item", line.item}, {"decision", line.decision}, {"reason", line.reason}});
-  return json.dump(2) + '\n';
+  return to_text(json, 2) + '\n';
 }
 
 std::string as_text(const Integrator& integrator, const std::vector<PlanLine>& lines) {
@@ -43,7 +43,7 @@ std::string as_text(const Integrator& integrator, const std::vector<PlanLine>& l
                      integrator.options().order, aligned(rows));
 }
 
-void plan(const Options& options, Session& session) {
+void plan(const PlanArguments& options, Session& session) {
   const CatalogueScene entry = make_scene(session, options.scene, parameters(options.set));
   MethodChoice choice = options.method;
   std::optional<double> step;
@@ -59,7 +59,7 @@ void plan(const Options& options, Session& session) {
   for (const std::string& change : entry.changes) lines.push_back({"scene", "changed", change});
   if (choice.name != options.method.name)
     lines.push_back({"method", choice.name, "the scene's file recommends it"});
-  lines.push_back(rate_line(*entry.scene, session.solvers, entry.t_end, entry.natural_step));
+  lines.push_back(variable_steps_line(entry.scene, session.solvers, entry.t_end, entry.natural_step, "--adaptive"));
   print(options.json ? as_json(integrator, lines) : as_text(integrator, lines));
 }
 
@@ -68,7 +68,7 @@ void plan(const Options& options, Session& session) {
 void add_plan(CLI::App& app, Session& session) {
   CLI::App* verb = app.add_subcommand("plan", "What is assembled for a scene, and what is left out and why");
   add_solver_options(*verb, session);
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<PlanArguments>();
   verb->add_option("SCENE", options->scene, "A scene; see diracstep list scenes")->required();
   add_method_options(*verb, options->method);
   verb->add_flag("--adaptive", options->adaptive, "The plan of reversible steps of varying size");

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <diracstep/command/interrupt.hpp>
 #include <diracstep/command/verbs/published_check.hpp>
-#include <diracstep/files/json.hpp>
+#include <diracstep/reports/json.hpp>
 #include <diracstep/reports/report.hpp>
 #include <diracstep/validation/references/published_cases.hpp>
 
@@ -28,7 +28,7 @@ std::string as_json(const std::vector<PublishedCase>& cases) {
                              {"source", one.source},
                              {"passed", one.passed()},
                              {"failure", one.failure}});
-  return json.dump(2) + '\n';
+  return to_text(json, 2) + '\n';
 }
 
 std::string as_text(const std::vector<PublishedCase>& cases) {

@@ -27,7 +27,7 @@ namespace {
 constexpr long most_fixed_steps = 1'000'000'000'000;
 constexpr double most_seconds = 1e8;  // three years
 
-struct Options {
+struct RunArguments {
   std::string scene;
   MethodChoice method;
   std::optional<double> step;
@@ -56,7 +56,7 @@ struct Options {
 
 constexpr double stated_to = 1e-6;  ///< relative, of an invariant's stated value
 
-StepGrid fitted_steps(const CatalogueScene& entry, double end, double step, const Options& options) {
+StepGrid fitted_steps(const CatalogueScene& entry, double end, double step, const RunArguments& options) {
   const StepGrid grid = fit_steps(entry.scene->start.time, end, step);
   if (const long most = options.max_steps.value_or(most_fixed_steps); grid.steps > most)
     throw Misuse(fmt::format("{} steps of {:g} lead to t = {:g}; --max-steps allows {}", grid.steps,
@@ -67,7 +67,7 @@ StepGrid fitted_steps(const CatalogueScene& entry, double end, double step, cons
   return grid;
 }
 
-void require_limits(const Options& options) {
+void require_limits(const RunArguments& options) {
   if (options.max_solves < 1)
     throw Misuse(fmt::format("--max-solves = {}; 1 or more is needed", options.max_solves));
   if (options.max_steps && *options.max_steps < 1)
@@ -83,7 +83,7 @@ void require_limits(const Options& options) {
                              options.smallest_step));
 }
 
-void require_sense(const Options& options) {
+void require_sense(const RunArguments& options) {
   const bool checkpoints = !options.checkpoint.empty() || !options.resume.empty();
   if (options.every < 1) throw Misuse(fmt::format("--every = {}; 1 or more is needed", options.every));
   if (!options.at.empty() && !options.adaptive) throw Misuse("--at needs --adaptive");
@@ -106,13 +106,13 @@ void require_sense(const Options& options) {
 }
 
 /// The file that checkpoints go to, or empty.
-std::string checkpoint_path(const Options& options) {
+std::string checkpoint_path(const RunArguments& options) {
   return options.checkpoint.empty() ? options.resume : options.checkpoint;
 }
 
 /// Before anything is computed: what could not be written in the end, or would be written over something
 /// read.
-void require_files(const Options& options, const Session& session) {
+void require_files(const RunArguments& options, const Session& session) {
   std::vector<NamedPath> inputs, outputs;
   if (options.scene.ends_with(".toml")) inputs.push_back({"the scene", options.scene});
   for (const Plugin& plugin : session.plugins) inputs.push_back({"the plugin", plugin.path()});
@@ -125,8 +125,8 @@ void require_files(const Options& options, const Session& session) {
 }
 
 /// Where the file goes on: from the checkpoint, or from its beginning.
-void open_trajectory(std::optional<TrajectoryFile>& file, const Options& options, const CatalogueScene& entry,
-                     const std::optional<Checkpoint>& saved) {
+void open_trajectory(std::optional<TrajectoryFile>& file, const RunArguments& options,
+                     const CatalogueScene& entry, const std::optional<Checkpoint>& saved) {
   if (options.out.empty()) return;
   if (saved)
     file.emplace(options.out, *entry.scene, TrajectoryFile::Mark{saved->points, saved->bytes},
@@ -135,7 +135,7 @@ void open_trajectory(std::optional<TrajectoryFile>& file, const Options& options
     file.emplace(options.out, *entry.scene, entry.invariants);
 }
 
-void go_on(const Checkpoint& saved, const Options& options, Integrator& integrator) {
+void go_on(const Checkpoint& saved, const RunArguments& options, Integrator& integrator) {
   try {
     integrator.restore(saved.state);
   } catch (const Misuse& misuse) {
@@ -145,7 +145,7 @@ void go_on(const Checkpoint& saved, const Options& options, Integrator& integrat
 }
 
 /// Steps of one size to the end, from the start or from a checkpoint.
-void run_fixed(const Options& options, const CatalogueScene& entry, const Session& session,
+void run_fixed(const RunArguments& options, const CatalogueScene& entry, const Session& session,
                Integrator& integrator, long steps, std::optional<TrajectoryFile>& file, RunResult& result) {
   Keeping keeping{.momentum = result.momentum, .every = options.every};
   keeping.checkpoint = checkpoint_path(options);
@@ -165,7 +165,7 @@ void run_fixed(const Options& options, const CatalogueScene& entry, const Sessio
 }
 
 /// Variable steps to the end, or to the last of the times given.
-void run_variable(const Options& options, const CatalogueScene& entry, AdaptiveIntegrator& integrator,
+void run_variable(const RunArguments& options, const CatalogueScene& entry, AdaptiveIntegrator& integrator,
                   VariableRunChecks& checks, double end, TrajectoryFile* file, RunResult& result) {
   Progress progress;
   const double start = entry.scene->start.time;
@@ -190,7 +190,7 @@ void run_variable(const Options& options, const CatalogueScene& entry, AdaptiveI
   if (!told.empty()) say(told);
 }
 
-void finish(std::optional<TrajectoryFile>& file, const Options& options, RunResult& result) {
+void finish(std::optional<TrajectoryFile>& file, const RunArguments& options, RunResult& result) {
   if (!file) return;
   file->close();
   result.out = options.out == standard_output ? "standard output" : options.out;
@@ -199,7 +199,7 @@ void finish(std::optional<TrajectoryFile>& file, const Options& options, RunResu
 }
 
 /// One run with the chosen steps into `result`.
-IntegratorOptions run_once(const Options& options, const CatalogueScene& entry, const Session& session,
+IntegratorOptions run_once(const RunArguments& options, const CatalogueScene& entry, const Session& session,
                            IntegratorOptions chosen, double end, RunResult& result) {
   std::optional<TrajectoryFile> file;
   if (options.adaptive) {
@@ -227,7 +227,7 @@ IntegratorOptions run_once(const Options& options, const CatalogueScene& entry, 
 }
 
 /// Finds the steps for --error.
-ErrorControlReport search(const Options& options, const CatalogueScene& entry, const Session& session,
+ErrorControlReport search(const RunArguments& options, const CatalogueScene& entry, const Session& session,
                           double end, const IntegratorOptions& chosen) {
   ErrorControlOptions wanted;
   wanted.error = *options.error;
@@ -248,7 +248,7 @@ ErrorControlReport search(const Options& options, const CatalogueScene& entry, c
 
 /// The run that the search ended with: its end, and again point by point where a file or another momentum is
 /// asked for.
-IntegratorOptions take_found(const Options& options, const CatalogueScene& entry, const Session& session,
+IntegratorOptions take_found(const RunArguments& options, const CatalogueScene& entry, const Session& session,
                              RunResult& result) {
   const ErrorControlReport& found = *result.search;
   result.failure = found.refusal;
@@ -280,7 +280,7 @@ IntegratorOptions take_found(const Options& options, const CatalogueScene& entry
 
 /// What the scene declares as kept, at both ends; what is not as stated is a doubt, where no parameter has
 /// been changed.
-void compare_invariants(const Options& options, const CatalogueScene& entry, RunResult& result) {
+void compare_invariants(const RunArguments& options, const CatalogueScene& entry, RunResult& result) {
   if (!result.has_end()) return;
   const auto scene = completed(entry.scene);
   const Start& start = scene->start;
@@ -301,7 +301,7 @@ void compare_invariants(const Options& options, const CatalogueScene& entry, Run
   }
 }
 
-void report(const RunResult& result, const Options& options, const CatalogueScene& entry,
+void report(const RunResult& result, const RunArguments& options, const CatalogueScene& entry,
             const IntegratorOptions& used, Session& session) {
   if (options.out == standard_output)  // which belongs to the points
     say("the run whose points went to standard output:\n" + run_text(result, entry, used));
@@ -314,8 +314,8 @@ void report(const RunResult& result, const Options& options, const CatalogueScen
   session.exit_status = failed;
 }
 
-void run(const Options& given, Session& session) {
-  Options options = given;
+void run(const RunArguments& given, Session& session) {
+  RunArguments options = given;
   require_sense(options);
   require_files(options, session);
   std::optional<FileLock> lock;
@@ -352,7 +352,7 @@ void run(const Options& given, Session& session) {
 void add_run(CLI::App& app, Session& session) {
   CLI::App* verb = app.add_subcommand("run", "One trajectory");
   add_solver_options(*verb, session);
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<RunArguments>();
   verb->add_option("SCENE", options->scene, "A scene; see diracstep list scenes")->required();
   add_method_options(*verb, options->method);
   verb->add_option("--step", options->step, "Step size; the scene's own without it");

@@ -22,7 +22,7 @@ namespace diracstep::command {
 
 namespace {
 
-struct Options {
+struct StabilityArguments {
   std::vector<std::string> scenes;
   std::optional<std::string> methods, orders;
   std::vector<std::string> set;
@@ -55,7 +55,7 @@ void add_the_others(const Registry& registry, std::vector<StabilityMethod>& meth
       methods.push_back({name, registry.method(name).info.order});
 }
 
-std::vector<StabilityMethod> chosen_methods(const Options& options, const Registry& registry) {
+std::vector<StabilityMethod> chosen_methods(const StabilityArguments& options, const Registry& registry) {
   std::vector<StabilityMethod> methods;
   if (!options.methods && !options.orders) {
     methods = usual_methods;
@@ -77,7 +77,7 @@ std::vector<StabilityMethod> chosen_methods(const Options& options, const Regist
 }
 
 /// The cases on each scene given, or the scene as it stands where there are none or its parameters are set.
-std::vector<StabilityCase> chosen_cases(const Options& options, const Session& session) {
+std::vector<StabilityCase> chosen_cases(const StabilityArguments& options, const Session& session) {
   std::vector<StabilityCase> all = stability_cases(options.full);
   if (options.scenes.empty()) {
     if (!options.set.empty()) throw Misuse("--set needs a scene whose parameters are set");
@@ -138,7 +138,7 @@ std::string text_of(const std::vector<LinearStability>& linear, const std::vecto
   return text;
 }
 
-void stability(const Options& options, Session& session) {
+void stability(const StabilityArguments& options, Session& session) {
   const std::vector<StabilityMethod> methods = chosen_methods(options, session.registry);
   const std::vector<StabilityCase> cases = chosen_cases(options, session);
   const auto out = options.out.empty() ? std::nullopt : std::optional(output_directory(options.out));
@@ -171,7 +171,7 @@ void stability(const Options& options, Session& session) {
 void add_stability(CLI::App& app, Session& session) {
   CLI::App* verb =
       app.add_subcommand("stability", "Behaviour on stiff and extreme cases, with IDA beside it");
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<StabilityArguments>();
   verb->add_option("SCENE", options->scenes, "Scenes; every stiff and extreme case without any");
   verb->add_option("--methods", options->methods,
                    "Methods, A,B,…; without it one of each construction,\nwith --full every method");

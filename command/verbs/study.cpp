@@ -70,7 +70,7 @@ constexpr std::chrono::seconds between_pages(10);
 
 constexpr const char* best_formulation = "best";  // of IDA on a scene
 
-struct Options {
+struct StudyArguments {
   std::vector<std::string> scenes;
   std::optional<std::string> methods;
   std::optional<std::string> orders, steps, rtols;
@@ -89,7 +89,7 @@ struct Options {
 /// Where a study of no named scenes leaves its report.
 const std::string default_directory = "diracstep-study";
 
-constexpr const char* explanation =
+constexpr const char* summary_explanation =
     "# CPU time to an error\n\n"
     "Written by `diracstep study SCENE... --methods A,B,... --table FILE`: the thread's CPU time at which "
     "the relative\n"
@@ -101,7 +101,7 @@ constexpr const char* explanation =
     "machine:\ncompare within a table.\n\n";
 
 std::string tables(const std::vector<Study>& studies) {
-  std::string text = explanation + sundials_build() + ".\n\n";
+  std::string text = summary_explanation + sundials_build() + ".\n\n";
   for (const Study& study : studies) text += at_error_markdown(study);
   return text;
 }
@@ -171,11 +171,11 @@ std::optional<DaeFormulation> formulation(const std::string& given) {
 }
 
 /// Where the person said how far the ladders go, they go so far.
-bool limited(const Options& options) {
+bool limited(const StudyArguments& options) {
   return !options.full && !options.steps && !options.rtols && !options.budget;
 }
 
-StudyOptions study_options(const Options& options) {
+StudyOptions study_options(const StudyArguments& options) {
   StudyOptions study;
   if (options.methods)
     study.methods = names("--methods", *options.methods);
@@ -241,7 +241,7 @@ std::string label(const StudyRow& row) {
 
 /// Whether a failed row is a failure of the study.  It is where the user chose the step or the tolerance; on
 /// a ladder, which looks for the largest possible step, only where no other row of the same kind succeeded.
-bool counts(const StudyRow& failed_row, const Study& study, const Options& options) {
+bool counts(const StudyRow& failed_row, const Study& study, const StudyArguments& options) {
   const bool chosen = (failed_row.is_baseline() ? options.rtols : options.steps).has_value();
   if (chosen && failed_row.fits()) return true;
   return std::ranges::none_of(study.rows, [&](const StudyRow& row) {
@@ -251,7 +251,7 @@ bool counts(const StudyRow& failed_row, const Study& study, const Options& optio
 }
 
 /// Tells of every failed row; whether one counts.
-bool tell_failures(const Study& study, const Options& options) {
+bool tell_failures(const Study& study, const StudyArguments& options) {
   const bool ladders = !options.steps && !options.methods && !options.orders;
   bool failure = false;
   for (const StudyRow& row : study.rows) {
@@ -263,9 +263,11 @@ bool tell_failures(const Study& study, const Options& options) {
   return failure;
 }
 
-bool nothing_named(const Options& options) { return options.scenes.empty() && options.more_scenes.empty(); }
+bool nothing_named(const StudyArguments& options) {
+  return options.scenes.empty() && options.more_scenes.empty();
+}
 
-std::vector<CatalogueScene> chosen_scenes(const Options& options, const Session& session) {
+std::vector<CatalogueScene> chosen_scenes(const StudyArguments& options, const Session& session) {
   std::vector<std::string> words = options.scenes;
   if (!options.more_scenes.empty())
     for (const std::string& word : names("--scenes", options.more_scenes)) words.push_back(word);
@@ -339,7 +341,7 @@ std::string earlier_study(const std::string& path) {
 
 /// Before anything is computed: what would be written over something read or over another output, and a table
 /// that cannot be written.
-void require_files(const Options& options, const Session& session) {
+void require_files(const StudyArguments& options, const Session& session) {
   std::vector<NamedPath> inputs;
   for (const std::string& scene : options.scenes)
     if (scene.ends_with(".toml")) inputs.push_back({"the scene", scene});
@@ -362,7 +364,7 @@ PageEntry page_entry(const Study& study, const CatalogueScene& scene, const Sess
 }
 
 /// Where the report goes: --out, or a default where no scenes are named.
-std::optional<OutputDirectory> report_directory(const Options& options) {
+std::optional<OutputDirectory> report_directory(const StudyArguments& options) {
   if (!options.out.empty()) return OutputDirectory(options.out);
   if (nothing_named(options)) return OutputDirectory(default_directory);
   return {};
@@ -372,7 +374,7 @@ std::optional<OutputDirectory> report_directory(const Options& options) {
 /// it. On a pipe the summary has one line for each scene.
 class Screen {
  public:
-  Screen(const Options& options, bool with_report)
+  Screen(const StudyArguments& options, bool with_report)
       : silent_(options.json), rows_(!with_report), terminal_(isatty(STDOUT_FILENO) == 1) {
     if (!silent_ && !rows_) print(terminal_ ? summary_head() : sundials_build() + '\n');
   }
@@ -387,7 +389,7 @@ class Screen {
   bool silent_, rows_, terminal_;
 };
 
-void study(const Options& options, Session& session) {
+void study(const StudyArguments& options, Session& session) {
   require_files(options, session);
   std::vector<CatalogueScene> scenes = chosen_scenes(options, session);
   const StudyOptions chosen = study_options(options);
@@ -432,7 +434,7 @@ void add_study(CLI::App& app, Session& session) {
   CLI::App* verb = app.add_subcommand(
       "study", "Error against run time, beside SUNDIALS IDA and an explicit Runge–Kutta method");
   add_solver_options(*verb, session);
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<StudyArguments>();
   verb->add_option("SCENE", options->scenes,
                    "Scenes, patterns such as 'kepler*', or classes such as holonomic;\na fair selection "
                    "without any, with its report in diracstep-study/");

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <diracstep/core/adaptive/adaptive_integrator.hpp>
 #include <diracstep/core/adaptive/pointwise_motion.hpp>
@@ -16,6 +17,11 @@ constexpr double lowest_ratio = 0.8, highest_ratio = 1.25;  // of z to ω before
 constexpr double size_tolerance = 1e-10;  // relative, of an equation in the step: below it is round-off
 constexpr int max_sizes = 30;             // tried for one step
 constexpr long scale_survey_steps = 120;
+
+constexpr std::array<std::pair<const char*, StepControl>, 3> controls{
+    {{"integrating", StepControl::integrating},
+     {"in-step", StepControl::in_step},
+     {"irreversible", StepControl::irreversible}}};
 
 /// The options of the integrator under the control: a step that solves for its size is no composition itself.
 IntegratorOptions inner_options(IntegratorOptions options, const Registry& registry, StepControl control) {
@@ -67,6 +73,18 @@ RateMeter make_meter(const Scene& scene, const SolverFactory& solvers, const Ada
 }
 
 }  // namespace
+
+const char* name(StepControl control) {
+  for (const auto& [name, value] : controls)
+    if (control == value) return name;
+  return "";
+}
+
+StepControl step_control(const std::string& name) {
+  for (const auto& [known, control] : controls)
+    if (name == known) return control;
+  throw Misuse("control: '" + name + "' is not one of integrating, in-step, irreversible");
+}
 
 AdaptiveIntegrator::AdaptiveIntegrator(const std::shared_ptr<const Scene>& scene, const Registry& registry,
                                        const SolverFactory& solvers, IntegratorOptions options,

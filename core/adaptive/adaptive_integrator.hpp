@@ -11,18 +11,22 @@ namespace diracstep {
 /// How the size of the next step is found.
 enum class StepControl {
   /// Integrating controller with a guard, explicit and reversible (Hairer and Söderlind, SIAM J. Sci. Comput.
-  /// 26,
-  /// 2005):  z ← ω(y_0) + eps/2 G(y_0), then in each step  h = eps/z,  z ← z + eps G(y),  G = d(ln ω)/dt.
+  /// 26, 2005):  z ← ω(y_0) + eps/2 G(y_0), then in each step  h = eps/z,  z ← z + eps G(y),  G = d(ln ω)/dt.
   /// Where (z − eps G/2)/ω(y) leaves [0.8, 1.25], z starts anew from y; that is counted.
   integrating,
   /// An equation in the step, h (ω(y_0) + ω(y_1))/2 = eps, solved for h with the step: reversible without any
   /// state of a controller, so also at coarse eps.  In a composition each part solves its own, with its
-  /// fraction
-  /// of eps.  Takes about four solves where the controller takes one.
+  /// fraction of eps.  Takes about four solves where the controller takes one.
   in_step,
   /// h = eps/ω(y_0): not reversible, loses the long-run behaviour.  For comparison only.
   irreversible
 };
+
+/// "integrating", "in-step" or "irreversible".
+const char* name(StepControl control);
+
+/// The control of that name; throws Misuse for any other.
+StepControl step_control(const std::string& name);
 
 /// How the step size varies.
 struct AdaptiveOptions {

@@ -6,6 +6,7 @@
 #include <diracstep/core/adaptive/pointwise_motion.hpp>
 #include <diracstep/core/adaptive/rate_survey.hpp>
 #include <diracstep/core/numerics/errors.hpp>
+#include <sstream>
 #include <vector>
 
 namespace diracstep {
@@ -15,10 +16,11 @@ namespace {
 constexpr double short_part = 1e-3;     // of the span: a survey of less says little of the motion
 constexpr double largest_power = 20.0;  // of the time, by which ω is taken to fall like m/(t − t0)
 constexpr long longer_survey = 8;       // times the steps, once, where ω falls so
+constexpr double most_of_fixed = 20.0;  // times the fixed steps that variable ones may take
 constexpr long most_steps = 5000;       // of a survey that is made longer
 
 /// The motion over one step of the survey: mean squares of v and a, and of ȧ from their difference.
-struct Stretch {
+struct SurveyStep {
   double duration, v2, a2, jerk2;
 
   double rate(double typical) const {
@@ -29,10 +31,10 @@ struct Stretch {
 
 /// The median over time of a quantity.
 template <class Quantity>
-double median(const std::vector<Stretch>& stretches, Quantity quantity) {
+double median(const std::vector<SurveyStep>& stretches, Quantity quantity) {
   std::vector<std::pair<double, double>> values;
   double all = 0.0, sum = 0.0;
-  for (const Stretch& stretch : stretches) {
+  for (const SurveyStep& stretch : stretches) {
     values.emplace_back(quantity(stretch), stretch.duration);
     all += stretch.duration;
   }
@@ -42,15 +44,15 @@ double median(const std::vector<Stretch>& stretches, Quantity quantity) {
   return 0.0;
 }
 
-double fastest_rate(const std::vector<Stretch>& stretches, double typical) {
+double fastest_rate(const std::vector<SurveyStep>& stretches, double typical) {
   double fastest = 0.0;
-  for (const Stretch& stretch : stretches) fastest = std::max(fastest, stretch.rate(typical));
+  for (const SurveyStep& stretch : stretches) fastest = std::max(fastest, stretch.rate(typical));
   return fastest;
 }
 
 /// Whether ω only fell, by far, in a time that is short beside the motion, as after a start at rest: then
 /// what was surveyed says nothing of the rest.
-bool only_fell(const std::vector<Stretch>& stretches, double typical, double covered, double span) {
+bool only_fell(const std::vector<SurveyStep>& stretches, double typical, double covered, double span) {
   return covered < short_part * span && !stretches.empty() &&
          stretches.back().rate(typical) < 1e-2 * fastest_rate(stretches, typical);
 }
@@ -58,14 +60,14 @@ bool only_fell(const std::vector<Stretch>& stretches, double typical, double cov
 /// Whether ω still falls like m/(t − t0) in a time that is short beside the motion, as it does after a start
 /// at rest under a force like (t − t0)^m: each step then lengthens that time by one factor, and with more
 /// steps the survey gets through.
-bool falls_like_time(const std::vector<Stretch>& stretches, double typical, double covered, double span) {
+bool falls_like_time(const std::vector<SurveyStep>& stretches, double typical, double covered, double span) {
   if (stretches.empty() || covered >= short_part * span) return false;
   const double last = stretches.back().rate(typical);
   return last < 0.5 * fastest_rate(stretches, typical) && last * covered < largest_power;
 }
 
-double lowest_rate(const std::vector<Stretch>& stretches, double typical) {
-  return 0.3 * median(stretches, [typical](const Stretch& s) { return s.rate(typical); });
+double lowest_rate(const std::vector<SurveyStep>& stretches, double typical) {
+  return 0.3 * median(stretches, [typical](const SurveyStep& s) { return s.rate(typical); });
 }
 
 /// One pass of the survey, with the steps that ω at a given ω0 asks for.
@@ -90,7 +92,7 @@ class SurveyRun {
     for (long k = 0; k < max_steps && std::abs(end_ - t_) > 1e-12 * span; ++k) {
       h = std::min(h, std::abs(end_ - t_));
       if (!runge_kutta(std::copysign(h, end_ - t_))) return "the coarse run failed";
-      const Stretch stretch = stretch_to_next(h);
+      const SurveyStep stretch = stretch_to_next(h);
       const double rate = stretch.rate(typical_);
       if (h * rate > 0.9 && h > 1e-12 * span) {  // too coarse: once more, shorter
         h *= std::max(0.1, 0.3 / (h * rate));
@@ -104,7 +106,7 @@ class SurveyRun {
     return {};
   }
 
-  std::vector<Stretch> stretches;
+  std::vector<SurveyStep> stretches;
   double covered = 0.0;
 
  private:
@@ -113,7 +115,7 @@ class SurveyRun {
     return std::min(1e-3 * span, v > 0.0 && a > 0.0 ? 0.1 * v / a : span);
   }
 
-  Stretch stretch_to_next(double h) const {
+  SurveyStep stretch_to_next(double h) const {
     return {h, 0.5 * (v_.squaredNorm() + next_v_.squaredNorm()),
             0.5 * (a_[0].squaredNorm() + next_.squaredNorm()), (next_ - a_[0]).squaredNorm() / (h * h)};
   }
@@ -157,7 +159,7 @@ RateSurvey survey_rate(const Scene& scene, const SolverFactory& solvers, double 
   SurveyRun first(motion, scene, end, 0.0);
   survey.failure = first.go(max_steps / 2);
   const double typical =
-      median(first.stretches, [](const Stretch& s) { return s.v2 > 0.0 ? std::sqrt(s.a2 / s.v2) : 0.0; });
+      median(first.stretches, [](const SurveyStep& s) { return s.v2 > 0.0 ? std::sqrt(s.a2 / s.v2) : 0.0; });
   SurveyRun second(motion, scene, end, typical);
   survey.failure = second.go(max_steps - max_steps / 2);
   if (longer_survey * max_steps <= most_steps && survey.failure.empty() &&
@@ -168,12 +170,39 @@ RateSurvey survey_rate(const Scene& scene, const SolverFactory& solvers, double 
   survey.scales.lowest = std::max(fell ? 0.0 : lowest_rate(second.stretches, typical), 0.3 / span);
   survey.covered = second.covered;
   survey.accelerations = motion.accelerations();
-  for (const Stretch& stretch : second.stretches) {
+  for (const SurveyStep& stretch : second.stretches) {
     const double rate = stretch.rate(survey.scales.typical);
     survey.slowest = survey.slowest == 0.0 ? rate : std::min(survey.slowest, rate);
     survey.fastest = std::max(survey.fastest, rate);
   }
   return survey;
+}
+
+PlanLine variable_steps_line(const std::shared_ptr<const Scene>& given, const SolverFactory& solvers,
+                             double end, double step, const std::string& how) {
+  const auto scene = completed(given);
+  if (!has_accelerations(*scene))
+    return {"variable steps", "not offered", "L is linear in v: no accelerations to choose them by"};
+  const RateSurvey survey = survey_rate(*scene, solvers, end);
+  if (!survey.failure.empty()) return {"variable steps", "not known", survey.failure};
+  const double span = std::abs(end - scene->start.time);
+  std::ostringstream reason;
+  reason.precision(2);
+  reason << "max ω / min ω = " << survey.ratio() << " over the first ";
+  reason.precision(3);
+  reason << survey.covered << " of " << span << " units of time";
+  // The survey takes four accelerations a step, and larger steps than a run.
+  const double wanted = 1.5 * static_cast<double>(survey.accelerations) / 4.0 * span / survey.covered;
+  const double fixed = span / std::abs(step);
+  if (wanted > most_of_fixed * fixed) {
+    std::ostringstream text;
+    text.precision(1);
+    text << "they would take about " << wanted << " steps, " << fixed
+         << " of the scene's own size lead to the end; " << reason.str();
+    return {"variable steps", "left out", text.str()};
+  }
+  if (survey.variable_steps_pay()) return {"variable steps", "pay: " + how, reason.str()};
+  return {"variable steps", "left out", reason.str() + ", they pay above 5"};
 }
 
 }  // namespace diracstep

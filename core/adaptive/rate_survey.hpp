@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <diracstep/core/adaptive/rate_monitor.hpp>
+#include <diracstep/core/integrator/integrator_options.hpp>
+#include <memory>
 #include <string>
 
 namespace diracstep {
@@ -33,5 +35,10 @@ inline constexpr long survey_steps = 400;
 /// start or not finite, and for a Lagrangian linear in v.
 RateSurvey survey_rate(const Scene& scene, const SolverFactory& solvers, double end,
                        long max_steps = survey_steps);
+
+/// What a plan says of variable steps, by a survey to `end`: whether they pay beside fixed ones of the size
+/// `step`, or why that is not known.  `how` is how the user asks for them.
+PlanLine variable_steps_line(const std::shared_ptr<const Scene>& scene, const SolverFactory& solvers,
+                             double end, double step, const std::string& how);
 
 }  // namespace diracstep

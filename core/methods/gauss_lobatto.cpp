@@ -8,7 +8,7 @@ namespace diracstep {
 namespace {
 
 /// A product factor · y_i·y_j of two columns, i < j; `per_step` products carry a factor h.
-struct Pairing {
+struct ColumnProduct {
   int i, j;
   double factor;
   bool per_step;
@@ -45,7 +45,7 @@ class GaussLobattoFunction final : public GeneratingFunction {
       const double t = move_to(i, step, y);
       sum += sign_ * step.size * table_.b[i] * lagrangian_->value(t, q_, v_);
     }
-    for (const Pairing& p : pairings_) sum += factor(p, step) * y.col(p.i).dot(y.col(p.j));
+    for (const ColumnProduct& p : pairings_) sum += factor(p, step) * y.col(p.i).dot(y.col(p.j));
     return sum;
   }
 
@@ -58,7 +58,7 @@ class GaussLobattoFunction final : public GeneratingFunction {
       for (int k = 0; k < s_; ++k) g.col(2 + k) += w * step.size * from_base_(i, k) * lq_;
       g.col(2 + i) += w * lv_;
     }
-    for (const Pairing& p : pairings_) {
+    for (const ColumnProduct& p : pairings_) {
       g.col(p.i) += factor(p, step) * y.col(p.j);
       g.col(p.j) += factor(p, step) * y.col(p.i);
     }
@@ -71,7 +71,7 @@ class GaussLobattoFunction final : public GeneratingFunction {
       lagrangian_->hessian(t, q_, v_, lqq_, lqv_, lvv_);
       add_node(i, step.size, w, blocks);
     }
-    for (const Pairing& p : pairings_)
+    for (const ColumnProduct& p : pairings_)
       for (const int place : diagonal_) blocks(place, pair(p.i, p.j)) += factor(p, step);
   }
 
@@ -102,7 +102,7 @@ class GaussLobattoFunction final : public GeneratingFunction {
     }
   }
 
-  static double factor(const Pairing& p, Interval step) {
+  static double factor(const ColumnProduct& p, Interval step) {
     return p.per_step ? p.factor * step.size : p.factor;
   }
 
@@ -145,7 +145,7 @@ class GaussLobattoFunction final : public GeneratingFunction {
   double sign_;              ///< of h Σ b_i L
   Columns from_base_;        ///< Q_i = base + h Σ_k from_base_ik V_k
   std::vector<int> moving_;  ///< the columns that Q_i and V_i depend on
-  std::vector<Pairing> pairings_;
+  std::vector<ColumnProduct> pairings_;
   std::vector<int> places_, mirrored_places_, diagonal_;
   Vector q_, v_, lq_, lv_, lqq_, lqv_, lvv_;
 };

@@ -118,8 +118,8 @@ class NearestPointProblem final : public NonlinearProblem {
   throw Misuse(message.str());
 }
 
-constexpr int largest_full = 100;        // rows that are looked through for dependent ones
-constexpr double rank_tolerance = 1e-7;  // of their independence, at poses found to 1e-10
+constexpr int largest_full = 100;                // rows that are looked through for dependent ones
+constexpr double independence_tolerance = 1e-7;  // of their independence, at poses found to 1e-10
 
 /// Numbers of the components that are no guesses.
 std::vector<int> held(const std::vector<bool>& guesses) {
@@ -158,7 +158,7 @@ std::shared_ptr<const Scene> independent(std::shared_ptr<const Scene> scene, con
                 pose_near(only_holonomic(scene->constraints), start.time, start.q, held).value_or(start.q));
   const std::vector<std::string> names = scene->row_names();
   std::vector<std::string> left;
-  for (const int r : dependent_columns(full_one_forms(rows, held), rank_tolerance))
+  for (const int r : dependent_columns(full_one_forms(rows, held), independence_tolerance))
     left.push_back(names[static_cast<std::size_t>(r)]);
   return left.empty() ? scene : without_rows(*scene, left);
 }

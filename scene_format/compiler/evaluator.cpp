@@ -11,7 +11,7 @@ namespace {
 
 constexpr long double largest_index = 1e9L;
 
-Place place_of(const SceneProgram& program, Node node) {
+Place written_at(const SceneProgram& program, Node node) {
   const auto found = program.symbols.places.find(node);
   return found == program.symbols.places.end() ? Place{} : found->second;
 }
@@ -36,7 +36,7 @@ std::size_t Evaluator::at(Node node) const {
 long Evaluator::index(Node node) const {
   const long double value = values_[at(node)];
   if (!(std::abs(value) <= largest_index) || value != std::floor(value))
-    throw SceneError(program_.document.file, place_of(program_, node),
+    throw SceneError(program_.document.file, written_at(program_, node),
                      fmt::format("an index or bound is {:g}; expected a whole number up to {:g}",
                                  static_cast<double>(value), static_cast<double>(largest_index)));
   return static_cast<long>(value);
@@ -65,7 +65,7 @@ void Evaluator::compute(std::size_t place) {
       const long i = index(data.b);
       if (i < 1 || i > static_cast<long>(array.size()))
         throw SceneError(
-            program_.document.file, place_of(program_, nodes_[place]),
+            program_.document.file, written_at(program_, nodes_[place]),
             fmt::format("{}[{}] is outside 1..{}",
                         program_.symbols.parameters[static_cast<std::size_t>(data.a)].name, i, array.size()));
       value = array[static_cast<std::size_t>(i - 1)];

@@ -25,16 +25,11 @@ constexpr std::string_view seal = "\ndiracstep kernels, SHA-256 ";  ///< at the 
 constexpr std::size_t digits = 64;
 constexpr std::size_t largest_object = 500'000'000;  // bytes
 
-std::string variable(const char* name) {
-  const char* value = std::getenv(name);
-  return value == nullptr ? "" : value;
-}
-
 fs::path cache_folder() {
-  if (const std::string own = variable("DIRACSTEP_CACHE"); !own.empty()) return own;
-  if (const std::string cache = variable("XDG_CACHE_HOME"); !cache.empty())
+  if (const std::string own = environment("DIRACSTEP_CACHE"); !own.empty()) return own;
+  if (const std::string cache = environment("XDG_CACHE_HOME"); !cache.empty())
     return fs::path(cache) / "diracstep";
-  if (const std::string home = variable("HOME"); !home.empty())
+  if (const std::string home = environment("HOME"); !home.empty())
     return fs::path(home) / ".cache" / "diracstep";
   return {};
 }
@@ -80,6 +75,11 @@ bool is_ours(const fs::path& path) {
 }
 
 }  // namespace
+
+std::string environment(const char* name) {
+  const char* value = std::getenv(name);
+  return value == nullptr ? "" : value;
+}
 
 KernelCache::KernelCache() : folder_(cache_folder()) {
   if (folder_.empty()) {
@@ -154,7 +154,7 @@ void KernelCache::limit_size(const fs::path& newest) const {
     std::uintmax_t bytes;
   };
   std::uintmax_t limit = usual_bytes, total = 0;
-  if (const std::string given = variable("DIRACSTEP_CACHE_BYTES"); !given.empty())
+  if (const std::string given = environment("DIRACSTEP_CACHE_BYTES"); !given.empty())
     limit = std::strtoull(given.c_str(), nullptr, 10);
   std::error_code error;
   std::vector<Kept> all;

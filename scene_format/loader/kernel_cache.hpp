@@ -7,6 +7,9 @@
 
 namespace diracstep {
 
+/// The value of an environment variable; empty where it is not set.
+std::string environment(const char* name);
+
 /// A folder of shared objects that this user has compiled.  What is loaded from it runs in this process, so a
 /// file counts only where it and its folder belong to this user and nobody else may write them, no folder
 /// above lets another user rename them, and the SHA-256 at its end is that of its bytes.

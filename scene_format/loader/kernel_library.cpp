@@ -34,25 +34,20 @@ constexpr std::array<const char*, 7> flags{"-std=c11", "-O3", "-ffp-contract=off
                                            "-shared",  "-w"};
 constexpr double usual_seconds = 120.0;
 
-std::string variable(const char* name) {
-  const char* value = std::getenv(name);
-  return value == nullptr ? "" : value;
-}
-
 double compiler_seconds() {
-  const double given = std::strtod(variable("DIRACSTEP_CC_SECONDS").c_str(), nullptr);
+  const double given = std::strtod(environment("DIRACSTEP_CC_SECONDS").c_str(), nullptr);
   return std::isfinite(given) && given > 0.0 ? given : usual_seconds;
 }
 
 /// The first compiler there is, as a path; empty where there is none.
 std::string found_compiler() {
-  const std::string own = variable("DIRACSTEP_CC");
+  const std::string own = environment("DIRACSTEP_CC");
   const auto is_program = [](const std::string& path) { return ::access(path.c_str(), X_OK) == 0; };
   if (own.find('/') != std::string::npos) return is_program(own) ? own : "";
   std::vector<std::string> names{"cc", "gcc", "clang"};
   if (!own.empty()) names = {own};
   for (const std::string& name : names) {
-    std::istringstream folders(variable("PATH"));
+    std::istringstream folders(environment("PATH"));
     for (std::string folder; std::getline(folders, folder, ':');)
       if (std::string path = fmt::format("{}/{}", folder, name); !folder.empty() && is_program(path))
         return path;
@@ -142,15 +137,15 @@ KernelLibrary compiled_now(const SceneProgram& program, const KernelCache& cache
 }  // namespace
 
 KernelLibrary kernel_library(const SceneProgram& program) {
-  if (variable("DIRACSTEP_CC") == "none") return {.origin = "interpreted, as DIRACSTEP_CC=none asks for"};
+  if (environment("DIRACSTEP_CC") == "none") return {.origin = "interpreted, as DIRACSTEP_CC=none asks for"};
   for (const ShippedScene& shipped : shipped_scenes())
     if (shipped.program == program.name) return {shipped.kernels, {}, "compiled with the library"};
   if (const std::size_t limit = scene_compiler::size_limits().source_bytes; program.source.size() > limit)
     return interpreted(fmt::format("{} bytes of C code, the limit for a compiler is {} (DIRACSTEP_LIMITS)",
                                    program.source.size(), limit));
   const std::string compiler = found_compiler();
-  if (compiler.empty() && !variable("DIRACSTEP_CC").empty())
-    return interpreted(fmt::format("DIRACSTEP_CC={} could not be run", variable("DIRACSTEP_CC")));
+  if (compiler.empty() && !environment("DIRACSTEP_CC").empty())
+    return interpreted(fmt::format("DIRACSTEP_CC={} could not be run", environment("DIRACSTEP_CC")));
   if (compiler.empty())
     return interpreted("no C compiler was found (cc, gcc or clang; Debian: apt-get install gcc libc6-dev)");
   const KernelCache cache;

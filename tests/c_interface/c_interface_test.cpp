@@ -496,5 +496,19 @@ TEST_F(CInterface, WithoutAMethodWhatTheFileRecommendsIsTaken) {
   EXPECT_NE(all.find("the scene's file recommends it"), std::string::npos);
 }
 
+TEST_F(CInterface, ThePlanTellsWhetherVariableStepsPay) {
+  const auto decision = [&](const char* scene) {
+    EXPECT_EQ(open(scene), DIRACSTEP_OK);
+    EXPECT_EQ(create(), DIRACSTEP_OK);
+    diracstep_table plan{};
+    EXPECT_EQ(diracstep_plan(made_, &plan), DIRACSTEP_OK);
+    for (int k = 0; k < plan.rows; ++k)
+      if (std::string(plan.cells[3 * k]) == "variable steps") return std::string(plan.cells[3 * k + 1]);
+    return std::string("no line");
+  };
+  EXPECT_EQ(decision("kepler_e099"), "pay: eps");
+  EXPECT_EQ(decision("pendulum_cartesian"), "left out");
+}
+
 }  // namespace
 }  // namespace diracstep::testing

@@ -266,6 +266,18 @@ TEST_F(Strangers, ManyRowsOfOneCoordinateAreRefusedAtOnce) {
   EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(30));
 }
 
+TEST_F(Strangers, ALargeStartIsNotProjected) {
+  std::string rows;
+  for (int k = 0; k < 10001; ++k) rows += "[[rows]]\nequation = \"x = 1\"\n";
+  write("guessed.toml",
+        "name = \"s\"\nlagrangian = \"v_x^2/2\"\n[coordinates]\nx = {}\n[start]\nx = 2\nguess = [\"x\"]\n"
+        "[span]\nend = 1\nstep = 0.1\n" +
+            rows);
+  const Outcome refused = run("run '" + path("guessed.toml") + "'", "ulimit -v 4000000; DIRACSTEP_CC=none");
+  EXPECT_EQ(refused.status, 2);
+  EXPECT_NE(refused.err.find("at most 10000 together"), std::string::npos) << refused.err.substr(0, 500);
+}
+
 // Strangers' text.
 
 TEST_F(Strangers, ControlCharactersAreShownEscaped) {

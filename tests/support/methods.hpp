@@ -14,6 +14,9 @@ inline const std::vector<std::string>& every_method() {
   return names;
 }
 
+/// The method of s Gauss-Lobatto stages.
+inline std::string gl(int s) { return "type1/gl:" + std::to_string(s); }
+
 /// A method's name as a test name.
 inline std::string test_name(std::string name) {
   for (char& c : name)

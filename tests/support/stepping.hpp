@@ -11,6 +11,8 @@
 
 namespace diracstep::testing {
 
+inline double distance(const Vector& a, const Vector& b) { return (a - b).lpNorm<Eigen::Infinity>(); }
+
 /// Every `every`-th point of a run; fails the test where the run fails.
 inline std::vector<Sample> samples_of(const std::shared_ptr<const Scene>& scene,
                                       const IntegratorOptions& options, long steps,

@@ -31,7 +31,7 @@ bool agrees(const OrderMeasurement& measured, int expected) {
   return measured.failure.empty() && std::abs(measured.order - expected) <= 0.2;
 }
 
-std::string cell(const OrderMeasurement& measured) {
+std::string measured_cell(const OrderMeasurement& measured) {
   return std::isfinite(measured.order) ? fmt::format("{:.2f}", measured.order) : "**failed**";
 }
 
@@ -96,7 +96,8 @@ std::string rule_table_markdown(const std::vector<RuleRow>& rows) {
   text += "\n|---|---|---|---|---|---|\n";
   for (const RuleRow& row : rows) {
     text += fmt::format("| `{}` | {} |", row.method, row.order);
-    for (const OrderMeasurement& measured : row.measured) text += fmt::format(" {} |", cell(measured));
+    for (const OrderMeasurement& measured : row.measured)
+      text += fmt::format(" {} |", measured_cell(measured));
     text += '\n';
   }
   return text;
@@ -105,7 +106,7 @@ std::string rule_table_markdown(const std::vector<RuleRow>& rows) {
 std::string circuit_table_markdown(const std::vector<CircuitRow>& rows) {
   std::string text = circuit_explanation;
   for (const CircuitRow& row : rows)
-    text += fmt::format("| `{}` | {} | {} |\n", row.method, row.order, cell(row.measured));
+    text += fmt::format("| `{}` | {} | {} |\n", row.method, row.order, measured_cell(row.measured));
   return text;
 }
 

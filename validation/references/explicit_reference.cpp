@@ -57,12 +57,6 @@ namespace {
 
 using detail::require;
 
-#ifdef DIRACSTEP_WITH_KLU
-constexpr int dense_limit = 40;  // unknowns of the linear system; larger ones are factored by KLU
-#else
-constexpr int dense_limit = 1 << 30;
-#endif
-
 struct FreeErk {
   void operator()(void* memory) const { ERKStepFree(&memory); }
 };
@@ -70,7 +64,9 @@ struct FreeErk {
 class ExplicitIntegration {
  public:
   ExplicitIntegration(const Scene& scene, const ReferenceOptions& options)
-      : scene_(scene), options_(options), equations_(scene, scene.dimension() + scene.rows() <= dense_limit) {
+      : scene_(scene),
+        options_(options),
+        equations_(scene, scene.dimension() + scene.rows() <= largest_full_system()) {
     y_.reset(require(N_VNew_Serial(equations_.size(), context_), "N_VNew_Serial"));
     auto y = map(y_.get());
     y.head(scene.dimension()) = scene.start.q;

@@ -140,12 +140,6 @@ namespace {
 
 using detail::require;
 
-#ifdef DIRACSTEP_WITH_KLU
-constexpr int dense_limit = 40;  // unknowns; larger systems are factored by KLU
-#else
-constexpr int dense_limit = 1 << 30;
-#endif
-
 constexpr double loose_tolerance = 1e2;  // of multipliers that no test is to wait for
 
 struct FreeIda {
@@ -161,8 +155,8 @@ class IdaIntegration {
       : scene_(scene),
         options_(options),
         atol_(options.atol > 0.0 ? options.atol : options.rtol),
-        dae_(scene, unknowns(scene, options.formulation) <= dense_limit, options.formulation),
-        acceleration_problem_(scene, unknowns(scene, options.formulation) <= dense_limit),
+        dae_(scene, unknowns(scene, options.formulation) <= largest_full_system(), options.formulation),
+        acceleration_problem_(scene, unknowns(scene, options.formulation) <= largest_full_system()),
         acceleration_solver_(kinsol()(acceleration_problem_)),
         acceleration_(Vector::Zero(acceleration_problem_.size())),
         linear_solver_(detail::make_linear_solver(dae_.pattern())),
@@ -203,7 +197,7 @@ class IdaIntegration {
 
   /// The velocity at the start that a Lagrangian linear in v determines, whatever the scene gives.
   SolveReport solve_phase_space_velocity(VectorRef v) {
-    PhaseSpaceVelocityProblem problem(scene_, dae_.size() <= dense_limit);
+    PhaseSpaceVelocityProblem problem(scene_, dae_.size() <= largest_full_system());
     problem.begin(scene_.start.time, scene_.start.q);
     return kinsol()(problem)->solve(v);
   }

@@ -2,6 +2,7 @@
 #include <ctime>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/validation/references/reference_run.hpp>
+#include <limits>
 #include <sstream>
 
 namespace diracstep {
@@ -36,6 +37,14 @@ void require_reference(const char* integrator, const Scene& scene, double t_end,
   require(options.atol >= 0.0 && std::isfinite(options.atol), "atol", options.atol,
           "a finite number, 0 or more, is needed");
   require(options.max_steps >= 1, "max_steps", static_cast<double>(options.max_steps), "1 or more is needed");
+}
+
+int largest_full_system() {
+#ifdef DIRACSTEP_WITH_KLU
+  return 40;
+#else
+  return std::numeric_limits<int>::max();
+#endif
 }
 
 double thread_seconds() {

@@ -50,4 +50,8 @@ void require_reference(const char* integrator, const Scene& scene, double t_end,
 /// CPU time of the calling thread.
 double thread_seconds();
 
+/// Unknowns up to which a linear system is factored in full; larger ones are factored by KLU, where the build
+/// has it.
+int largest_full_system();
+
 }  // namespace diracstep

@@ -13,18 +13,18 @@ namespace diracstep {
 
 namespace {
 
-struct Candidate {
+struct Ladder {
   const char* method;
   int order;
 };
-constexpr std::array<Candidate, 4> candidates{
+constexpr std::array<Ladder, 4> reference_ladders{
     {{"type1/gl:6", 12}, {"type1/gl:4", 8}, {"type1/midpoint", 8}, {"type1/trapezoidal", 8}}};
 
 constexpr double converged = 1e-6;  ///< a change above it is never taken for round-off
 constexpr double still_falling = 0.5;
 constexpr double smallest_claim = 1e-15;  ///< the rounding of the reference itself
 constexpr double first_step = 8.0;        ///< times the scene's own
-constexpr long steps_between_looks = 256;
+constexpr long steps_per_look = 256;
 constexpr int most_halvings = 30;
 
 double distance(const Sample& a, const Sample& b) {
@@ -48,7 +48,7 @@ class Refinement {
              double t_end, const Look& look)
       : scene_(scene), registry_(registry), solvers_(solvers), t_end_(t_end), look_(look) {}
 
-  Refined refined(const Candidate& by, double seconds) const {
+  Refined refined(const Ladder& by, double seconds) const {
     Refined best;
     best.method = by.method;
     best.order = by.order;
@@ -83,13 +83,13 @@ class Refinement {
   }
 
  private:
-  std::string run(const Candidate& by, double step, Sample& end) const {
+  std::string run(const Ladder& by, double step, Sample& end) const {
     const StepGrid grid = fit_steps(scene_.scene->start.time, t_end_, step);
     Integrator integrator = made(by, grid.step);
     const StepReport last = step_while(
         integrator, [&](long k) { return k < grid.steps; },
         [&](long k) {
-          if (look_ && k % steps_between_looks == 0) look_();
+          if (look_ && k % steps_per_look == 0) look_();
           return true;
         });
     if (!last.ok()) return last.failure;
@@ -97,7 +97,7 @@ class Refinement {
     return reading.ok() ? "" : describe(reading.status);
   }
 
-  Integrator made(const Candidate& by, double step) const {
+  Integrator made(const Ladder& by, double step) const {
     IntegratorOptions options{.method = by.method, .order = by.order, .step = step};
     options.compensated_sums = true;
     try {
@@ -123,7 +123,7 @@ ReferenceEnd converged_reference(const CatalogueScene& scene, const Registry& re
   const Refinement refinement(scene, registry, solvers, t_end, look);
   std::vector<Refined> found;
   ReferenceEnd reference{.kind = "converged", .how = {}, .missing = {}, .q = {}, .p = {}};
-  for (const Candidate& candidate : candidates) {
+  for (const Ladder& candidate : reference_ladders) {
     if (found.size() == 2) break;
     try {
       Refined one = refinement.refined(candidate, 0.5 * seconds);

@@ -16,11 +16,10 @@ namespace diracstep {
 
 namespace {
 
-constexpr double coarse_error = 1e-2;     // a ladder begins at a step with at least this error
-constexpr double plateau_ceiling = 1e-6;  // errors above it are never taken for round-off
-constexpr double still_falling = 0.7;     // an order-1 method halves the error where the step is halved
-constexpr int plateau_length = 2;         // refinements in vain that end a ladder
-constexpr double usual_ladder = 12.0;     // rows, for the progress only
+constexpr double coarse_error = 1e-2;    // a ladder begins at a step with at least this error
+constexpr double improves_little = 0.7;  // an order-1 method halves the error where the step is halved
+constexpr int plateau_length = 2;        // refinements in vain that end a ladder
+constexpr double usual_ladder = 12.0;    // rows, for the progress only
 constexpr std::size_t longest_ladder = 40;
 constexpr double fewest_steps = 2.0;
 constexpr double natural_eps = 1.0;                   // radians of the coarsest variable step
@@ -231,7 +230,7 @@ class StudyInProgress {
       const StudyRow& row = run_row(series, step, part);
       cpu_seconds = row.cpu_seconds.median;
       if (!row.ok()) continue;
-      in_vain = best < plateau_ceiling && row.error() > still_falling * best ? in_vain + 1 : 0;
+      in_vain = best < plateau_ceiling && row.error() > improves_little * best ? in_vain + 1 : 0;
       best = std::isnan(best) ? row.error() : std::min(best, row.error());
       if (row.error() < smallest) return fmt::format("the reference is known to {:.1e} only", smallest);
       if (in_vain == plateau_length)

@@ -24,12 +24,6 @@ constexpr double student_t = 2.101;  // 97.5 % quantile of Student's t with 18 d
 constexpr long ida_max_steps = 200'000;
 constexpr double ida_least_budget = 0.05;  // CPU seconds
 
-double thread_seconds() {
-  std::timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
-
 struct Point {
   double time, deviation;
 };

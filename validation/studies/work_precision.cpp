@@ -11,7 +11,6 @@ constexpr double zero_reference = 1e-14;  // a body at rest has such momenta in 
 constexpr double pre_asymptotic = 1e-2;
 constexpr double round_off = 1e-11;
 constexpr double round_off_margin = 30.0;
-constexpr double plateau_ceiling = 1e-6;
 constexpr double plateau_slope = 0.5;
 constexpr std::size_t max_points = 4;
 constexpr std::size_t fewest_points = 3;

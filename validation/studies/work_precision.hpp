@@ -6,6 +6,9 @@
 
 namespace diracstep {
 
+/// Errors above it are never taken for round-off.
+inline constexpr double plateau_ceiling = 1e-6;
+
 /// One run: its step or tolerance, its error and its CPU time.
 struct WorkPoint {
   double step = 0.0;
@@ -26,8 +29,8 @@ struct OrderFit {
 ///
 ///   * its error is below 1e-2 (coarser ones are pre-asymptotic), and
 ///   * it lies above round-off: above 1e-11, or above 30 times the smallest error reached.
-///     Where the ladder shows a plateau (an error below 1e-6 that a refinement lowers by less than the square
-///     root of the step ratio) only the second part holds, for the points before it;
+///     Where the ladder shows a plateau (an error below plateau_ceiling that a refinement lowers by less than
+///     the square root of the step ratio) only the second part holds, for the points before it;
 ///
 /// of these the finest four are taken.
 std::optional<OrderFit> measure_order(std::vector<WorkPoint> points);

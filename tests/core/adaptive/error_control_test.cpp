@@ -18,8 +18,8 @@ using testing::expect_misuse;
 using testing::samples_of;
 
 ErrorControlReport solve(const std::shared_ptr<const Scene>& scene, double end,
-                         const ErrorControlOptions& options) {
-  return solve_to_error(scene, Registry::with_built_ins(), kinsol(), end, options);
+                         const ErrorControlOptions& wanted) {
+  return solve_to_error(scene, Registry::with_built_ins(), kinsol(), end, wanted);
 }
 
 double true_error(const std::shared_ptr<const Scene>& scene, const Sample& end, long steps) {

@@ -106,8 +106,8 @@ Vector contact_curve(double t) {
 
 TEST_P(EveryRule, DefectOnACurveInTheDistributionHasTheOrderOfTheRule) {
   Discrete c = discrete(testing::nonholonomic()->constraints);
-  const auto defect = [&](double h) {
-    return std::abs(c.at({1.0, h}, contact_curve(1.0), contact_curve(1.0 + h))[0]);
+  const auto defect = [&](double size) {
+    return std::abs(c.at({1.0, size}, contact_curve(1.0), contact_curve(1.0 + size))[0]);
   };
   const bool one_sided = GetParam() == StepRule::left || GetParam() == StepRule::right;
   EXPECT_NEAR(std::log2(defect(0.01) / defect(0.005)), one_sided ? 2.0 : 3.0, 0.05);

@@ -18,8 +18,6 @@ using testing::join;
 using testing::samples_of;
 using testing::ScenePointer;
 
-double distance(const Vector& a, const Vector& b) { return (a - b).lpNorm<Eigen::Infinity>(); }
-
 // --- Accuracy
 // ---------------------------------------------------------------------------------------------------
 
@@ -29,11 +27,11 @@ TEST(Integrator, SparseAndFullMatricesAgree) {
       const Sample full = samples_of(scene, options, 20).back();
       options.dense_limit = 0;
       const Sample sparse = samples_of(scene, options, 20).back();
-      EXPECT_LT(distance(full.q, sparse.q), 1e-12) << describe(scene, options);
-      EXPECT_LT(distance(full.p, sparse.p), 1e-12) << describe(scene, options);
-      EXPECT_LT(distance(full.v, sparse.v), 1e-12) << describe(scene, options);
+      EXPECT_LT(testing::distance(full.q, sparse.q), 1e-12) << describe(scene, options);
+      EXPECT_LT(testing::distance(full.p, sparse.p), 1e-12) << describe(scene, options);
+      EXPECT_LT(testing::distance(full.v, sparse.v), 1e-12) << describe(scene, options);
       if (scene->rows() == 0) continue;
-      EXPECT_LT(distance(full.lambda, sparse.lambda), 1e-11) << describe(scene, options);
+      EXPECT_LT(testing::distance(full.lambda, sparse.lambda), 1e-11) << describe(scene, options);
     }
 }
 
@@ -42,7 +40,7 @@ double composed_order(const ScenePointer& scene, int order, long steps, const Sa
   const auto error = [&](long count) {
     const IntegratorOptions options{.method = "type1/midpoint", .order = order, .step = 2.0 / double(count)};
     const Sample end = samples_of(scene, options, count).back();
-    return distance(join(end.q, end.p), join(reference.q, reference.p));
+    return testing::distance(join(end.q, end.p), join(reference.q, reference.p));
   };
   const double coarse = error(steps), fine = error(2 * steps);
   EXPECT_GT(fine, 1e-12) << "round-off of the reference";
@@ -74,8 +72,8 @@ TEST(Integrator, StepForwardAndBackReturnsToTheProjectedStart) {
       options.step = -options.step;
       const Sample back = samples_of(turned, options, 1).back();
       EXPECT_EQ(back.time, 0.0);
-      EXPECT_LT(distance(back.q, forward[0].q), 1e-13) << describe(scene, options);
-      EXPECT_LT(distance(back.p, forward[0].p), 1e-12) << describe(scene, options);
+      EXPECT_LT(testing::distance(back.q, forward[0].q), 1e-13) << describe(scene, options);
+      EXPECT_LT(testing::distance(back.p, forward[0].p), 1e-12) << describe(scene, options);
     }
 }
 
@@ -100,8 +98,8 @@ TEST(Integrator, SeparableTrapezoidalStepIsVelocityVerletWithoutASolve) {
     v += h / 2.0 * force(q).cwiseQuotient(mass);
     ASSERT_TRUE(integrator.step().ok());
     ASSERT_TRUE(integrator.sample(Momentum::projected, sample).ok());
-    EXPECT_LT(distance(sample.q, q), 1e-14);
-    EXPECT_LT(distance(sample.v, v), 1e-13);
+    EXPECT_LT(testing::distance(sample.q, q), 1e-14);
+    EXPECT_LT(testing::distance(sample.v, v), 1e-13);
   }
   EXPECT_EQ(integrator.work().solves, 0);
   EXPECT_EQ(integrator.work().iterations, 0);
@@ -126,7 +124,7 @@ void expect_stated_orders(const ScenePointer& scene, double end, Exact exact) {
       IntegratorOptions fitted = options;
       fitted.step = grid.step;
       const Sample last = samples_of(scene, fitted, grid.steps).back();
-      return distance(join(join(last.q, last.v), last.lambda), exact(last.time));
+      return testing::distance(join(join(last.q, last.v), last.lambda), exact(last.time));
     };
     const double coarse = error(options.step), fine = error(options.step / 2.0);
     EXPECT_NEAR(std::log2(coarse / fine), options.order, 0.1) << describe(scene, options);

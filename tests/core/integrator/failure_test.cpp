@@ -17,8 +17,6 @@ using testing::expect_parts;
 using testing::integrator_for;
 using testing::ScenePointer;
 
-double distance(const Vector& a, const Vector& b) { return (a - b).lpNorm<Eigen::Infinity>(); }
-
 // --- Failure
 // ----------------------------------------------------------------------------------------------------
 
@@ -65,7 +63,7 @@ StepReport failing_step(Integrator& integrator, long step) {
   EXPECT_EQ(integrator.work().steps, step);
   EXPECT_TRUE(integrator.sample(Momentum::plus, after).ok());
   EXPECT_EQ(after.p, before.p);
-  EXPECT_LT(distance(after.v, before.v), 1e-14);
+  EXPECT_LT(testing::distance(after.v, before.v), 1e-14);
   return report;
 }
 
@@ -107,7 +105,7 @@ TEST(Failure, LaterStageLeavesTheMinusMomentumAsItWas) {
   ASSERT_FALSE(integrator.step().ok());
   ASSERT_TRUE(integrator.sample(Momentum::minus, after).ok());
   EXPECT_EQ(after.q, before.q);
-  EXPECT_LT(distance(after.p, before.p), 1e-13);
+  EXPECT_LT(testing::distance(after.p, before.p), 1e-13);
 }
 
 TEST(Failure, LagrangianThatIsNotANumberIsReported) {

@@ -28,8 +28,6 @@ using testing::ScenePointer;
 const double nan = std::numeric_limits<double>::quiet_NaN();
 const double infinity = std::numeric_limits<double>::infinity();
 
-double distance(const Vector& a, const Vector& b) { return (a - b).lpNorm<Eigen::Infinity>(); }
-
 // --- Construction
 // -----------------------------------------------------------------------------------------------
 
@@ -80,9 +78,9 @@ TEST(Momentum, PlusAndMinusAreTheTwoDiscreteLegendreTransforms) {
   Columns y(3, 2), g(3, 2);
   y << plus[1].q, plus[2].q;
   l_d->gradient({plus[1].time, options.step}, y, g);
-  EXPECT_LT(distance(plus[2].p, g.col(1)), 1e-12);
-  EXPECT_LT(distance(minus[1].p, -g.col(0)), 1e-12);
-  EXPECT_GT(distance(minus[1].p, plus[1].p), 1e-4) << "the impulse vanishes, so nothing is tested";
+  EXPECT_LT(testing::distance(plus[2].p, g.col(1)), 1e-12);
+  EXPECT_LT(testing::distance(minus[1].p, -g.col(0)), 1e-12);
+  EXPECT_GT(testing::distance(minus[1].p, plus[1].p), 1e-4) << "the impulse vanishes, so nothing is tested";
 }
 
 TEST(Momentum, ProjectedIsThatOfAVelocityInTheDistributionAndInTheSameClass) {
@@ -95,7 +93,7 @@ TEST(Momentum, ProjectedIsThatOfAVelocityInTheDistributionAndInTheSameClass) {
       scene->lagrangian->gradient(projected.time, projected.q, projected.v, lq, p);
       EXPECT_EQ(projected.p, p) << scene->name;
       if (scene->rows() == 0) {
-        EXPECT_LT(distance(raw.p, projected.p), 1e-14);
+        EXPECT_LT(testing::distance(raw.p, projected.p), 1e-14);
         continue;
       }
       ConstraintsAtPoint rows(scene->constraints, 3);
@@ -106,7 +104,7 @@ TEST(Momentum, ProjectedIsThatOfAVelocityInTheDistributionAndInTheSameClass) {
       const Eigen::MatrixXd a = testing::full(rows.pattern(), rows.coefficients());
       const Vector difference = raw.p - projected.p;
       const Vector lambda = a.transpose().colPivHouseholderQr().solve(difference);
-      EXPECT_LT(distance(a.transpose() * lambda, difference), 1e-13) << scene->name;
+      EXPECT_LT(testing::distance(a.transpose() * lambda, difference), 1e-13) << scene->name;
       EXPECT_GT(difference.norm(), 1e-4) << "the momenta agree, so nothing is tested";
     }
 }
@@ -159,9 +157,9 @@ TEST(Integrator, TheMinusMomentumIsThatOfTheStepTakenNext) {
       const testing::SingleStep::Result step =
           testing::SingleStep(method, *scene)({integrator.time(), options.step}, integrator.position(),
                                               integrator.momentum(), integrator.velocity_estimate());
-      EXPECT_LT(distance(minus.impulse, step.impulse), 1e-11);
+      EXPECT_LT(testing::distance(minus.impulse, step.impulse), 1e-11);
       ASSERT_TRUE(integrator.step().ok());
-      EXPECT_LT(distance(integrator.position(), step.q1), 1e-11);
+      EXPECT_LT(testing::distance(integrator.position(), step.q1), 1e-11);
     }
   });
 }

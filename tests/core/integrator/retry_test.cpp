@@ -6,6 +6,7 @@
 
 #include "combinations.hpp"
 #include "misuse.hpp"
+#include "stepping.hpp"
 
 /// What happens where Newton's method from the first guess does not do: retries, other solutions, divided
 /// steps, and that a failure leaves no trace.
@@ -17,8 +18,6 @@ using testing::expect_parts;
 using testing::integrator_for;
 using testing::same_bits;
 using testing::ScenePointer;
-
-double distance(const Vector& a, const Vector& b) { return (a - b).lpNorm<Eigen::Infinity>(); }
 
 /// Two bodies at the pericentre of an orbit of eccentricity 0.6.
 ScenePointer kepler() {
@@ -139,7 +138,7 @@ struct LadderTest : ::testing::Test {
     EXPECT_TRUE(integrator.step().ok());
     Integrator undisturbed = integrator_for(pendulum(), integrator.options());
     for (int k = 0; k < 7; ++k) EXPECT_TRUE(undisturbed.step().ok());
-    EXPECT_LT(distance(integrator.position(), undisturbed.position()), 1e-13);
+    EXPECT_LT(testing::distance(integrator.position(), undisturbed.position()), 1e-13);
     return integrator.work().retries;
   }
 };
@@ -197,7 +196,7 @@ TEST(Substeps, AreTakenWhereTheWholeStepHasNoSolution) {
   Integrator smaller = integrator_for(kepler(), half);
   ASSERT_TRUE(smaller.step().ok());
   ASSERT_TRUE(smaller.step().ok());
-  EXPECT_LT(distance(divided.position(), smaller.position()), 1e-13);
+  EXPECT_LT(testing::distance(divided.position(), smaller.position()), 1e-13);
   for (int k = 0; k < 5; ++k) EXPECT_TRUE(divided.step().ok()) << k;  // and the run goes on
 }
 

@@ -4,6 +4,7 @@
 #include <diracstep/core/steps/gauss_lobatto/tableau.hpp>
 
 #include "differences.hpp"
+#include "methods.hpp"
 #include "scenes.hpp"
 #include "stepping.hpp"
 
@@ -12,8 +13,6 @@ namespace {
 
 using testing::join;
 using testing::samples_of;
-
-std::string gl(int s) { return "type1/gl:" + std::to_string(s); }
 
 TEST(GaussLobattoTableau, HasTheKnownCoefficients) {
   const GaussLobattoTableau one = gauss_lobatto_tableau(1), two = gauss_lobatto_tableau(2);
@@ -52,7 +51,7 @@ TEST(GaussLobattoStep, JacobianAgreesWithDifferences) {
     for (const auto& plain : testing::every_constraint_class())
       for (const auto& scene : {plain, testing::forced(plain)})
         for (const bool dense : {true, false}) {
-          const auto problem = Registry::with_built_ins().method(gl(s)).make_step(*scene, {dense});
+          const auto problem = Registry::with_built_ins().method(testing::gl(s)).make_step(*scene, {dense});
           Vector p(3), lq(3), x(problem->size());
           scene->lagrangian->gradient(0.0, scene->start.q, scene->start.v, lq, p);
           problem->begin({0.0, 0.2}, {scene->start.q, p, scene->start.v}, {});
@@ -77,7 +76,7 @@ TEST(GaussLobattoStep, OneStageIsTheMidpointStep) {
     const auto midpoint = samples_of(scene, {.method = "type1/plain_midpoint", .step = 0.05}, 20,
                                      Momentum::projected, with_plain_midpoint())
                               .back();
-    const auto gauss = samples_of(scene, {.method = gl(1), .step = 0.05}, 20).back();
+    const auto gauss = samples_of(scene, {.method = testing::gl(1), .step = 0.05}, 20).back();
     EXPECT_LT((gauss.q - midpoint.q).lpNorm<Eigen::Infinity>(), 1e-13) << scene->name;
     EXPECT_LT((gauss.p - midpoint.p).lpNorm<Eigen::Infinity>(), 1e-12) << scene->name;
   }
@@ -89,7 +88,7 @@ TEST(GaussLobattoStep, PlusAndMinusMomentaAreThoseOfTheMidpointStepForOneStage) 
     const auto midpoint = samples_of(scene, {.method = "type1/plain_midpoint", .step = 0.05}, 3, momentum,
                                      with_plain_midpoint())
                               .back();
-    const auto gauss = samples_of(scene, {.method = gl(1), .step = 0.05}, 3, momentum).back();
+    const auto gauss = samples_of(scene, {.method = testing::gl(1), .step = 0.05}, 3, momentum).back();
     EXPECT_LT((gauss.p - midpoint.p).lpNorm<Eigen::Infinity>(), 1e-13);
   }
 }
@@ -105,10 +104,10 @@ double error_with(const std::shared_ptr<const Scene>& scene, const std::string& 
 }
 
 void expect_order(const std::shared_ptr<const Scene>& scene, int s, long refinement = 1) {
-  const Sample reference = samples_of(scene, {.method = gl(6), .step = 3.6 / 96}, 96).back();
+  const Sample reference = samples_of(scene, {.method = testing::gl(6), .step = 3.6 / 96}, 96).back();
   const long coarse = refinement * (s == 1 ? 240 : s == 2 ? 40 : s == 3 ? 16 : 8);
-  const double first = error_with(scene, gl(s), coarse, reference);
-  const double second = error_with(scene, gl(s), 2 * coarse, reference);
+  const double first = error_with(scene, testing::gl(s), coarse, reference);
+  const double second = error_with(scene, testing::gl(s), 2 * coarse, reference);
   EXPECT_GT(second, 1e-13) << scene->name << ": at round-off, nothing is measured";
   EXPECT_NEAR(std::log2(first / second), 2.0 * s, 0.35)
       << scene->name << " s = " << s << " errors " << first << " " << second;
@@ -127,10 +126,10 @@ TEST(GaussLobattoStep, OrderHoldsForAffineAndTimeDependentRows) {
 TEST(GaussLobattoStep, IsSelfAdjoint) {
   for (const auto& scene : testing::every_constraint_class())
     for (const int s : {1, 2, 3, 4}) {
-      const auto there = samples_of(scene, {.method = gl(s), .step = 0.1}, 1).back();
+      const auto there = samples_of(scene, {.method = testing::gl(s), .step = 0.1}, 1).back();
       auto back = std::make_shared<Scene>(*scene);
       back->start = {0.0, there.q, there.v};
-      const auto again = samples_of(back, {.method = gl(s), .step = -0.1}, 1).back();
+      const auto again = samples_of(back, {.method = testing::gl(s), .step = -0.1}, 1).back();
       EXPECT_LT((again.q - scene->start.q).lpNorm<Eigen::Infinity>(), 1e-13) << scene->name;
       EXPECT_LT((again.v - scene->start.v).lpNorm<Eigen::Infinity>(), 1e-13) << scene->name;
     }
@@ -145,7 +144,7 @@ TEST(GaussLobattoStep, TheThreeTypesAreOneSystem) {
 
 TEST(GaussLobattoStep, HolonomicRowsDoNotDrift) {
   const auto scene = testing::mixed();
-  const auto samples = samples_of(scene, {.method = gl(3), .step = 0.1}, 400);
+  const auto samples = samples_of(scene, {.method = testing::gl(3), .step = 0.1}, 400);
   Vector phi(1);
   scene->constraints.front()->position(0.0, samples.back().q, phi);
   EXPECT_LT(std::abs(phi[0]), 1e-14);
@@ -153,8 +152,9 @@ TEST(GaussLobattoStep, HolonomicRowsDoNotDrift) {
 
 TEST(GaussLobattoStep, FullAndSparseMatricesAgree) {
   for (const auto& scene : testing::every_constraint_class()) {
-    const auto full = samples_of(scene, {.method = gl(3), .step = 0.1}, 20).back();
-    const auto sparse = samples_of(scene, {.method = gl(3), .step = 0.1, .dense_limit = 0}, 20).back();
+    const auto full = samples_of(scene, {.method = testing::gl(3), .step = 0.1}, 20).back();
+    const auto sparse =
+        samples_of(scene, {.method = testing::gl(3), .step = 0.1, .dense_limit = 0}, 20).back();
     EXPECT_LT((full.q - sparse.q).lpNorm<Eigen::Infinity>(), 1e-12) << scene->name;
   }
 }

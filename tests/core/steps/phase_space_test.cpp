@@ -4,6 +4,7 @@
 #include <diracstep/core/numerics/errors.hpp>
 
 #include "differences.hpp"
+#include "methods.hpp"
 #include "misuse.hpp"
 #include "stepping.hpp"
 
@@ -36,8 +37,6 @@ std::shared_ptr<const Scene> lotka_volterra() {
   scene.start.q << 2.0, 1.0;
   return std::make_shared<const Scene>(scene);
 }
-
-std::string gl(int s) { return "type1/gl:" + std::to_string(s); }
 
 double error_at_ten(const std::shared_ptr<const Scene>& scene, const std::string& method, long steps) {
   const auto end =
@@ -76,7 +75,7 @@ TEST(PhaseSpaceStep, VelocityOfAOneFormThatDependsOnTimeIsTheClosedForm) {
 TEST(PhaseSpaceStep, JacobianAgreesWithDifferences) {
   const auto scene = completed(lotka_volterra<0>());
   for (const int s : {1, 2, 3}) {
-    const auto problem = Registry::with_built_ins().method(gl(s)).make_step(*scene, {true});
+    const auto problem = Registry::with_built_ins().method(testing::gl(s)).make_step(*scene, {true});
     Vector x = Vector::LinSpaced(problem->size(), -0.1, 0.15), p(2), lq(2);
     scene->lagrangian->gradient(0.0, scene->start.q, scene->start.v, lq, p);
     problem->begin({0.0, 0.2}, {scene->start.q, p, scene->start.v}, {});
@@ -87,7 +86,8 @@ TEST(PhaseSpaceStep, JacobianAgreesWithDifferences) {
 TEST(PhaseSpaceStep, OrderIsTwiceTheStagesInEveryGauge) {
   for (const auto& scene : {lotka_volterra<0>(), lotka_volterra<1>(), lotka_volterra<2>()})
     for (const auto& [s, steps] : {std::pair{1, 800L}, {2, 200L}, {3, 160L}, {4, 40L}}) {
-      const double first = error_at_ten(scene, gl(s), steps), second = error_at_ten(scene, gl(s), 2 * steps);
+      const double first = error_at_ten(scene, testing::gl(s), steps),
+                   second = error_at_ten(scene, testing::gl(s), 2 * steps);
       EXPECT_GT(second, 2e-14) << "round-off: nothing is measured";
       const double tolerance = s == 4 ? 0.6 : 0.2;  // round-off comes before GL(4) is quite asymptotic
       EXPECT_NEAR(std::log2(first / second), 2.0 * s, tolerance)
@@ -100,7 +100,7 @@ TEST(PhaseSpaceStep, MomentumStaysOnThePrimaryConstraintAndEnergyDoesNotDrift) {
   Vector lq(2), theta(2);
   double early = 0.0, late = 0.0;
   const double energy0 = -2.3068528194400546;
-  const auto samples = samples_of(scene, {.method = gl(2), .step = 0.2}, 5000);
+  const auto samples = samples_of(scene, {.method = testing::gl(2), .step = 0.2}, 5000);
   for (std::size_t k = 0; k < samples.size(); ++k) {
     scene->lagrangian->gradient(0.0, samples[k].q, samples[k].v, lq, theta);
     ASSERT_LT((samples[k].p - theta).lpNorm<Eigen::Infinity>(), 1e-14);
@@ -112,17 +112,17 @@ TEST(PhaseSpaceStep, MomentumStaysOnThePrimaryConstraintAndEnergyDoesNotDrift) {
 }
 
 TEST(PhaseSpaceStep, VelocityIsThatOfTheEquationsOfMotion) {
-  const Sample start = samples_of(lotka_volterra<0>(), {.method = gl(1), .step = 0.1}, 0).front();
+  const Sample start = samples_of(lotka_volterra<0>(), {.method = testing::gl(1), .step = 0.1}, 0).front();
   EXPECT_NEAR(start.v[0], 2.0 * (-1.0 + 2.0), 1e-14);   // q1' = q1 (a2 q2 + b2)
   EXPECT_NEAR(start.v[1], -1.0 * (-2.0 + 1.0), 1e-14);  // q2' = −q2 (a1 q1 + b1)
 }
 
 TEST(PhaseSpaceStep, IsSelfAdjoint) {
   for (const int s : {1, 2, 3}) {
-    const auto there = samples_of(lotka_volterra<0>(), {.method = gl(s), .step = 0.2}, 1).back();
+    const auto there = samples_of(lotka_volterra<0>(), {.method = testing::gl(s), .step = 0.2}, 1).back();
     auto back = std::make_shared<Scene>(*lotka_volterra<0>());
     back->start.q = there.q;
-    const auto again = samples_of(back, {.method = gl(s), .step = -0.2}, 1).back();
+    const auto again = samples_of(back, {.method = testing::gl(s), .step = -0.2}, 1).back();
     EXPECT_LT((again.q - lotka_volterra<0>()->start.q).lpNorm<Eigen::Infinity>(), 1e-13) << s;
   }
 }
@@ -130,7 +130,7 @@ TEST(PhaseSpaceStep, IsSelfAdjoint) {
 TEST(PhaseSpaceStep, FixedPointStepsAreThoseOfNewtonsMethodWithoutJacobians) {
   for (const int s : {1, 2, 4, 5})
     for (const auto& scene : {lotka_volterra<0>(), lotka_volterra<1>()}) {
-      const IntegratorOptions options{.method = gl(s), .step = 0.05};
+      const IntegratorOptions options{.method = testing::gl(s), .step = 0.05};
       Integrator newton(scene, Registry::with_built_ins(), kinsol(), options);
       Integrator fixed_point(scene, Registry::with_built_ins(), kinsol({.iteration = Iteration::fixed_point}),
                              options);
@@ -203,7 +203,7 @@ TEST(PhaseSpaceStep, AMillionStepsStayBoundedInTwoGauges_slow) {
     EXPECT_LT(last, 1.05 * first) << method;
     EXPECT_GT(last, 0.0) << method;
   }
-  EXPECT_LT(energy_bands(lotka_volterra<1>(), {.method = gl(3), .step = 0.1}, 1000000).second, 1e-6);
+  EXPECT_LT(energy_bands(lotka_volterra<1>(), {.method = testing::gl(3), .step = 0.1}, 1000000).second, 1e-6);
 }
 
 TEST(PhaseSpaceStep, MasslessChargeDriftsAsPublishedOverItsFullSpan_slow) {
@@ -216,10 +216,10 @@ TEST(PhaseSpaceStep, MasslessChargeDriftsAsPublishedOverItsFullSpan_slow) {
   });
   scene.start.q = Vector::Ones(2);
   const auto shared = std::make_shared<const Scene>(scene);
-  const Sample end = samples_of(shared, {.method = gl(4), .step = 0.1}, 10000).back();
+  const Sample end = samples_of(shared, {.method = testing::gl(4), .step = 0.1}, 10000).back();
   EXPECT_NEAR(end.q[0], -0.3374654656645142, 1e-8);
   EXPECT_NEAR(end.q[1], 2.688023690442904, 1e-8);
-  const auto [first, last] = energy_bands(shared, {.method = gl(3), .step = 0.2}, 1000000);
+  const auto [first, last] = energy_bands(shared, {.method = testing::gl(3), .step = 0.2}, 1000000);
   EXPECT_LT(last, 1.05 * first);
 }
 
@@ -236,7 +236,7 @@ TEST(PhaseSpaceStep, TwoPointVorticesTurnAsTheClosedFormSays) {
   scene.start.q = Vector(4);
   scene.start.q << 1.0 / 3.0, 0.0, -2.0 / 3.0, 0.0;
   const auto end =
-      samples_of(std::make_shared<const Scene>(scene), {.method = gl(4), .step = 0.1}, 1000).back();
+      samples_of(std::make_shared<const Scene>(scene), {.method = testing::gl(4), .step = 0.1}, 1000).back();
   Vector reference(4);
   reference << 0.1066289561796316, 0.3158185821245376, -0.2132579123592632, -0.6316371642490752;
   EXPECT_LT((end.q - reference).lpNorm<Eigen::Infinity>(), 1e-10);

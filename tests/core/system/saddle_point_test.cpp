@@ -84,7 +84,7 @@ TEST_P(SaddlePoint, GrowingMassSlowsDown) {
 }
 
 /// Position-dependent mass and a term linear in v, both changing with the time.
-struct Driven {
+struct DrivenTwist {
   template <class T>
   T operator()(const std::array<T, 3>& q, const std::array<T, 3>& v, const T& t) const {
     using std::sin;
@@ -95,7 +95,7 @@ struct Driven {
 
 Scene driven(std::shared_ptr<const ConstraintRows> rows) {
   Scene scene = testing::particle("driven");
-  scene.lagrangian = lagrangian<3>(Driven{});
+  scene.lagrangian = lagrangian<3>(DrivenTwist{});
   scene.constraints = {std::move(rows)};
   return scene;
 }

@@ -197,9 +197,9 @@ step = 0.01
 
 double pendulum_angle(double angle, double end) {
   double rate = 0.0;
-  const int steps = 20000;
-  const double h = end / steps;
-  for (int k = 0; k < steps; ++k) {  // Stoermer and Verlet's steps, far below the error looked for
+  const int verlet_steps = 20000;
+  const double h = end / verlet_steps;
+  for (int k = 0; k < verlet_steps; ++k) {  // Stoermer and Verlet's steps, far below the error looked for
     rate -= h / 2.0 * 9.81 * std::sin(angle);
     angle += h * rate;
     rate -= h / 2.0 * 9.81 * std::sin(angle);
