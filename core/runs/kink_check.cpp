@@ -9,7 +9,7 @@ namespace diracstep {
 namespace {
 
 constexpr double part_of_jump = 0.1;  // of h J, that the momentum of a step over a jump is off by
-constexpr double too_much = 0.01;      // of the largest momentum
+constexpr double too_much = 0.01;     // of the largest momentum
 
 }  // namespace
 
