@@ -8,8 +8,8 @@ namespace diracstep {
 
 namespace {
 
-constexpr double part_of_jump = 0.1;   // of h J, that the momentum of a step over a jump is off by
-constexpr double doubted_jump = 0.01;  // of the largest momentum
+constexpr double part_of_jump = 0.1;  // of h J, that the momentum of a step over a jump is off by
+constexpr double too_much = 0.01;     // of the largest momentum
 
 }  // namespace
 
@@ -59,7 +59,7 @@ void KinkCheck::look(const Integrator& integrator) {
 }
 
 std::string KinkCheck::text() const {
-  if (!(sum_ > doubted_jump * largest_momentum_)) return {};
+  if (!(sum_ > too_much * largest_momentum_)) return {};
   std::ostringstream text;
   text.precision(4);
   text << "forces jump where the motion crosses kinks of the formulas, " << jumps_
