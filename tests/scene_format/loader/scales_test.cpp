@@ -14,10 +14,10 @@ namespace {
 
 const std::vector<std::string> methods{"type1/midpoint", "type1/trapezoidal", "type1/left", "type1/gl:3"};
 
-Sample end_of(const CatalogueScene& entry, const std::string& method, long steps, double step) {
+Sample end_of(const CatalogueScene& entry, const std::string& method, long count, double step) {
   Integrator integrator(entry.scene, Registry::with_built_ins(), kinsol(), {.method = method, .step = step});
   Sample last;
-  for (long k = 0; k < steps; ++k) {
+  for (long k = 0; k < count; ++k) {
     const StepReport report = integrator.step();
     EXPECT_TRUE(report.ok()) << method << ": " << report.failure;
     if (!report.ok()) break;
