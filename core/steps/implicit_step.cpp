@@ -156,10 +156,9 @@ class ImplicitStep final : public StepProblem {
   void evaluate(ConstVectorRef x) {
     if (last_x_ == x) return;
     last_x_ = x;
-    const double h = data_.step.size;
     y_.col(0) = graph_.starts_from_position ? data_.q0 : data_.p0;
     if (!graph_.starts_from_position && m_ > 0)
-      data_.start_rows.add_annihilator(x.segment(n_, m_), y_.col(0), 1.0 / h);
+      data_.start_rows.add_annihilator(x.segment(n_, m_), y_.col(0), 1.0 / data_.step.size);
     y_.col(1) = end_factor() * x.head(n_);
     if (by_increment_) {
       increment_ = x.head(n_);
@@ -180,6 +179,15 @@ class ImplicitStep final : public StepProblem {
       if (force_) force_->evaluate(data_.step, data_.q0, q1_, increment_);
     }
     if (m_ > 0) data_.raise_constraint_scale(increment_, blocks_[1].scale);
+    raise(blocks_[0].scale, std::abs(row_factor()), 0, 1);
+    if (inner_ > 0) raise(blocks_.back().scale, 1.0, 2, s_->columns());
+  }
+
+  /// At rest in the origin no term was known before this point.
+  void raise(double& scale, double factor, int first, int end) const {
+    if (scale > smallest_scale) return;
+    for (int i = first; i < end; ++i)
+      scale = std::max(scale, factor * std::max(max_norm(gradient_.col(i)), cancelling_terms(i)));
   }
 
   /// Where nothing is known of an earlier step: the Hessian at a plausible point, for the round-off scales.
@@ -206,9 +214,7 @@ class ImplicitStep final : public StepProblem {
     blocks_[0].scale = scale_of(std::max({own, impulse, std::abs(row_factor()) * terms_[0]}));
     if (m_ > 0) blocks_[1].scale = data_.constraint_scale();
     if (inner_ == 0) return;
-    double largest = 0.0;
-    for (int i = 2; i < s_->columns(); ++i) largest = std::max(largest, terms_[i]);
-    blocks_.back().scale = scale_of(largest);
+    blocks_.back().scale = scale_of(terms_.tail(s_->columns() - 2).maxCoeff());
   }
 
   /// Size of the terms that make up column i of the gradient: second derivatives times what they multiply.
@@ -216,8 +222,7 @@ class ImplicitStep final : public StepProblem {
     double largest = 0.0;
     for (int j = 0; j < s_->columns(); ++j) {
       const auto block = hessian_.col(s_->pair(std::min(i, j), std::max(i, j)));
-      const double size =
-          by_increment_ && j == 0 ? (block + hessian_.col(1)).lpNorm<Eigen::Infinity>() : max_norm(block);
+      const double size = by_increment_ && j == 0 ? max_norm(block + hessian_.col(1)) : max_norm(block);
       largest = std::max(largest, size * max_norm(y_.col(j)));
     }
     return largest;

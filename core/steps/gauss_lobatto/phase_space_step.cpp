@@ -6,6 +6,7 @@
 #include <diracstep/core/numerics/lu.hpp>
 #include <diracstep/core/numerics/row_scales.hpp>
 #include <diracstep/core/steps/gauss_lobatto/phase_space_step.hpp>
+#include <diracstep/core/steps/gauss_lobatto/regular_two_form.hpp>
 #include <diracstep/core/steps/gauss_lobatto/stage_sums.hpp>
 #include <diracstep/core/steps/gauss_lobatto/tableau.hpp>
 #include <diracstep/core/system/lagrangian_derivatives.hpp>
@@ -207,6 +208,8 @@ class PhaseSpaceStep final : public StepProblem {
       }
     end_.take_first(*lagrangian_, step_.end(), q1_, zero_);
     end_along_.take_first(*lagrangian_, step_.end(), q1_, nu);
+    if (blocks_[0].scale <= smallest_scale)  // no term was known before: at rest in the origin
+      blocks_[0].scale = blocks_[1].scale = scale_of(std::max(std::abs(h) * max_norm(lq_), max_norm(lv_)));
   }
 
   template <class Entry>
@@ -272,33 +275,6 @@ class PhaseSpaceStep final : public StepProblem {
   Eigen::PartialPivLU<Columns> two_form_factors_;
   bool dense_ = false, two_form_known_ = false;
 };
-
-constexpr int max_coordinates_to_test = 1000;  // the test takes full matrices
-
-/// Throws Misuse where dθ has no full rank at the start: then the equations leave some velocities open, and
-/// the Lagrangian is not degenerate but wrong, or needs rows.
-void require_regular_two_form(const Scene& scene) {
-  const Lagrangian& l = *scene.lagrangian;
-  const int n = scene.dimension();
-  if (n > max_coordinates_to_test || scene.start.q.size() != n) return;
-  LagrangianDerivatives at_start(l);
-  at_start.take_second(l, scene.start.time, scene.start.q, Vector::Zero(n));
-  const Columns transposed = l.pattern().full(at_start.qv);  // Dθᵀ
-  if (!transposed.allFinite()) return;                       // the step says so itself
-  const Eigen::FullPivLU<Columns> two_form(transposed - transposed.transpose());
-  if (two_form.isInvertible()) return;
-  const Columns kernel = two_form.kernel();
-  std::string open;
-  for (int i = 0; i < n; ++i)
-    if (kernel.row(i).lpNorm<Eigen::Infinity>() > 1e-8)
-      open += " '" + scene.coordinates[static_cast<std::size_t>(i)] + "'";
-  throw Misuse("scene '" + scene.name +
-               "': its Lagrangian θ(q)·v − H(q) is linear in v, and the two-form dθ has rank " +
-               std::to_string(two_form.rank()) + " of " + std::to_string(n) +
-               " at the start, so nothing determines the velocities of" + open +
-               "; a phase-space Lagrangian pairs every coordinate with another one" +
-               (n % 2 == 1 ? ", which an odd number of them cannot be" : ""));
-}
 
 }  // namespace
 

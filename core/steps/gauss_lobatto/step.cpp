@@ -277,9 +277,7 @@ class GaussLobattoStep final : public StepProblem {
   SparsityPattern pattern_;
   BlockPattern layout_;
   std::vector<ResidualBlock> blocks_;
-
   std::unique_ptr<FixedStages> fixed_;  ///< of few coordinates, rows and stages, without a force
-
   Vector p0_, last_x_;
   StageRowScales row_scales_;
   Columns impulses_;  ///< A(Q~_j)ᵀ λ_j

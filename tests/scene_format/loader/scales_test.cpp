@@ -275,5 +275,20 @@ step = 0.001
     }
 }
 
+/// At rest in the origin under a force that begins at zero no term is known before the first step: x = t³/6,
+/// and x = t − sin t of a Lagrangian linear in v.
+TEST(Scales, AStartAtRestInTheOriginWithoutAForceIsStepped) {
+  const std::string rest = "[coordinates]\nx = {}\ny = {}\n[span]\nend = 1\nstep = 0.1\n";
+  const CatalogueScene regular = scene_from_text(
+      "late.toml", "name = \"late\"\nlagrangian = \"v_x^2/2 + v_y^2/2 + x*y + t*x\"\n" + rest);
+  for (const char* method : {"type1/midpoint", "type1/left", "type2/legendre(type1/midpoint)", "type1/gl:3"})
+    EXPECT_NEAR(end_of(regular, method, 10, 0.1).q[0], 1.0 / 6.0, 3e-3) << method;
+  EXPECT_NEAR(end_of(regular, "type2/legendre(type1/midpoint)", 1000, 1e-3).q[0],
+              end_of(regular, "type1/gl:3", 10, 0.1).q[0], 1e-6);
+  const CatalogueScene linear = scene_from_text(
+      "linear.toml", "name = \"linear\"\nlagrangian = \"x*v_y - x^2/2 - y^2/2 + t*x\"\n" + rest);
+  EXPECT_NEAR(end_of(linear, "type1/gl:3", 10, 0.1).q[0], 1.0 - std::sin(1.0), 1e-10);
+}
+
 }  // namespace
 }  // namespace diracstep
