@@ -222,7 +222,8 @@ class ImplicitStep final : public StepProblem {
     double largest = 0.0;
     for (int j = 0; j < s_->columns(); ++j) {
       const auto block = hessian_.col(s_->pair(std::min(i, j), std::max(i, j)));
-      const double size = by_increment_ && j == 0 ? max_norm(block + hessian_.col(1)) : max_norm(block);
+      const bool both = by_increment_ && j == 0;
+      const double size = both ? (block + hessian_.col(1)).lpNorm<Eigen::Infinity>() : max_norm(block);
       largest = std::max(largest, size * max_norm(y_.col(j)));
     }
     return largest;

@@ -71,7 +71,7 @@ def test_invariants_and_momenta(spring):
 def test_doubts_are_warnings():
     stiff = ds.Scene(["x"], lambda q, v: v.x**2 / 2 - 1e4 * q.x**4 / 4, q=[1.0], until=10.0)
     with pytest.warns(ds.Doubt, match="scene"):
-        run = stiff.run(step=0.04)
+        run = stiff.run(step=0.025)
     assert run.doubt
 
 
