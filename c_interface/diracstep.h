@@ -151,8 +151,8 @@ DIRACSTEP_API int diracstep_create(const diracstep_model *model, const diracstep
 /* Ends an integrator, NULL as well. */
 DIRACSTEP_API void diracstep_destroy(diracstep_integrator *integrator);
 
-/* What is assembled, and what is left out and why: item, decision, reason.  Whether variable steps pay is told by a
-   coarse run, of some hundred steps. */
+/* What is assembled, and what is left out and why: item, decision, reason.  Whether variable steps pay is
+   told by a coarse run, of some hundred steps. */
 DIRACSTEP_API int diracstep_plan(const diracstep_integrator *integrator, diracstep_table *table);
 
 /* Takes steps until `steps` are done or one fails; the state is then that before the failed step. */

@@ -97,7 +97,8 @@ void plan(const PlanArguments& options, Session& session) {
   for (const std::string& change : entry.changes) lines.push_back({"scene", "changed", change});
   if (choice.name != options.method.name)
     lines.push_back({"method", choice.name, "the scene's file recommends it"});
-  lines.push_back(variable_steps_line(entry.scene, session.solvers, entry.t_end, entry.natural_step, "--adaptive"));
+  lines.push_back(
+      variable_steps_line(entry.scene, session.solvers, entry.t_end, entry.natural_step, "--adaptive"));
   print(options.json ? as_json(integrator, lines) : as_text(integrator, lines));
 }
 

@@ -44,8 +44,8 @@ class Convergence {
   bool near_round_off() const;
   /// Factor of the next step, from 0.35 to 0.7.
   double next_factor() const;
-  /// Part of the work of the last run that one which meets the error would take, by the better of the last two
-  /// orders observed: before steps resolve the motion the orders tell nothing.
+  /// Part of the work of the last run that one which meets the error would take, by the better of the last
+  /// two orders observed: before steps resolve the motion the orders tell nothing.
   double work_to_go() const;
   /// Why the sequence is not accepted, in words.
   std::string obstacle() const;
