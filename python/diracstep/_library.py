@@ -112,6 +112,8 @@ class Table(Structure):
     def lines(self) -> list[tuple[str, ...]]:
         """The rows, copied."""
         width = self.columns
+        if not width:
+            return []
         cells = [self.cells[k].decode() for k in range(self.rows * width)]
         return [tuple(cells[k:k + width]) for k in range(0, len(cells), width)]
 
@@ -277,7 +279,9 @@ def call_interruptibly(call: Callable[[], int], stop: c_int,
     function: ``call`` must keep all that it uses.  ``watch`` is called about ten times a second.
     """
     outcome: list[Any] = []
-    done = threading.Event()  # Thread.join takes a thread for ended where Ctrl-C comes in it (Python 3.11)
+    # Thread.join takes a thread for ended where Ctrl-C comes in it (Python 3.11), and Event.wait may keep its lock then.
+    running = threading.Lock()
+    running.acquire()
 
     def work() -> None:
         try:
@@ -285,14 +289,14 @@ def call_interruptibly(call: Callable[[], int], stop: c_int,
             outcome.extend((code, lib.message().decode() if code != OK else ""))  # messages belong to the thread
         except BaseException as error:  # noqa: BLE001  of a callback's machinery: raised below, in the caller
             outcome.extend((error, ""))
-        done.set()
+        running.release()
 
     thread = threading.Thread(target=work, name="diracstep", daemon=True)
     try:
         thread.start()
         while not outcome:
             try:
-                if not done.wait(0.1) and watch is not None:
+                if not running.acquire(timeout=0.1) and watch is not None:
                     watch()
             except KeyboardInterrupt:
                 if stop.value != 0:

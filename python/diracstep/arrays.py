@@ -10,7 +10,7 @@ from .errors import Misuse
 
 
 def column(values: Any, names: Sequence[str], what: str) -> np.ndarray:
-    """n finite doubles, one behind the other: from a sequence in the order of the names, or by name.
+    """n finite doubles, one behind the other: from a sequence in the order of the names, or by name, 0 where nothing is said.
 
     A copy is made where the array given is of another type or lies otherwise in memory; a read-only one serves.
     """
@@ -41,12 +41,14 @@ def real(value: Any, what: str) -> float:
     return float(table(value, (), what))
 
 
-def whole(value: Any, what: str, least: int = 0) -> int:
-    """A whole number that a C long holds."""
+def whole(value: Any, what: str, least: int = 0, most: int = 2**63 - 1) -> int:
+    """A whole number, that a C long holds without ``most``."""
     try:
         number = int(value.__index__())
     except AttributeError:
         raise Misuse(f"{what} is {value!r}; a whole number is needed") from None
-    if not least <= number < 2**63:
+    if number < least:
         raise Misuse(f"{what} is {number}; at least {least} is needed")
+    if number > most:
+        raise Misuse(f"{what} is {number}; at most {most} is taken")
     return number

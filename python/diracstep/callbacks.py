@@ -18,6 +18,13 @@ def _view(address: int, count: int) -> np.ndarray:
     return np.frombuffer((ctypes.c_double * count).from_address(address))  # type: ignore[call-overload]
 
 
+def _copy(address: int, count: int) -> np.ndarray:
+    """The column for a user's function, who may keep it and may not write to it."""
+    column = _view(address, count).copy()
+    column.flags.writeable = False
+    return column
+
+
 class _Called:
     """A Python function with some of its arguments fixed, asked for by name."""
 
@@ -71,7 +78,7 @@ class CallbackScene:
         called, n = _Called(function, self._parameters, ("q", "v", "t"), "lagrangian"), self._n
 
         def value(t: float, q: Any, v: Any, result: Any) -> None:
-            _view(result, 1)[0] = float(called(q=_view(q, n), v=_view(v, n), t=t))
+            _view(result, 1)[0] = float(called(q=_copy(q, n), v=_copy(v, n), t=t))
 
         return self._guard(c.VALUE, value)
 
@@ -79,7 +86,7 @@ class CallbackScene:
         called, n = _Called(function, self._parameters, ("q", "v", "t"), "force"), self._n
 
         def value(t: float, q: Any, v: Any, result: Any) -> None:
-            _view(result, n)[:] = called(q=_view(q, n), v=_view(v, n), t=t)
+            _view(result, n)[:] = called(q=_copy(q, n), v=_copy(v, n), t=t)
 
         return self._guard(c.VALUE, value)
 
@@ -90,14 +97,14 @@ class CallbackScene:
         block = self._keep(c.Rows(rows=count))
         if "v" not in called.columns:
             def position(t: float, at: Any, result: Any) -> None:
-                _view(result, count)[:] = called(q=_view(at, n), v=None, t=t)
+                _view(result, count)[:] = called(q=_copy(at, n), v=None, t=t)
 
             block.holonomic, block.position = 1, self._guard(c.POSITION, position)
             return block
         basis = np.eye(n)
 
         def coefficients(t: float, at: Any, a: Any, b: Any) -> None:
-            place = _view(at, n)
+            place = _copy(at, n)
             constant = np.atleast_1d(np.asarray(called(q=place, v=np.zeros(n), t=t), dtype=float))
             matrix = _view(a, n * count).reshape(n, count)  # column by column
             for k in range(n):
@@ -125,7 +132,7 @@ class GeneratingFunction:
             try:
                 seen = system.contents
                 n = seen.dimension
-                columns = _view(y, 2 * n).reshape(2, n)
+                columns = _copy(y, 2 * n).reshape(2, n)
                 _view(result, 1)[0] = float(function(_lagrangian_of(seen), columns[0], columns[1], interval.size, interval.start))
                 return 0
             except BaseException as error:  # noqa: BLE001  it cannot pass through C

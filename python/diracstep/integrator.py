@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes
 import threading
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 
@@ -51,9 +51,14 @@ class Integrator:
         if getattr(self, "_handle", 0):
             self._destroy(self._handle)
 
+    def __reduce__(self) -> NoReturn:
+        raise TypeError("an integrator is not copied or pickled; save() and restore() carry its state to another one")
+
     def step(self, count: int = 1, *, size: float | None = None) -> None:
         """Takes so many steps, or one of another size.  After a Failure the state is that before the failed step."""
         if size is None:
+            if not -2**63 <= count < 2**63 if isinstance(count, int) else False:
+                raise Misuse(f"steps is {count}; at most {2**63 - 1} are taken")
             try:
                 with self._lock:
                     code = self._step(self._handle, count)
@@ -71,7 +76,7 @@ class Integrator:
 
         The integrator must be made with ``pushed=True``.
         """
-        numbers = column(force, self.scene.coordinates, "force")
+        numbers = column(force, self.scene._coordinates, "force")
         with self._lock:
             self._check(c.lib.push(self._handle, numbers.ctypes.data))
 
@@ -82,7 +87,7 @@ class Integrator:
 
     def state(self, momentum: str = "projected") -> State:
         """The current point."""
-        n, m = len(self.scene.coordinates), len(self.scene.rows)
+        n, m = len(self.scene._coordinates), len(self.scene._rows)
         q, v, p, force = np.empty(n), np.empty(n), np.empty(n), np.empty(m)
         read = c.State(q=q.ctypes.data, v=v.ctypes.data, p=p.ctypes.data, lambda_=force.ctypes.data)
         with self._lock:
@@ -90,14 +95,15 @@ class Integrator:
         return State(read.time, q, v, p, force, read.energy)
 
     def reset(self, q: Any = None, v: Any = None, t: float | None = None) -> None:
-        """Starts anew: at the scene's start, or at a consistent point of one's own.  What is not given is the scene's."""
+        """Starts anew: at the scene's start, or at a consistent point of one's own.  A column that is not given is the scene's;
+        one given by names is 0 where nothing is said."""
         scene = self.scene
         if q is None and v is None and t is None:
             with self._lock:
                 self._check(c.lib.reset(self._handle, 0.0, None, None))
             return
-        start_q = column(scene.start_q if q is None else q, scene.coordinates, "q")
-        start_v = column(scene.start_v if v is None else v, scene.coordinates, "v")
+        start_q = column(scene.start_q if q is None else q, scene._coordinates, "q")
+        start_v = column(scene.start_v if v is None else v, scene._coordinates, "v")
         start_t = scene.start_time if t is None else real(t, "t")
         with self._lock:
             self._check(c.lib.reset(self._handle, start_t, start_q.ctypes.data, start_v.ctypes.data))

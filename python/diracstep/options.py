@@ -10,6 +10,7 @@ from .arrays import real, whole
 from .errors import Misuse
 
 DEFAULT_EPS = 0.2
+_LARGEST_INT = 2**31 - 1  # of C
 KNOWN = ("method", "order", "step", "rule", "solver", "jacobian", "project_start", "substeps", "compensated_sums", "adaptive",
          "eps", "control", "smallest_step", "max_steps")
 
@@ -25,8 +26,9 @@ def options_from(given: dict[str, Any], until: float | None, pushed: bool = Fals
         if value is not None and not isinstance(value, str):
             raise Misuse(f"{name} is {value!r}; a text is needed")
         setattr(options, name, c.encoded(value))
-    for name in ("order", "substeps", "max_steps"):
-        setattr(options, name, whole(given.get(name) or 0, name))
+    for name in ("order", "substeps"):
+        setattr(options, name, whole(given.get(name) or 0, name, most=_LARGEST_INT))
+    options.max_steps = whole(given.get("max_steps") or 0, "max_steps")
     for name in ("project_start", "compensated_sums"):
         setattr(options, name, int(bool(given.get(name))))
     if given.get("step") is not None:

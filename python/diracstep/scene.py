@@ -57,6 +57,8 @@ class Scene:
                  invariants: Mapping[str, Callable[..., Any]] | None = None, name: str = "scene", description: str = "",
                  callback: bool = False, plugins: Sequence[str] = (), methods: Sequence[GeneratingFunction] = (),
                  drop_redundant: bool = False) -> None:
+        if getattr(self, "_handle", 0):
+            raise Misuse("a scene is made once")
         coordinates, parameters = list(coordinates), dict(parameters or {})
         if not coordinates:
             raise Misuse("a scene needs coordinates")
@@ -106,10 +108,11 @@ class Scene:
         facts = c.Facts()
         self._check(c.lib.read_facts(self._handle, ctypes.byref(facts)))
         listed = self._lines(c.COORDINATES)
-        self.coordinates: list[str] = list(coordinates or (name for name, _, _ in listed))  #: names, in the order of columns
-        self.units: dict[str, str] = {name: unit for name, (_, unit, _) in zip(self.coordinates, listed)}
-        self.rows: list[str] = [name for name, in self._lines(c.ROWS)]  #: names of the constraints
-        self.invariants: list[str] = [name for name, _ in self._lines(c.INVARIANTS)]  #: names of what the motion keeps
+        # The sizes of what the library writes: not to be changed from outside.
+        self._coordinates = tuple(coordinates or (name for name, _, _ in listed))
+        self._rows = tuple(name for name, in self._lines(c.ROWS))
+        self._invariants = tuple(name for name, _ in self._lines(c.INVARIANTS))
+        self.units: dict[str, str] = {name: unit for name, (_, unit, _) in zip(self._coordinates, listed)}
         self.parameters: dict[str, float] = {name: float(value) for name, value, _, _ in self._lines(c.PARAMETERS)}
         self.about: list[tuple[str, str]] = [(what, text) for what, text in self._lines(c.ABOUT)]  #: what the scene says of itself
         self.name: str = self.about[0][1]
@@ -120,6 +123,21 @@ class Scene:
         self.start_q.flags.writeable = self.start_v.flags.writeable = False
         self.until: float = facts.end_time  #: where a run ends that is given no other end
         self.step: float = facts.step  #: a coarse but sensible step
+
+    @property
+    def coordinates(self) -> list[str]:
+        """Names, in the order of columns."""
+        return list(self._coordinates)
+
+    @property
+    def rows(self) -> list[str]:
+        """Names of the constraints."""
+        return list(self._rows)
+
+    @property
+    def invariants(self) -> list[str]:
+        """Names of what the motion keeps."""
+        return list(self._invariants)
 
     def with_parameters(self, **parameters: float) -> Scene:
         """The same scene with other values of parameters and sizes; nothing is compiled again."""
@@ -132,6 +150,9 @@ class Scene:
     def __del__(self) -> None:
         if getattr(self, "_handle", 0):
             self._close(self._handle)
+
+    def __reduce__(self) -> NoReturn:
+        raise TypeError("a scene is not copied or pickled: it belongs to the library; make it again, or with with_parameters()")
 
     # ---- runs ----
     def run(self, *, until: float | None = None, steps: int | None = None, at: Any = None, error: float | None = None,
@@ -190,7 +211,7 @@ class Scene:
         return self._finished(points, code, message, search=search, doubt=search.warning if search else "")
 
     def _points(self, room: int) -> Points:
-        return Points(len(self.coordinates), len(self.rows), len(self.invariants), room)
+        return Points(len(self._coordinates), len(self._rows), len(self._invariants), room)
 
     def _finished(self, points: Points, code: int, message: str, *, statistics: Statistics | None = None,
                   search: Search | None = None, doubt: str = "") -> Run:
@@ -199,11 +220,11 @@ class Scene:
         if points.failure is not None:
             raise points.failure
         if code == c.INTERRUPTED:
-            warnings.warn(message, Interrupted, stacklevel=4)
+            warnings.warn(message, Interrupted, stacklevel=3)
         elif code != c.OK:
             self._raise(code, message, run)
         if doubt:
-            warnings.warn(f"{self.name}: {doubt}", Doubt, stacklevel=4)
+            warnings.warn(f"{self.name}: {doubt}", Doubt, stacklevel=3)
         return run
 
     def ensemble(self, q: Any, v: Any = None, *, t: Any = None, until: float | None = None, steps: int | None = None,
@@ -215,14 +236,14 @@ class Scene:
         """
         starts_q = np.asarray(q)
         members = len(starts_q) if starts_q.ndim else 0
-        shape = (members, len(self.coordinates))
+        shape = (members, len(self._coordinates))
         starts_q = table(starts_q, shape, "q")
         starts_v = None if v is None else table(v, shape, "v")
         times = None if t is None else table(t, (members,), "t")
-        flag, points = stop_flag(), Points(len(self.coordinates), len(self.rows), len(self.invariants), members, grows=False)
+        flag, points = stop_flag(), Points(len(self._coordinates), len(self._rows), len(self._invariants), members, grows=False)
         request = c.Ensemble(members=members, q=starts_q.ctypes.data, v=_address(starts_v), time=_address(times),
                              steps=0 if steps is None else whole(steps, "steps", 1), momentum=momentum_from(momentum),
-                             threads=whole(threads, "threads"), stop=ctypes.pointer(flag))
+                             threads=whole(threads, "threads", most=2**31 - 1), stop=ctypes.pointer(flag))
         request.kept = starts_q, starts_v, times  # the call may go on after a second Ctrl-C has left this function
         chosen = options_from(options, None if steps is not None else self.until if until is None else until)
         failures: dict[int, str] = {}

@@ -114,7 +114,8 @@ class Expression:
         raise TypeError("formulas are not compared: the function is called once, with symbols. A row is written as an expression "
                         "that is zero")
 
-    __lt__ = __le__ = __gt__ = __ge__ = _compared
+    __lt__ = __le__ = __gt__ = __ge__ = __eq__ = __ne__ = _compared  # type: ignore[assignment]
+    __hash__ = object.__hash__
 
     def __float__(self) -> float:
         raise TypeError("a formula is no number: use ds.sin, numpy.sin, … in place of math.sin, …")

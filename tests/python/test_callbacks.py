@@ -55,3 +55,24 @@ def test_a_generating_function_in_python():
     assert np.allclose(one.q, other.q, atol=1e-7)
     with pytest.raises(ds.Misuse, match="type1/"):
         ds.GeneratingFunction("mine", 2, trapezoidal)
+
+
+def test_columns_can_be_kept_and_not_be_written():
+    seen = []
+
+    def lagrangian(q, v):
+        seen.append(q)
+        return v @ v / 2 - q @ q / 2
+
+    with pytest.warns(ds.CallbackCost):
+        scene = ds.Scene(["x"], lagrangian, q=[0.8], callback=True)
+    scene.run(steps=2, step=0.1, method="type1/midpoint")
+    assert seen[0][0] == pytest.approx(0.8, rel=1e-2)
+
+    def writing(q, v):
+        energy = v @ v / 2 - q @ q / 2
+        q[0] = 0.0
+        return energy
+
+    with pytest.raises(ds.Error), pytest.warns(ds.CallbackCost):
+        ds.Scene(["x"], writing, q=[0.8], callback=True).run(steps=2, step=0.1)

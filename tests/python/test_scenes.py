@@ -1,5 +1,8 @@
 """Scenes from files, from text, from the catalogue and from functions."""
 
+import copy
+import pickle
+
 import numpy as np
 import pytest
 
@@ -88,3 +91,34 @@ def test_methods_are_listed_with_those_of_plugins(plugin):
     assert "type1/midpoint" in {row[0] for row in ds.methods()}
     assert "type1/galerkin2" in {row[0] for row in ds.methods([plugin])} - {row[0] for row in ds.methods()}
     assert ds.load("knife_edge", plugins=[plugin]).run(steps=3, step=0.1, method="type1/galerkin2").statistics.order == 4
+
+
+def test_names_are_not_changed_through_what_is_given():
+    scene = ds.load("knife_edge")
+    scene.coordinates.pop()
+    assert scene.coordinates == ["x", "y", "ph"] and scene.run(steps=2, step=0.1).q.shape == (3, 3)
+    with pytest.raises(AttributeError):
+        scene.coordinates = ["x"]
+
+
+def test_scenes_and_integrators_are_not_copied():
+    scene = ds.load("knife_edge")
+    for thing in (scene, scene.integrator(step=0.1)):
+        for how in (copy.copy, copy.deepcopy, pickle.dumps):
+            with pytest.raises(TypeError, match="not copied"):
+                how(thing)
+    with pytest.raises(ds.Misuse, match="made once"):
+        scene.__init__(["x"], lambda q, v: v.x**2 / 2)
+
+
+def test_comparisons_of_formulas_are_refused():
+    for branch in (lambda q, v: v.x**2 if q.x == 0 else v.x**2 / 2, lambda q, v: v.x**2 if q.x in (0, 1) else v.x**2 / 2):
+        with pytest.raises(TypeError, match="not compared"):
+            ds.Scene(["x"], branch)
+
+
+def test_an_ensemble_that_is_refused_says_why():
+    with pytest.raises(ds.Error, match="substeps|adaptive|steps"):
+        ds.load("knife_edge").ensemble(np.zeros((2, 3)), adaptive=True, until=1.0)
+    with pytest.raises(ds.Misuse, match="at most 2147483647"):
+        ds.load("knife_edge").run(order=2**32 + 4)
