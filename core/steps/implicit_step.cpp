@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <diracstep/core/dirac/discrete_force.hpp>
 #include <diracstep/core/numerics/errors.hpp>
@@ -38,8 +39,7 @@ class ImplicitStep final : public StepProblem {
     gradient_ = y_;
     at_end_ = hessian_ = Columns::Zero(s_->pattern().nonzeros(), s_->pairs());
     last_x_.setZero(size());
-    q1_.setZero(n_);
-    for (Vector* column : {&increment_, &sizes_, &largest_, &as_largest_}) column->setZero(n_);
+    for (Vector* column : {&q1_, &increment_, &sizes_, &largest_, &as_largest_}) column->setZero(n_);
     row_scales_ = RowScales(size());
     quadratic_ = scene.lagrangian->structure().quadratic && !scene.force;
     by_increment_ = s_->type() == GeneratingType::one && s_->take_increments();
@@ -75,6 +75,7 @@ class ImplicitStep final : public StepProblem {
     }
     hessian_known_ = false;
     update_scales();
+    for (std::size_t b = 0; b < blocks_.size(); ++b) known_[b] = blocks_[b].scale;
   }
 
   void guess(ConstVectorRef v0, VectorRef x) override {
@@ -152,7 +153,7 @@ class ImplicitStep final : public StepProblem {
   /// ∂(end argument)/∂(first unknowns).
   double end_factor() const { return graph_.ends_at_position ? 1.0 : 1.0 / data_.step.size; }
 
-  /// Columns, gradient and end configuration at x, unless x is where they were last taken.
+  /// Columns, gradient and end at x, unless x is where they were last taken.
   void evaluate(ConstVectorRef x) {
     if (last_x_ == x) return;
     last_x_ = x;
@@ -179,15 +180,14 @@ class ImplicitStep final : public StepProblem {
       if (force_) force_->evaluate(data_.step, data_.q0, q1_, increment_);
     }
     if (m_ > 0) data_.raise_constraint_scale(increment_, blocks_[1].scale);
-    raise(blocks_[0].scale, std::abs(row_factor()), 0, 1);
-    if (inner_ > 0) raise(blocks_.back().scale, 1.0, 2, s_->columns());
-  }
-
-  /// At rest in the origin no term was known before this point.
-  void raise(double& scale, double factor, int first, int end) const {
-    if (scale > smallest_scale) return;
-    for (int i = first; i < end; ++i)
-      scale = std::max(scale, factor * std::max(max_norm(gradient_.col(i)), cancelling_terms(i)));
+    // Terms at x, where those known before this step are smaller, as at rest.
+    const auto& p1 = graph_.ends_at_position ? gradient_ : y_;
+    double own = std::max(max_norm(gradient_.col(0)),
+                          graph_.starts_from_position ? max_norm(p1.col(1)) : max_norm(q1_));
+    if (force_) own = std::max(own, max_norm(force_->minus()));
+    blocks_[0].scale = std::max(known_[0], scale_of(std::abs(row_factor()) * own));
+    // Inner columns are positions between the ends, with terms as large as the momentum.
+    if (inner_ > 0) blocks_.back().scale = std::max(known_[blocks_.size() - 1], scale_of(own));
   }
 
   /// Where nothing is known of an earlier step: the Hessian at a plausible point, for the round-off scales.
@@ -280,6 +280,7 @@ class ImplicitStep final : public StepProblem {
   ImplicitJacobian jacobian_;
   Vector force_by_end_;
   std::vector<ResidualBlock> blocks_;
+  std::array<double, 3> known_{};  ///< their scales before this step
   RowScales row_scales_;
   Vector last_x_, q1_, increment_;
   Vector sizes_, largest_, as_largest_, none_;  ///< workspaces of size_terms(), but for an empty one

@@ -34,8 +34,13 @@ const double* StageRowScales::beside_all_terms(const Point& point, ConstVectorRe
   largest_momenta_.setZero();
   point.momentum.add_sizes(h, q_, v_, momenta_);
   point.momentum.add_sizes(h, largest_q_, largest_v_, largest_momenta_);
+  for (StageRows& rows : point.rows) rows.add_impulse_sizes(point.at, point.x, q_, momenta_);
+  // What a row cancels is among its terms: the velocity that the momenta would have without it.
+  point.momentum.pattern().for_each([&](Eigen::Index e, int r, int c) {
+    const double mass = std::abs(point.momentum.mass(0)[e]);
+    if (r == c && mass > 0.0) v_[c] = std::max(std::abs(v_[c]), momenta_[c] / mass);
+  });
   for (StageRows& rows : point.rows) {
-    rows.add_impulse_sizes(point.at, point.x, q_, momenta_);
     set_largest(rows.rows().constant(), part_of_length * length_);
     rows.size_terms(h, largest_q_, largest_v_, largest_rows_);
     rows.size_terms(h, q_, v_, rows_);

@@ -1,7 +1,9 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <diracstep/core/numerics/scales.hpp>
+#include <diracstep/core/steps/gauss_lobatto/affine.hpp>
 #include <diracstep/core/steps/gauss_lobatto/momentum.hpp>
 #include <diracstep/core/steps/gauss_lobatto/points.hpp>
 #include <diracstep/core/steps/gauss_lobatto/row_scales.hpp>
@@ -23,12 +25,6 @@ constexpr double last_bit = 0.01;
 
 /// The splitting takes full matrices.
 constexpr int largest_split = 40;
-
-bool affine(const Scene& scene) {
-  const auto constant = [](const auto& block) { return block->constant(); };
-  return scene.lagrangian->structure().quadratic && !scene.force &&
-         std::ranges::all_of(scene.constraints, constant);
-}
 
 class GaussLobattoStep final : public StepProblem {
  public:
@@ -94,8 +90,8 @@ class GaussLobattoStep final : public StepProblem {
       splitting_->solve(f);
   }
   Contraction contract(VectorRef x, VectorRef f, const ContractionLimits& limits) override {
-    const bool at_rest_in_origin = m_ > 0 && blocks_[1].scale <= smallest_scale;  // then scales follow x
-    if (!fixed_ || at_rest_in_origin) return StepProblem::contract(x, f, limits);
+    const bool at_rest = blocks_[0].scale <= smallest_scale || blocks_.back().scale <= smallest_scale;
+    if (!fixed_ || at_rest) return StepProblem::contract(x, f, limits);
     evaluated_ = false;
     const auto prepare = [&] {
       evaluated_at(x.data());
@@ -119,6 +115,7 @@ class GaussLobattoStep final : public StepProblem {
     for (StageRows& rows : rows_) rows.begin(points_);
     last_impulse_ = memory.known && m_ > 0 ? impulse_scale(impulse_size(rows_, memory.multipliers)) : 0.0;
     update_scales();
+    known_ = {blocks_[0].scale, blocks_.back().scale};
     evaluated_ = false;
   }
 
@@ -201,10 +198,14 @@ class GaussLobattoStep final : public StepProblem {
       return;
     evaluated_ = true;
     const double impulse = evaluate_points(x);
+    const double forces = largest_entry(momentum_.forces().data(), n_ * s_);
+    const double terms =
+        std::max(largest_entry(momentum_.momenta().data(), n_ * s_), std::abs(step_size()) * forces);
+    blocks_[0].scale = std::max(known_[0], part() * std::max(terms, m_ > 0 ? impulse_scale(impulse) : 0.0));
     if (m_ == 0) return;
-    blocks_[0].scale = std::max(blocks_[0].scale, part() * impulse_scale(impulse));
-    if (blocks_[1].scale <= smallest_scale)  // at rest in the origin
-      blocks_[1].scale = scale_of(part() * form_size(rows_) * largest_entry(x.data(), n_ * s_));
+    const double mass = largest_entry(momentum_.mass(0).data(), momentum_.mass(0).size());
+    const double velocity = std::max(largest_entry(x.data(), n_ * s_), mass > 0.0 ? terms / mass : 0.0);
+    blocks_[1].scale = std::max(known_[1], scale_of(part() * form_size(rows_) * velocity));
   }
 
   /// What an iteration leaves of the residual is no random error: it is a smooth function of the state and
@@ -257,6 +258,7 @@ class GaussLobattoStep final : public StepProblem {
     evaluated_ = false;
     update_scales();
     blocks_[0].scale = std::max(blocks_[0].scale, before);
+    known_ = {blocks_[0].scale, blocks_.back().scale};
   }
 
   /// Terms of the momentum rows are momenta, those of the last step where this one is not solved yet; a
@@ -277,6 +279,7 @@ class GaussLobattoStep final : public StepProblem {
   SparsityPattern pattern_;
   BlockPattern layout_;
   std::vector<ResidualBlock> blocks_;
+  std::array<double, 2> known_{};       ///< their scales before this step; at rest they may say nothing of it
   std::unique_ptr<FixedStages> fixed_;  ///< of few coordinates, rows and stages, without a force
   Vector p0_, last_x_;
   StageRowScales row_scales_;

@@ -290,5 +290,44 @@ TEST(Scales, AStartAtRestInTheOriginWithoutAForceIsStepped) {
   EXPECT_NEAR(end_of(linear, "type1/gl:3", 10, 0.1).q[0], 1.0 - std::sin(1.0), 1e-10);
 }
 
+/// A force that begins at zero moves what was at rest: scales come from the step itself, not from what was
+/// before.  q̈ = sin t − … with a, b coupled by a velocity; x = (t − 1)³/6 after a mass has lain on a floor.
+TEST(Scales, ForcesThatBeginAtZeroMoveWhatWasAtRest) {
+  const CatalogueScene gyroscopic = scene_from_text("gyroscopic.toml", R"toml(
+name = "gyroscopic"
+lagrangian = "(v_a^2 + v_b^2)/2 + a*v_b"
+[coordinates]
+a = {}
+b = {}
+[force]
+a = "sin(t)"
+[span]
+end = 1
+step = 0.1
+)toml");
+  // v_b = −a, so ä = −a + sin t: a = (sin t − t cos t)/2
+  const double exact = (std::sin(1.0) - std::cos(1.0)) / 2.0;
+  for (const std::string& method : methods)
+    EXPECT_NEAR(end_of(gyroscopic, method, 100, 0.01).q[0], exact, method == "type1/left" ? 5e-3 : 2e-5)
+        << method;
+  EXPECT_NEAR(end_of(gyroscopic, "type1/gl:3", 10, 0.1).q[0], exact, 1e-9);
+  const CatalogueScene floor = scene_from_text("floor.toml", R"toml(
+name = "floor"
+lagrangian = "(v_x^2 + v_y^2)/2 - 9.8*y"
+[coordinates]
+x = {}
+y = {}
+[[rows]]
+equation = "y = 0"
+[force]
+x = "max(0, t-1)"
+[span]
+end = 2
+step = 0.1
+)toml");
+  EXPECT_NEAR(end_of(floor, "type1/gl:3", 20, 0.1).q[0], 1.0 / 6.0, 1e-9);
+  EXPECT_NEAR(end_of(floor, "type1/gl:3", 20, 0.1).lambda[0], 9.8, 1e-9);
+}
+
 }  // namespace
 }  // namespace diracstep
