@@ -150,8 +150,6 @@ class ImplicitStep final : public StepProblem {
 
  private:
   double row_factor() const { return graph_.starts_from_position ? data_.step.size : 1.0; }
-  /// ∂(end argument)/∂(first unknowns).
-  double end_factor() const { return graph_.ends_at_position ? 1.0 : 1.0 / data_.step.size; }
 
   /// Columns, gradient and end at x, unless x is where they were last taken.
   void evaluate(ConstVectorRef x) {
@@ -160,7 +158,7 @@ class ImplicitStep final : public StepProblem {
     y_.col(0) = graph_.starts_from_position ? data_.q0 : data_.p0;
     if (!graph_.starts_from_position && m_ > 0)
       data_.start_rows.add_annihilator(x.segment(n_, m_), y_.col(0), 1.0 / data_.step.size);
-    y_.col(1) = end_factor() * x.head(n_);
+    y_.col(1) = (graph_.ends_at_position ? 1.0 : 1.0 / data_.step.size) * x.head(n_);
     if (by_increment_) {
       increment_ = x.head(n_);
       q1_ = data_.q0 + increment_;

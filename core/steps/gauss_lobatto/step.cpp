@@ -189,7 +189,6 @@ class GaussLobattoStep final : public StepProblem {
   }
 
   double step_size() const { return points_.step.size; }
-  int row_of(int j) const { return n_ * s_ + m_ * j; }
 
   /// Everything the residual is made of, at x, unless x is where it was last taken.
   void evaluate(ConstVectorRef x) {
@@ -197,8 +196,7 @@ class GaussLobattoStep final : public StepProblem {
         std::memcmp(x.data(), last_x_.data(), sizeof(double) * static_cast<std::size_t>(size())) == 0)
       return;
     evaluated_ = true;
-    const double impulse = evaluate_points(x);
-    const double forces = largest_entry(momentum_.forces().data(), n_ * s_);
+    const double impulse = evaluate_points(x), forces = largest_entry(momentum_.forces().data(), n_ * s_);
     const double terms =
         std::max(largest_entry(momentum_.momenta().data(), n_ * s_), std::abs(step_size()) * forces);
     blocks_[0].scale = std::max(known_[0], part() * std::max(terms, m_ > 0 ? impulse_scale(impulse) : 0.0));
