@@ -2,17 +2,16 @@
 #include <cmath>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/numerics/scales.hpp>
+#include <diracstep/solvers/detail/fixed_point_trial.hpp>
 #include <diracstep/solvers/detail/jacobian_factors.hpp>
 #include <diracstep/solvers/direct_solver.hpp>
-#include <limits>
 
 namespace diracstep {
 
 namespace {
 
-/// Without KINSOL around them so many fixed-point iterations cost what Newton's method does; they are judged
-/// by so many solves at a time.
-constexpr int quick_directly = 7, direct_solves_to_judge = 12;
+/// Without KINSOL around them so many fixed-point iterations cost what Newton's method does.
+constexpr int quick_directly = 7;
 /// Of a matrix of so many entries, a step takes one Jacobian and its factors cost what two or three residuals
 /// do.
 constexpr int few_entries = 600;
@@ -36,7 +35,7 @@ class DirectSolver final : public NonlinearSolver {
     report_ = {};
     report_.status = SolveStatus::no_convergence;
     guess_ = x;
-    if (fixed_point_ && !given_up_) contract(x);
+    if (fixed_point_ && !trial_.given_up()) contract(x);
     if (!report_.ok()) newton(x, x);
     if (report_.ok() && small_rows_are_unsolved(x)) {  // KINSOL goes on from here
       guess_ = x;
@@ -47,21 +46,15 @@ class DirectSolver final : public NonlinearSolver {
 
   void reset() override {
     factors_.reset();
-    judged_solves_ = judged_iterations_ = 0;
-    given_up_ = false;
+    trial_.reset();
   }
   void save(Snapshot& to) const override {
     factors_.save(to);
-    to.put("judged solves", judged_solves_);
-    to.put("judged iterations", judged_iterations_);
-    to.put("fixed-point iteration given up", given_up_);
+    trial_.save(to);
   }
   void restore(SnapshotReader& from) override {
     factors_.restore(from);
-    judged_solves_ = static_cast<int>(from.whole_number("judged solves", direct_solves_to_judge));
-    judged_iterations_ =
-        static_cast<int>(from.whole_number("judged iterations", std::numeric_limits<int>::max()));
-    given_up_ = from.flag("fixed-point iteration given up");
+    trial_.restore(from);
   }
 
   std::string description() const override {
@@ -71,9 +64,7 @@ class DirectSolver final : public NonlinearSolver {
     std::string newton = "Newton's method, " + factors_.policy();
     if (!fixed_point_) return newton;
     const bool measured = options_.iteration == Iteration::automatic;
-    return (measured ? "fixed-point iteration while it is quick; otherwise "
-                     : "fixed-point iteration; where it fails ") +
-           newton;
+    return detail::fixed_point_strategy(measured, newton);
   }
 
  private:
@@ -110,10 +101,9 @@ class DirectSolver final : public NonlinearSolver {
 
   /// Newton's method from now on, where the fixed-point iteration has turned out to be slow.
   void judge(int iterations) {
-    judged_iterations_ += report_.ok() ? iterations : max_fixed_point;
-    if (++judged_solves_ < direct_solves_to_judge) return;
-    given_up_ = judged_iterations_ > quick_directly * direct_solves_to_judge;
-    judged_solves_ = judged_iterations_ = 0;
+    if (!trial_.add(report_.ok() ? iterations : max_fixed_point)) return;
+    trial_.judge(quick_directly);
+    trial_.count_again();
   }
 
   /// Newton's method with full steps, as KINSOL takes them: until F is below the tolerance, and where the
@@ -184,8 +174,7 @@ class DirectSolver final : public NonlinearSolver {
   std::unique_ptr<NonlinearSolver> kinsol_;  ///< made where it is needed first
   Vector guess_, f_, last_;
   SolveReport report_;
-  int judged_solves_ = 0, judged_iterations_ = 0;
-  bool given_up_ = false;  ///< the fixed-point iteration was slow
+  detail::FixedPointTrial trial_;
 };
 
 }  // namespace

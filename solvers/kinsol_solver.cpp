@@ -1,13 +1,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <diracstep/core/numerics/contraction_loop.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/numerics/scales.hpp>
+#include <diracstep/solvers/detail/fixed_point_trial.hpp>
 #include <diracstep/solvers/detail/jacobian_factors.hpp>
 #include <diracstep/solvers/detail/shells.hpp>
 #include <diracstep/solvers/detail/vector.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
-#include <limits>
 #include <string>
 #include <utility>
 
@@ -20,14 +21,12 @@ using detail::require;
 
 /// KINSOL measures a Newton step in units of the guess, which may be next to zero.
 constexpr double no_limit = 1e100;
-/// A residual of so many tolerances is round-off.
-constexpr double round_off = 16.0;
 /// The row that a norm is of is no larger than that norm times its scale, but for rounding.
 constexpr double at_rounding = 1e-12;
 
 /// A fixed-point iteration of so many iterations costs what Newton's method does.  It is judged by its first
 /// solves, once there is a history to guess from.
-constexpr int quick = 6, solves_to_judge = 12;
+constexpr int quick = 6;
 
 /// KINSOL around our own direct linear solver.  KINSOL believes that it gets a new Jacobian in each
 /// iteration; JacobianFactors decides what it does get.  The SUNMatrix that KINSOL carries around is an empty
@@ -71,7 +70,7 @@ class KinsolSolver final : public NonlinearSolver {
     data_of(x_.get()) = x.data();
     set_scales();
     report_.status = SolveStatus::no_convergence;
-    if (fixed_point_ && !given_up_) attempt(KIN_FP);
+    if (fixed_point_ && !trial_.given_up()) attempt(KIN_FP);
     if (options_.iteration == Iteration::automatic && fixed_point_) judge_fixed_point();
     if (!report_.ok()) attempt(KIN_NONE);
     if (!report_.ok()) {
@@ -83,21 +82,15 @@ class KinsolSolver final : public NonlinearSolver {
 
   void reset() override {
     factors_.reset();
-    judged_solves_ = judged_iterations_ = 0;
-    given_up_ = false;
+    trial_.reset();
   }
   void save(Snapshot& to) const override {
     factors_.save(to);
-    to.put("judged solves", judged_solves_);
-    to.put("judged iterations", judged_iterations_);
-    to.put("fixed-point iteration given up", given_up_);
+    trial_.save(to);
   }
   void restore(SnapshotReader& from) override {
     factors_.restore(from);
-    judged_solves_ = static_cast<int>(from.whole_number("judged solves", solves_to_judge));
-    judged_iterations_ =
-        static_cast<int>(from.whole_number("judged iterations", std::numeric_limits<int>::max()));
-    given_up_ = from.flag("fixed-point iteration given up");
+    trial_.restore(from);
   }
 
   std::string description() const override { return std::string("KINSOL, ") + factors_.name(); }
@@ -105,9 +98,7 @@ class KinsolSolver final : public NonlinearSolver {
     std::string newton = "Newton's method, " + factors_.policy();
     if (!fixed_point_) return newton;
     const bool measured = options_.iteration == Iteration::automatic;
-    return (measured ? "fixed-point iteration while it is quick; otherwise "
-                     : "fixed-point iteration; where it fails ") +
-           newton;
+    return detail::fixed_point_strategy(measured, newton);
   }
 
  private:
@@ -119,9 +110,8 @@ class KinsolSolver final : public NonlinearSolver {
 
   /// Newton's method from now on, where the fixed-point iteration has turned out to be slow.
   void judge_fixed_point() {
-    if (given_up_ || judged_solves_ == solves_to_judge) return;
-    judged_iterations_ += report_.ok() ? report_.iterations : options_.max_iterations;
-    given_up_ = ++judged_solves_ == solves_to_judge && judged_iterations_ > quick * solves_to_judge;
+    if (trial_.given_up() || trial_.over()) return;
+    if (trial_.add(report_.ok() ? report_.iterations : options_.max_iterations)) trial_.judge(quick);
   }
 
   /// From the guess to a status.
@@ -148,7 +138,7 @@ class KinsolSolver final : public NonlinearSolver {
     norm = report_residual();
     // KINSOL ends where its steps are small beside the unknowns, which may be far from the origin or of
     // different sizes; it goes on for as long as the residual falls.
-    while (code == KIN_STEP_LT_STPTOL && norm > round_off * options_.tolerance &&
+    while (code == KIN_STEP_LT_STPTOL && norm > round_off_in_tolerances * options_.tolerance &&
            report_.iterations < options_.max_iterations)
       if (!improve(code, norm)) break;
     small_step_ = code == KIN_STEP_LT_STPTOL;
@@ -290,7 +280,7 @@ class KinsolSolver final : public NonlinearSolver {
     const bool stagnates = norm > smallest_norm_ / 2.0;
     if (not_finite_ || norm > 2.0 * smallest_norm_) return norm <= options_.accept ? end_near(x, g) : -1;
     smallest_norm_ = std::min(smallest_norm_, norm);
-    if (norm <= options_.tolerance || (stagnates && norm <= round_off * options_.tolerance))
+    if (norm <= options_.tolerance || (stagnates && norm <= round_off_in_tolerances * options_.tolerance))
       return end_near(x, g);
     contract_to(x, g);
     return 0;
@@ -352,8 +342,7 @@ class KinsolSolver final : public NonlinearSolver {
   SolveReport report_;
   detail::ExceptionKeeper callbacks_;
   int strategy_ = KIN_NONE;
-  int judged_solves_ = 0, judged_iterations_ = 0;
-  bool given_up_ = false;            ///< the fixed-point iteration was slow
+  detail::FixedPointTrial trial_;
   double smallest_norm_ = HUGE_VAL;  ///< of the fixed-point iteration so far
   bool singular_ = false;
   bool not_finite_ = false;  ///< the last residual or Jacobian

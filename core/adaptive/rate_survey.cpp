@@ -6,7 +6,6 @@
 #include <diracstep/core/adaptive/pointwise_motion.hpp>
 #include <diracstep/core/adaptive/rate_survey.hpp>
 #include <diracstep/core/numerics/errors.hpp>
-#include <sstream>
 #include <vector>
 
 namespace diracstep {
@@ -186,23 +185,17 @@ PlanLine variable_steps_line(const std::shared_ptr<const Scene>& given, const So
   const RateSurvey survey = survey_rate(*scene, solvers, end);
   if (!survey.failure.empty()) return {"variable steps", "not known", survey.failure};
   const double span = std::abs(end - scene->start.time);
-  std::ostringstream reason;
-  reason.precision(2);
-  reason << "max ω / min ω = " << survey.ratio() << " over the first ";
-  reason.precision(3);
-  reason << survey.covered << " of " << span << " units of time";
+  const std::string reason = "max ω / min ω = " + to_text(survey.ratio(), 2) + " over the first " +
+                             to_text(survey.covered, 3) + " of " + to_text(span, 3) + " units of time";
   // The survey takes four accelerations a step, and larger steps than a run.
   const double wanted = 1.5 * static_cast<double>(survey.accelerations) / 4.0 * span / survey.covered;
   const double fixed = span / std::abs(step);
-  if (wanted > most_of_fixed * fixed) {
-    std::ostringstream text;
-    text.precision(1);
-    text << "they would take about " << wanted << " steps, " << fixed
-         << " of the scene's own size lead to the end; " << reason.str();
-    return {"variable steps", "left out", text.str()};
-  }
-  if (survey.variable_steps_pay()) return {"variable steps", "pay: " + how, reason.str()};
-  return {"variable steps", "left out", reason.str() + ", they pay above 5"};
+  if (wanted > most_of_fixed * fixed)
+    return {"variable steps", "left out",
+            "they would take about " + to_text(wanted, 1) + " steps, " + to_text(fixed, 1) +
+                " of the scene's own size lead to the end; " + reason};
+  if (survey.variable_steps_pay()) return {"variable steps", "pay: " + how, reason};
+  return {"variable steps", "left out", reason + ", they pay above 5"};
 }
 
 }  // namespace diracstep

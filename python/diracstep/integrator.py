@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import numpy as np
 
 from . import _library as c
-from .arrays import column, real
+from .arrays import column, real, whole
 from .errors import Misuse
 from .options import momentum_from, options_from
 from .plan import TextTable
@@ -57,8 +57,8 @@ class Integrator:
     def step(self, count: int = 1, *, size: float | None = None) -> None:
         """Takes so many steps, or one of another size.  After a Failure the state is that before the failed step."""
         if size is None:
-            if not -2**63 <= count < 2**63 if isinstance(count, int) else False:
-                raise Misuse(f"steps is {count}; at most {2**63 - 1} are taken")
+            if isinstance(count, int) and not -2**63 <= count < 2**63:  # ctypes would wrap it around
+                whole(count, "steps")
             try:
                 with self._lock:
                     code = self._step(self._handle, count)
