@@ -185,9 +185,13 @@ SolverFactory direct(KinsolOptions options) {
   };
 }
 
+SolverFactory direct() { return direct(KinsolOptions{.iteration = Iteration::automatic}); }
+
 SolverFactory named_solver(const std::string& name, KinsolOptions options) {
-  options.iteration = Iteration::automatic;
-  if (name == "direct") return direct(options);
+  if (name == "direct") {
+    options.iteration = Iteration::automatic;
+    return direct(options);
+  }
   try {
     options.iteration = iteration(name);
   } catch (const Misuse& misuse) {

@@ -10,7 +10,10 @@ namespace diracstep {
 /// method where there is none, where it does not contract or where the first solves show it to be slow
 /// (`options.iteration`).  What this does not solve is solved by kinsol() from the same guess, so that a step
 /// that fails fails for both.
-SolverFactory direct(KinsolOptions options = {.iteration = Iteration::automatic});
+SolverFactory direct(KinsolOptions options);
+
+/// The same with Iteration::automatic.
+SolverFactory direct();
 
 /// The solver of that name: "direct", or kinsol() with the iteration of that name.  Throws Misuse for any
 /// other.

@@ -18,7 +18,7 @@ namespace diracstep::detail {
 /// FixedStages of n coordinates, m rows and s stages.
 template <int n, int m, int s>
 class Stages final : public FixedStages {
-  static constexpr int rows = m > 0 ? m : 1, unknowns = s * (n + m), velocities = s * n;
+  static constexpr int rows = std::max(m, 1), unknowns = s * (n + m), velocities = s * n;
   using Square = std::array<double, n * n>;
   using Forms = std::array<double, rows * n>;  // m×n by columns
 
