@@ -198,7 +198,7 @@ std::string run_pictures(const PageEntry& entry, std::ptrdiff_t number, const st
                    fmt::format("<b>Error over time</b> of {}, against {}", run, html(history.error_against)),
                    scene + ": error over time", stem + "-error.svg");
   text += figure("history", number,
-                 fmt::format("<b>What should stay</b>: energy{}{} over time, of {}",
+                 fmt::format("<b>Conserved quantities</b>: energy{}{} over time, of {}",
                              history.constraint.empty() ? "" : ", constraint rows",
                              history.invariants.empty() ? "" : ", invariants", run),
                  scene + ": energy, invariants and constraint residual over time", stem + "-history.svg");

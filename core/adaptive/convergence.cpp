@@ -83,7 +83,7 @@ std::string Convergence::obstacle() const {
   text.precision(3);
   if (near_round_off()) {
     text << "the runs no longer come closer to each other than " << difference()
-         << ": round-off, or a motion that amplifies it, sets the limit";
+         << ": round-off, or a chaotic motion, sets the limit";
   } else {
     text << "the order observed is " << order_of(runs() - 1) << " and " << order_of(runs())
          << ", the stated one " << order_ << ", with differences of " << difference()

@@ -91,7 +91,10 @@ void choose_method(const Scene& scene, const Registry& registry, const ErrorCont
     report.compensated_sums = options.compensated_sums.value_or(false);
     return;
   }
-  const DefaultMethod choice = default_method(scene, {.order = options.order, .error = options.error});
+  const DefaultMethod choice = default_method(scene, {.order = options.order,
+                                                      .error = options.error,
+                                                      .rule = options.integrator.constraint_rule,
+                                                      .large = large_from(options.integrator.dense_limit)});
   const bool has_compensated_sums = registry.method(choice.method).info.stages > 0;
   report.method = choice.method;
   report.order = choice.order;

@@ -194,8 +194,8 @@ PlanLine variable_steps_line(const std::shared_ptr<const Scene>& given, const So
     return {"variable steps", "left out",
             "they would take about " + to_text(wanted, 1) + " steps, " + to_text(fixed, 1) +
                 " of the scene's own size lead to the end; " + reason};
-  if (survey.variable_steps_pay()) return {"variable steps", "pay: " + how, reason};
-  return {"variable steps", "left out", reason + ", they pay above 5"};
+  if (survey.variable_steps_pay()) return {"variable steps", "save time: " + how, reason};
+  return {"variable steps", "left out", reason + ", they save time above 5"};
 }
 
 }  // namespace diracstep

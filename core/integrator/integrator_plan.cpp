@@ -18,7 +18,7 @@ std::vector<PlanLine> Integrator::plan() const {
   if (solver != nullptr)
     lines.push_back({"nonlinear solver", solver->description(), solver->strategy()});
   else
-    lines.push_back({"nonlinear solver", "left out", "the step is explicit and no rows bind"});
+    lines.push_back({"nonlinear solver", "left out", "the step is explicit and there are no rows"});
   if (solver != nullptr) {
     const int nonzeros = problem.pattern().nonzeros();
     lines.push_back({"Jacobian", matrices_.full ? "full" : "sparse",

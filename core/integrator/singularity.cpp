@@ -68,7 +68,7 @@ std::string describe_singularity(NonlinearProblem& problem, ConstVectorRef x, co
       text << (k == 0 ? "" : "; ") << names_in(lu.kernel().col(k), problem, scene);
   } else {
     text << "; the Jacobian is regular there (ratio of its pivots " << pivots.maxCoeff() / pivots.minCoeff()
-         << "): the iteration is slow or started too far away, and a smaller step may help";
+         << "): the iteration is slow or its initial guess poor, and a smaller step may help";
   }
   return text.str();
 }

@@ -34,8 +34,8 @@ void BranchCheck::look(const Integrator& integrator) {
   watched_ = false;
   std::ostringstream text;
   text << "within a step before t = " << integrator.time() << " the velocity turned by "
-       << std::round(100.0 * turn / largest_speed_) << " % of the largest so far, at a pose where the rows "
-       << "may depend on each other: the motion may have left its branch there; compare with a smaller step";
+       << std::round(100.0 * turn / largest_speed_) << " % of the largest so far, at a pose where rows "
+       << "may be redundant: the motion may have left its branch there; compare with a smaller step";
   text_ = text.str();
 }
 

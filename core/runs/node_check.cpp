@@ -105,7 +105,7 @@ void NodeCheck::look_for_rest() {
     text << "near t = " << nodes_.back().time << " the momentum of "
          << scene_.coordinates[static_cast<std::size_t>(i)] << " stays at " << nodes_.back().p[i]
          << " while a force acts on it whose impulse in these steps is " << impulses[i]
-         << ": the motion is frozen";
+         << ": the momentum does not respond to the force";
     text_ = text.str();
   }
 }

@@ -14,8 +14,9 @@ constexpr long fewest_steps = 3;    // before velocities and momenta count
 
 std::string line(double time, double part, const char* of) {
   std::ostringstream text;
-  text << "two parts of the step from t = " << time << " end " << std::round(100.0 * part) << " % of " << of
-       << " beside the whole one: the step is too large for the result to be trusted";
+  text << "step size check: from t = " << time << " two substeps and the whole step differ by "
+       << std::round(100.0 * part) << " % of " << of
+       << ": the step is too large for the result to be trusted";
   return text.str();
 }
 

@@ -36,7 +36,7 @@ void require_few_products(const Eigen::SparseMatrix<double>& one_forms) {
       rows[entry.row()] += 1.0;
   if (rows.squaredNorm() > most)
     throw Misuse("too many rows share a coordinate, " + std::to_string(std::lround(rows.maxCoeff())) +
-                 " of them: whether they depend on each other cannot be found");
+                 " of them: whether some are redundant cannot be decided");
 }
 
 /// The pivots of the Gram matrix are squared distances from the columns before.  The shift keeps those that

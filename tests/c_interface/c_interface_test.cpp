@@ -506,7 +506,7 @@ TEST_F(CInterface, ThePlanTellsWhetherVariableStepsPay) {
       if (std::string(plan.cells[3 * k]) == "variable steps") return std::string(plan.cells[3 * k + 1]);
     return std::string("no line");
   };
-  EXPECT_EQ(decision("kepler_e099"), "pay: eps");
+  EXPECT_EQ(decision("kepler_e099"), "save time: eps");
   EXPECT_EQ(decision("pendulum_cartesian"), "left out");
 }
 

@@ -70,12 +70,12 @@ TEST_F(AdaptiveCommand, StudyShowsVariableStepsBesideFixedOnes) {
 }
 
 TEST_F(AdaptiveCommand, PlanSaysWhetherVariableStepsPay) {
-  EXPECT_NE(run("plan kepler_e099").out.find("pay: --adaptive"), std::string::npos);
+  EXPECT_NE(run("plan kepler_e099").out.find("save time: --adaptive"), std::string::npos);
   const Outcome adaptive = run("plan kepler_e099 --adaptive --eps 0.1");
   for (const char* part : {"integrating controller", "eps = 0.1", "monitor", "ω0 = "})
     EXPECT_NE(adaptive.out.find(part), std::string::npos) << part << '\n' << adaptive.out;
   const Outcome steady = run("plan contact_oscillator");
-  EXPECT_NE(steady.out.find("they pay above 5"), std::string::npos) << steady.out;
+  EXPECT_NE(steady.out.find("they save time above 5"), std::string::npos) << steady.out;
   EXPECT_NE(run("plan lotka_volterra_2d").out.find("not offered"), std::string::npos);
 }
 

@@ -153,7 +153,7 @@ step = 1e-3
   const Outcome outcome = run("plan " + file);
   ASSERT_EQ(outcome.status, 0) << outcome.err;
   EXPECT_NE(outcome.out.find("they would take about"), std::string::npos) << outcome.out;
-  EXPECT_EQ(outcome.out.find("pay: --adaptive"), std::string::npos) << outcome.out;
+  EXPECT_EQ(outcome.out.find("save time: --adaptive"), std::string::npos) << outcome.out;
 }
 
 TEST_F(Doubt, AnErrorThatEqualRunsWouldStateIsNotStated) {
@@ -183,6 +183,12 @@ TEST_F(Doubt, TheFileHoldsTheAcceptedRun) {
         EXPECT_EQ(std::stod(values[i]), end["q"][names[i]].get<double>()) << options << ' ' << names[i];
       }
   }
+}
+
+TEST_F(Doubt, ARuleAskedForIsThatOfTheAcceptedRun) {
+  const Outcome outcome = run("run knife_edge --error 1e-4 --rule left --json");
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_TRUE(Json::parse(outcome.out)["method"].get<std::string>().starts_with("type1/midpoint"));
 }
 
 TEST_F(Doubt, FixedStepsCanBeAskedFor) {

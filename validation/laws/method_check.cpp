@@ -27,7 +27,7 @@ constexpr double order_tolerance = 0.2;  // as in the order table
 
 Check check_symplecticity(const Subject& subject) {
   const double defect = symplecticity_defect(subject.registry, laws::unconstrained(), subject.stepping());
-  return at_most(defect, 1e-8, "largest entry of M'JM - J, h = 0.05");
+  return at_most(defect, 1e-8, "largest entry of MᵀΩM − Ω, h = 0.05");
 }
 
 Check check_consistency(const Subject& subject) {

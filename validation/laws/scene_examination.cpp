@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <cmath>
 #include <diracstep/core/integrator/integrator.hpp>
+#include <diracstep/core/methods/default_method.hpp>
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/steps/matrix_form.hpp>
 #include <diracstep/core/system/redundant_rows.hpp>
 #include <diracstep/validation/laws/scene_examination.hpp>
 #include <optional>
@@ -32,13 +34,11 @@ Finding examine_dimensions(const Scene& scene) {
     return {"dimensions", false, misuse.what()};
   }
   const int n = scene.dimension(), m = scene.rows();
-  return {
-      "dimensions", m <= n,
-      fmt::format("{} coordinates, {} rows{}", n, m,
-                  m < n    ? ""
-                  : m == n ? ": they alone determine the motion"
-                           : ": more rows than coordinates; --drop-redundant leaves out those that follow "
-                             "from others")};
+  return {"dimensions", m <= n,
+          fmt::format("{} coordinates, {} rows{}", n, m,
+                      m < n    ? ""
+                      : m == n ? ": they alone determine the motion"
+                               : ": more rows than coordinates; --drop-redundant leaves out redundant ones")};
 }
 
 Finding examine_start(const Scene& scene) {
@@ -58,8 +58,7 @@ Finding examine_rank(const Scene& scene) {
   Finding finding{"rank of the rows", dependent.empty(),
                   fmt::format("rank {} of {} at the start", m - static_cast<int>(dependent.size()), m)};
   for (const std::string& name : dependent)
-    finding.detail +=
-        fmt::format("{}'{}'", &name == dependent.data() ? "; follows from the others: " : ", ", name);
+    finding.detail += fmt::format("{}'{}'", &name == dependent.data() ? "; redundant: " : ", ", name);
   if (dependent.empty()) return finding;
   const std::string kept_for = why_not_left_out(row_dependence(scene, scene.start, dependent));
   finding.detail += kept_for.empty()
@@ -160,14 +159,19 @@ std::vector<std::string> advise(const CatalogueScene& entry, const Examination& 
     advice.emplace_back("linear: every step has the same Jacobian");
   else if (structure.separable && structure.y_hessian_constant && scene.constraints.empty() && !scene.force)
     advice.emplace_back("separable: type1/trapezoidal is explicit and cheap where nothing is stiff");
-  if (entry.recommended.stated)
+  const DefaultMethod choice = default_method(scene, {.order = entry.recommended.order});
+  if (entry.recommended.stated) {
+    const bool named = entry.recommended.method != automatic_method;
     advice.push_back(fmt::format(
-        "without --method and --order a run takes {}{}, as the file recommends", entry.recommended.method,
+        "without --method and --order a run takes {}{}, as the file recommends",
+        named ? entry.recommended.method : choice.method,
         entry.recommended.order > 0 ? fmt::format(", order {}", entry.recommended.order) : std::string()));
-  else
-    advice.emplace_back("without --method GL(3), order 6; --order 8 to 12 for errors below 1e-6");
-  if (scene.dimension() + scene.rows() > 40)
-    advice.emplace_back("large: the step uses sparse matrices (KLU)");
+  } else {
+    advice.push_back(fmt::format("without --method a run takes {}, {}; --order 8 to 12 for errors below 1e-6",
+                                 choice.method, choice.reason));
+  }
+  if (const MatrixForm form = matrix_form(scene, as_measured); !form.full)
+    advice.push_back("sparse matrices: " + form.reason);
   if (scene.force)
     advice.emplace_back(
         "forces that damp strongly lose accuracy in composed orders, whose inner steps go backwards; "

@@ -128,7 +128,7 @@ TEST(Run, SaysWhyItsResultIsNotToBeBelieved) {
     return 0.5 * (v[0] * v[0] - q[0] * q[0]) + 200.0 * q[0] * cos(20.0 * t);
   };
   EXPECT_EQ(doubts_of(driven, "type1/midpoint", 0.003), "");
-  EXPECT_TRUE(doubts_of(driven, "type1/midpoint", 0.25).starts_with("two parts of the step from t ="));
+  EXPECT_TRUE(doubts_of(driven, "type1/midpoint", 0.25).starts_with("step size check: from t ="));
 }
 
 /// The same integrator for a second run, from another start: the doubt is of that run alone.
