@@ -62,13 +62,17 @@ double end_from(const diracstep_model& model, const diracstep_options& options) 
 }
 
 double step_from(const diracstep_model& model, const diracstep_options& options) {
+  return step_from(model, options, model.scene->start.time);
+}
+
+double step_from(const diracstep_model& model, const diracstep_options& options, double start) {
   const CatalogueScene& entry = entry_of(model);
-  const double forward = end_from(model, options) - model.scene->start.time;
+  const double forward = end_from(model, options) - start;
   double step = options.step;
   if (step == 0.0)
     step = std::copysign(recommended(model, options) ? entry.recommended.step : entry.natural_step, forward);
   if (options.eps > 0.0) return std::copysign(step, forward);
-  return options.ends != 0 ? fit_steps(model.scene->start.time, options.end, step).step : step;
+  return options.ends != 0 ? fit_steps(start, options.end, step).step : step;
 }
 
 }  // namespace diracstep::c_interface

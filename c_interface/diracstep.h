@@ -176,8 +176,8 @@ DIRACSTEP_API int diracstep_reset(diracstep_integrator *integrator, double time,
                                   const double *v);
 
 /* All that the next steps depend on, as bytes: *size becomes how many, and where there is room for so many
- * they are written.  An integrator of the same scene and options goes on from them with the same bits.  Not
- * where steps vary. */
+ * they are written, the push among them.  An integrator of the same scene, parameters, method and step goes on from
+ * them with the same bits; any other refuses them.  Not where steps vary. */
 DIRACSTEP_API int diracstep_save(const diracstep_integrator *integrator, char *bytes, size_t room,
                                  size_t *size);
 DIRACSTEP_API int diracstep_restore(diracstep_integrator *integrator, const char *bytes, size_t size);
@@ -266,7 +266,7 @@ DIRACSTEP_API int diracstep_solve(const diracstep_model *model, const diracstep_
 /* Many starts of one scene, each of them consistent. */
 typedef struct diracstep_ensemble {
   int members;
-  const double *time;  /* or NULL: all at the scene's */
+  const double *time;  /* or NULL: all at the scene's; equal ones where steps is 0 */
   const double *q, *v; /* members × n; v may be NULL: the scene's */
   long steps;          /* 0: to the end that the options give */
   int momentum;

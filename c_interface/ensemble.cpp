@@ -20,6 +20,19 @@ std::vector<Start> starts_of(const diracstep_model& model, const diracstep_ensem
   return starts;
 }
 
+/// The starting time; throws Misuse where members that are to end at one time have several.
+double start_of_all(const diracstep_model& model, const diracstep_ensemble& ensemble) {
+  if (ensemble.time == nullptr || ensemble.members == 0) return model.scene->start.time;
+  const double first = ensemble.time[0];
+  if (ensemble.steps == 0)
+    for (int k = 1; k < ensemble.members; ++k)
+      if (ensemble.time[k] != first)
+        throw Misuse("members 0 and " + std::to_string(k) + " start at " + to_text(first) + " and " +
+                     to_text(ensemble.time[k]) +
+                     ": steps of one size that end at one time need one start; give the number of steps");
+  return first;
+}
+
 void require_room_for_all(const diracstep_ensemble& ensemble, const diracstep_points& ends) {
   if (ensemble.members < 0 || ensemble.steps < 0)
     throw Misuse("members = " + std::to_string(ensemble.members) +
@@ -36,8 +49,8 @@ void run(const diracstep_model& model, const diracstep_options& options, const d
   if (options.eps > 0.0 || options.pushed != 0)
     throw Misuse("ensembles need steps of fixed size, and no push");
   IntegratorOptions stepping = stepping_from(model, options);
-  stepping.step = step_from(model, options);
-  const double start = model.scene->start.time;
+  const double start = start_of_all(model, ensemble);
+  stepping.step = step_from(model, options, start);
   const long steps =
       ensemble.steps > 0 ? ensemble.steps : fit_steps(start, end_from(model, options), stepping.step).steps;
   const auto members = run_ensemble(entry.scene, model.registry, solvers_from(options), stepping,

@@ -27,6 +27,7 @@ struct diracstep_integrator {
   std::shared_ptr<const diracstep::Scene> scene;  ///< completed
   std::vector<diracstep::Invariant> invariants;
   bool invariants_by_momentum;
+  diracstep::Parameters parameters;
   std::vector<diracstep::PlanLine> notes;  ///< of the model, for the plan
   double end;                              ///< where a run ends that names none
   std::shared_ptr<diracstep::Vector> push = {};
@@ -88,9 +89,10 @@ SolverFactory solvers_from(const diracstep_options& options);
 /// All but the step.
 IntegratorOptions stepping_from(const diracstep_model& model, const diracstep_options& options);
 StepControl control_from(const diracstep_options& options);
-/// Where the motion ends, and the step that leads there, with its sign.
+/// Where the motion ends, and the step that leads there from the scene's start or another, with its sign.
 double end_from(const diracstep_model& model, const diracstep_options& options);
 double step_from(const diracstep_model& model, const diracstep_options& options);
+double step_from(const diracstep_model& model, const diracstep_options& options, double start);
 
 /// Whether the caller has asked for the end; false without a flag.
 bool stopped(const int* flag);

@@ -58,9 +58,9 @@ std::unique_ptr<diracstep_integrator> make(const diracstep_model& model, const d
   Stepper stepper = options.eps > 0.0
                         ? Stepper(varying(model, scene, stepping, options))
                         : Stepper(Integrator(scene, model.registry, solvers_from(options), stepping));
-  auto handle = std::make_unique<diracstep_integrator>(
-      diracstep_integrator{std::move(stepper), model.scene, entry.invariants, !entry.scene->lagrangian,
-                           notes_of(model, options), end_from(model, options), std::move(push)});
+  auto handle = std::make_unique<diracstep_integrator>(diracstep_integrator{
+      std::move(stepper), model.scene, entry.invariants, !entry.scene->lagrangian, entry.parameters,
+      notes_of(model, options), end_from(model, options), std::move(push)});
   if (const auto* const made = std::get_if<AdaptiveIntegrator>(&handle->stepper))
     handle->side = [scene, registry = model.registry, solvers = solvers_from(options),
                     used = made->options()] { return Integrator(scene, registry, solvers, used); };
@@ -69,6 +69,15 @@ std::unique_ptr<diracstep_integrator> make(const diracstep_model& model, const d
 
 void write(const Vector& column, double* to) {
   if (to != nullptr) std::copy(column.begin(), column.end(), to);
+}
+
+/// Throws Misuse where the snapshot is of a scene with other parameters.
+void read_parameters(SnapshotReader& from, const Parameters& parameters) {
+  from.section("parameters");
+  for (const auto& [name, value] : parameters)
+    if (const double saved = from.number(name); saved != value)
+      throw Misuse("the snapshot is of " + name + " = " + to_text(saved) + "; this scene has " + name +
+                   " = " + to_text(value));
 }
 
 Eigen::Map<const Vector> column(const double* numbers, const diracstep_integrator& handle) {
@@ -166,7 +175,13 @@ int diracstep_reset(diracstep_integrator* integrator, double time, const double*
 
 int diracstep_save(const diracstep_integrator* integrator, char* bytes, size_t room, size_t* size) {
   return guarded([&] {
-    const std::string saved = fixed_of(given(integrator, "the integrator"), "a snapshot").save().bytes();
+    const diracstep_integrator& from = given(integrator, "the integrator");
+    Snapshot snapshot;
+    snapshot.section("parameters");
+    for (const auto& [name, value] : from.parameters) snapshot.put(name, value);
+    if (from.push) snapshot.put("push", *from.push);
+    fixed_of(from, "a snapshot").save(snapshot);
+    const std::string saved = snapshot.bytes();
     given(size, "where the size goes") = saved.size();
     if (bytes != nullptr && room >= saved.size()) saved.copy(bytes, saved.size());
   });
@@ -174,8 +189,21 @@ int diracstep_save(const diracstep_integrator* integrator, char* bytes, size_t r
 
 int diracstep_restore(diracstep_integrator* integrator, const char* bytes, size_t size) {
   return guarded([&] {
-    Integrator& to = fixed_of(given(integrator, "the integrator"), "a snapshot");
-    to.restore(Snapshot::from_bytes({&given(bytes, "the snapshot"), size}));
+    diracstep_integrator& handle = given(integrator, "the integrator");
+    Integrator& to = fixed_of(handle, "a snapshot");
+    const Snapshot snapshot = Snapshot::from_bytes({&given(bytes, "the snapshot"), size});
+    try {
+      SnapshotReader reader(snapshot);
+      read_parameters(reader, handle.parameters);
+      Vector push = handle.push ? *handle.push : Vector();
+      if (handle.push) reader.read("push", push);
+      to.restore(reader);
+      reader.require_end();
+      if (handle.push) *handle.push = push;
+    } catch (const Misuse&) {
+      to.reset();
+      throw;
+    }
   });
 }
 

@@ -67,12 +67,15 @@ class Integrator {
 
   std::vector<PlanLine> plan() const;
 
-  /// All that the next steps depend on.  After `restore`, an integrator of the same scene and options goes on
+  /// All that the next steps depend on.  After `restore`, an integrator of the same scene, method and step goes on
   /// with the same bits as the one saved.  restore() throws Misuse for a snapshot that does not fit, naming
   /// what does not, and then the integrator is as after reset().  The last step before it cannot be taken
   /// again by retry().
   Snapshot save() const;
   void restore(const Snapshot& from);
+  /// The same beside fields of the caller's.  After a Misuse the integrator is to be reset().
+  void save(Snapshot& to) const;
+  void restore(SnapshotReader& from);
 
  private:
   /// The step taken last, or tried.
@@ -90,7 +93,6 @@ class Integrator {
   StepReport take(double h, Guess guess);
   StepReport failed(const SolveReport& solve, double time, const std::string& why) const;
   void accept_step(double h, int pieces);
-  void read(SnapshotReader& from);
 
   std::shared_ptr<const Scene> scene_;
   std::vector<PlanLine> preparation_;

@@ -25,11 +25,21 @@ void for_each_count(AnyWork& work, Visit visit) {
   visit("divided steps", retries.divided_steps);
 }
 
+std::string title(const IntegratorOptions& options) {
+  return "integrator of " + options.method + ", order " + std::to_string(options.order);
+}
+
 }  // namespace
 
 Snapshot Integrator::save() const {
   Snapshot to;
-  to.section("integrator");
+  save(to);
+  return to;
+}
+
+void Integrator::save(Snapshot& to) const {
+  to.section(title(options_));
+  to.put("step size", options_.step);
   for_each_count(work_, [&](const char* name, long count) { to.put(name, static_cast<double>(count)); });
   to.put("time base", clock_.base);
   to.put("time rest", clock_.rest);
@@ -41,13 +51,12 @@ Snapshot Integrator::save() const {
   to.put_extended("position rest", state_.rest.q);
   to.put_extended("momentum rest", state_.rest.p);
   sequence_->save(to);
-  return to;
 }
 
 void Integrator::restore(const Snapshot& from) {
   try {
     SnapshotReader reader(from);
-    read(reader);
+    restore(reader);
     reader.require_end();
   } catch (const Misuse&) {
     reset();
@@ -55,9 +64,12 @@ void Integrator::restore(const Snapshot& from) {
   }
 }
 
-void Integrator::read(SnapshotReader& from) {
+void Integrator::restore(SnapshotReader& from) {
   reset();
-  from.section("integrator");
+  from.section(title(options_));
+  if (const double step = from.number("step size"); step != options_.step)
+    throw Misuse("the snapshot is of steps of " + to_text(step) + "; this integrator takes " +
+                 to_text(options_.step));
   for_each_count(work_, [&](const char* name, long& count) { count = from.whole_number(name, max_counted); });
   clock_.base = from.number("time base");
   clock_.rest = from.number("time rest");

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import threading
+import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -55,21 +56,30 @@ class Integrator:
         raise TypeError("an integrator is not copied or pickled; save() and restore() carry its state to another one")
 
     def step(self, count: int = 1, *, size: float | None = None) -> None:
-        """Takes so many steps, or one of another size.  After a Failure the state is that before the failed step."""
+        """Takes so many steps, or one of another size.  After a Failure the state is that before the failed step; Ctrl-C
+        ends many steps within a fraction of a second, where the motion has come to by then."""
         if size is None:
-            if isinstance(count, int) and not -2**63 <= count < 2**63:  # ctypes would wrap it around
-                whole(count, "steps")
-            try:
-                with self._lock:
-                    code = self._step(self._handle, count)
-                    if code == _OK:
-                        return
-                    message = c.lib.message().decode()
-            except ctypes.ArgumentError:
-                raise Misuse(f"steps is {count!r}; a whole number is needed") from None
-            self.scene._raise(code, message)
+            if isinstance(count, int) and count == 1:
+                self._take(1)
+                return
+            left, part = whole(count, "steps"), 1
+            while left > 0:  # Ctrl-C is heard between the parts
+                begin = time.perf_counter()
+                self._take(min(part, left))
+                left -= part
+                if time.perf_counter() - begin < 0.05:
+                    part *= 2
+            return
         with self._lock:
             self._check(c.lib.step_by(self._handle, real(size, "size")))
+
+    def _take(self, count: int) -> None:
+        with self._lock:
+            code = self._step(self._handle, count)
+            if code == _OK:
+                return
+            message = c.lib.message().decode()
+        self.scene._raise(code, message)
 
     def push(self, force: Any) -> None:
         """A further generalised force, by coordinate or in their order, that acts until the next push.
@@ -109,7 +119,8 @@ class Integrator:
             self._check(c.lib.reset(self._handle, start_t, start_q.ctypes.data, start_v.ctypes.data))
 
     def save(self) -> bytes:
-        """All that the next steps depend on.  An integrator of the same scene and options goes on from it with the same bits."""
+        """All that the next steps depend on, the push included.  An integrator of the same scene, parameters, method and step goes
+        on from it with the same bits; any other refuses it."""
         size = ctypes.c_size_t()
         with self._lock:
             self._check(c.lib.save(self._handle, None, 0, ctypes.byref(size)))

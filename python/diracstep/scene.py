@@ -231,7 +231,8 @@ class Scene:
                  threads: int = 0, momentum: str = "projected", **options: Any) -> Ensemble:
         """The ends of many motions, stepped by threads in C++ (0: one for each processor); the same bits for any number.
 
-        q, v: N × n, consistent starts; v is the scene's where it is left out.  t: N starting times, the scene's without.
+        q, v: N × n, consistent starts; v is the scene's where it is left out.  t: N starting times, the scene's without;
+        equal ones where no steps are given.  Ends are read, not checked: ``doubt`` belongs to runs.
         Ctrl-C ends it with KeyboardInterrupt.
         """
         starts_q = np.asarray(q)

@@ -226,7 +226,9 @@ _UFUNCS: dict[str, Callable[..., Any]] = {
 
 
 class Column(np.ndarray):
-    """The coordinates, or their velocities, as an array of symbols that also knows them by name: q[0], q["x"], q.x."""
+    """The coordinates, or their velocities, as an array of symbols that also knows them by name: q[0], q["x"], q.x.
+
+    q["T"], not q.T, is a coordinate that has the name of an attribute of arrays."""
 
     _names: dict[str, int]
 

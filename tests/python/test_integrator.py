@@ -39,6 +39,38 @@ def test_snapshots_go_on_with_the_same_bits(skate):
         skate.integrator(step=0.1, method="type1/midpoint").restore(saved)
 
 
+def test_snapshots_of_other_steps_and_parameters_are_refused():
+    scene = ds.load("knife_edge")
+    saved = scene.integrator(step=0.1).save()
+    with pytest.raises(ds.Misuse, match="steps of 0.1; this integrator takes 0.05"):
+        scene.integrator(step=0.05).restore(saved)
+    with pytest.raises(ds.Misuse, match="of m = 1; this scene has m = 2"):
+        ds.load("knife_edge", m=2.0).integrator(step=0.1).restore(saved)
+    with pytest.raises(ds.Misuse, match="push"):
+        scene.integrator(step=0.1, pushed=True).restore(saved)
+
+
+def test_snapshots_hold_the_push(skate):
+    integrator = skate.integrator(step=0.1, pushed=True)
+    integrator.push([0.3, 0.1, 0.2])
+    integrator.step(2)
+    saved = integrator.save()
+    integrator.step(5)
+    other = skate.integrator(step=0.1, pushed=True)
+    other.restore(saved)
+    other.step(5)
+    assert np.array_equal(other.state().q, integrator.state().q)
+
+
+def test_many_steps_are_those_of_one_call_each(skate):
+    one, many = skate.integrator(step=0.1), skate.integrator(step=0.1)
+    for _ in range(300):
+        one.step()
+    many.step(300)
+    assert np.array_equal(one.state().q, many.state().q)
+    assert many.statistics.steps == 300
+
+
 def test_starts_of_ones_own(skate):
     integrator = skate.integrator(step=0.1)
     integrator.reset(q=[1, 2, 0], v={"x": 1.0})

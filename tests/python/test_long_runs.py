@@ -29,6 +29,16 @@ def test_ctrl_c_ends_a_run_and_keeps_what_is_computed(skate):
     assert not skate.run(steps=10, step=0.01).interrupted  # the next one is not affected
 
 
+def test_ctrl_c_ends_many_steps_by_hand(skate):
+    integrator = skate.integrator(step=0.01)
+    timer = interrupt_soon()
+    with pytest.raises(KeyboardInterrupt):
+        integrator.step(10**9)
+    timer.join()
+    assert 0 < integrator.statistics.steps < 10**9
+    integrator.step()
+
+
 def test_ctrl_c_ends_a_search_and_an_ensemble(skate):
     timer = interrupt_soon()
     with pytest.warns(ds.Interrupted):

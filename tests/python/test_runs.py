@@ -112,6 +112,11 @@ def test_an_ensemble_is_its_members(spring):
         assert integrator.state().q[0] == ends.q[k, 0]
     assert np.array_equal(ends.q, spring.ensemble(starts, until=1.0, step=0.1, threads=3).q)
     assert len(spring.ensemble(np.empty((0, 1)), until=1.0)) == 0
+    later = spring.ensemble(starts, t=np.full(len(starts), 0.5), until=1.0, step=0.1)
+    assert np.allclose(later.t, 1.0)
+    assert np.allclose(later.q, spring.ensemble(starts, until=0.5, step=0.1).q, atol=1e-12)
+    with pytest.raises(ds.Misuse, match="give the number of steps"):
+        spring.ensemble(starts, t=np.arange(len(starts)), until=1.0, step=0.1)
     with pytest.raises(ds.Misuse, match="shape"):
         spring.ensemble(np.zeros((3, 2)))
     with pytest.raises(ds.Misuse, match="finite"):

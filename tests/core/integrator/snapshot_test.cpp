@@ -134,18 +134,20 @@ TEST(RestoredIntegrator, RefusesASnapshotThatDoesNotFitByNameAndStandsAtItsStart
     EXPECT_TRUE(integrator.step().ok());
   };
   const IntegratorOptions same{.method = "type1/gl:2", .step = 0.05};
-  refused({.method = "type1/gl:3", .step = 0.05}, snapshot, {"'solution'", "another scene, method"});
-  refused({.method = "type1/gl:2", .order = 6, .step = 0.05}, snapshot, {"'step'", "'predictor' is needed"});
+  refused({.method = "type1/gl:3", .step = 0.05}, snapshot,
+          {"'integrator of type1/gl:2, order 4'", "'integrator of type1/gl:3, order 6'", "another scene, method"});
+  refused({.method = "type1/gl:2", .order = 6, .step = 0.05}, snapshot, {"order 4", "order 6"});
+  refused({.method = "type1/gl:2", .step = 0.025}, snapshot, {"steps of 0.05", "takes 0.025"});
   IntegratorOptions compensated = same;
   compensated.compensated_sums = true;
   refused(compensated, snapshot, {"0 numbers for 'position rest'"});
-  refused(same, Snapshot(), {"ends before 'integrator'"});
+  refused(same, Snapshot(), {"ends before 'integrator of type1/gl:2"});
   Snapshot longer = snapshot;
   longer.put("one more", 0.0);
   refused(same, longer, {"goes on with 'one more'"});
   for (const double value : {-1.0, 0.5, 1e300, std::nan("")}) {
     Snapshot changed = snapshot;
-    changed.numbers()[0] = value;
+    changed.numbers()[1] = value;
     refused(same, changed, {"for 'steps'", "a whole number from 0"});
   }
 }
