@@ -176,8 +176,8 @@ DIRACSTEP_API int diracstep_reset(diracstep_integrator *integrator, double time,
                                   const double *v);
 
 /* All that the next steps depend on, as bytes: *size becomes how many, and where there is room for so many
- * they are written, the push among them.  An integrator of the same scene, parameters, method and step goes on from
- * them with the same bits; any other refuses them.  Not where steps vary. */
+ * they are written, the push among them.  An integrator of the same scene, parameters, method and step goes
+ * on from them with the same bits; any other refuses them.  Not where steps vary. */
 DIRACSTEP_API int diracstep_save(const diracstep_integrator *integrator, char *bytes, size_t room,
                                  size_t *size);
 DIRACSTEP_API int diracstep_restore(diracstep_integrator *integrator, const char *bytes, size_t size);
