@@ -98,7 +98,7 @@ def test_a_push_acts_like_a_force():
 
 
 @pytest.mark.parametrize("call, words", [
-    (lambda i: i.step(-1), "0 or more"), (lambda i: i.step(1.5), "whole number"), (lambda i: i.step(size=0.0), "step"),
+    (lambda i: i.step(-1), "at least 0"), (lambda i: i.step(1.5), "whole number"), (lambda i: i.step(size=0.0), "step"),
     (lambda i: i.step(size=np.nan), "finite"), (lambda i: i.state("other"), "projected"),
     (lambda i: i.reset(q=[0.0]), r"shape \(1,\)"), (lambda i: i.reset(q=np.zeros((3, 1))), "shape"),
     (lambda i: i.reset(q=np.zeros(3, dtype=complex)), "complex128"), (lambda i: i.reset(q=np.zeros(3, dtype=object)), "object"),
