@@ -248,6 +248,69 @@ step = 0.05
   EXPECT_NE(outcome.err.find("before t = 1.05"), std::string::npos) << outcome.err;
 }
 
+TEST_F(Doubt, ADamperOfTheValueZeroDoesNotSwitchOffTheEnergy) {
+  const std::string file = scene("stiff", R"toml(
+lagrangian = "v_x^2/2 - k*max(0, x)^2/2"
+[coordinates]
+x = {}
+[parameters]
+k = 1e6
+d = 0
+[force]
+x = "-d*v_x"
+[start]
+x = -1
+v_x = 1
+[span]
+end = 2
+step = 0.1
+)toml");
+  EXPECT_NE(run("run " + file).err.find("the energy, which this scene keeps"), std::string::npos);
+  EXPECT_EQ(run("run " + file + " --set d=0.1").err.find("the energy, which this scene keeps"),
+            std::string::npos);
+}
+
+/// p = m v of a mass of 1e-27 beside a reference whose velocity is half as large again.
+TEST_F(Doubt, AnErrorAgainstAReferenceHasNoUnit) {
+  const Outcome outcome = run("run " + scene("light", R"toml(
+lagrangian = "m*v_x^2/2 - m*x^2/2"
+[coordinates]
+x = {}
+[parameters]
+m = 1e-27
+[start]
+x = 1
+[span]
+end = 10
+step = 0.5
+[[reference]]
+kind = "exact"
+digits = 15
+how = "wrong on purpose"
+x = "cos(t)"
+v_x = "-1.5*sin(t)"
+)toml") + " --json");
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_NEAR(Json::parse(outcome.out)["error_p"].get<double>(), 1.0 / 3.0, 1e-3) << outcome.out;
+}
+
+/// From the lowest point the acceleration is zero at the start.
+TEST_F(Doubt, VariableStepsFromTheLowestPointOfAPendulumAreFew) {
+  const std::string file = scene("swing", R"toml(
+lagrangian = "v_a^2/2 + 9.81*cos(a)"
+[coordinates]
+a = {}
+[start]
+v_a = 2
+[span]
+end = 10
+step = 0.05
+)toml");
+  const Json json = Json::parse(run("run " + file + " --adaptive --json").out);
+  EXPECT_LT(json["steps"].get<long>(), 400) << json;
+  EXPECT_GT(json["steps"].get<long>(), 50) << json;
+}
+
 /// A drag that follows a fast drive: variable steps would take a thousand times those of the scene.
 TEST_F(Doubt, APlanDoesNotAdviseVariableStepsThatAreTooMany) {
   const std::string file = scene("drag", R"toml(
