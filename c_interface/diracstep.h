@@ -20,7 +20,7 @@ extern "C" {
 
 /* Raised when a struct here or in diracstep_scene.h, or what a function does, changes; not for new functions.
  */
-#define DIRACSTEP_VERSION_OF_C_INTERFACE 2u
+#define DIRACSTEP_VERSION_OF_C_INTERFACE 3u
 
 #if defined(_WIN32)
 #define DIRACSTEP_API __declspec(dllexport)
@@ -48,7 +48,7 @@ DIRACSTEP_API const char *diracstep_version(void);
 
 /* ---- Models: a scene, and the methods that are known with it ---- */
 
-/* A parameter or size of a scene, changed. */
+/* A parameter or size of a scene, changed; or the tolerance of a coordinate, absolute and in its unit. */
 typedef struct diracstep_parameter {
   const char *name;
   double value;
@@ -68,6 +68,9 @@ typedef struct diracstep_source {
   const char *const *plugin;            /* … and their paths */
   int linked;                           /* plugins that are in memory, see diracstep_plugin.h … */
   const struct diracstep_plugin *const *linked_plugin; /* … which stay as the callbacks do */
+  int tolerances; /* how many coordinates, far smaller than others, are solved in each step to a value of
+                   * their own, not to 1e-15 of the largest … */
+  const diracstep_parameter *tolerance; /* … and which */
 } diracstep_source;
 
 typedef struct diracstep_model diracstep_model;

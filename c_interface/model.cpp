@@ -33,12 +33,12 @@ void add_plugins(diracstep_model& model, const diracstep_source& source) {
     add_plugin(model, Plugin(&entry_at(source.linked_plugin, k, "linked plugin")));
 }
 
-Parameters parameters_of(const diracstep_source& source) {
-  Parameters changes;
-  if (source.parameters > 0) (void)given(source.parameter, "parameter");
-  for (int k = 0; k < source.parameters; ++k)
-    changes[&given(source.parameter[k].name, "the name of a parameter")] = source.parameter[k].value;
-  return changes;
+Parameters named_values(int count, const diracstep_parameter* list, const char* what) {
+  Parameters values;
+  if (count > 0) (void)given(list, what);
+  for (int k = 0; k < count; ++k)
+    values[&given(list[k].name, (std::string("the name of a ") + what).c_str())] = list[k].value;
+  return values;
 }
 
 /// What is known of a scene that no file describes.
@@ -79,7 +79,7 @@ CatalogueScene scene_by_name(const diracstep_model& model, const std::string& na
 }
 
 CatalogueScene scene_of(const diracstep_model& model, const diracstep_source& source) {
-  const Parameters changes = parameters_of(source);
+  const Parameters changes = named_values(source.parameters, source.parameter, "parameter");
   const char* const name = source.name;
   if (source.callbacks != nullptr) {
     if (name != nullptr || source.text != nullptr || !changes.empty())
@@ -111,6 +111,7 @@ int diracstep_open(unsigned version, const diracstep_source* source, diracstep_m
     if (has_scene(from)) {
       made->entry = scene_of(*made, from);
       if (from.drop_redundant != 0) drop_redundant_rows(made->entry);
+      set_tolerances(made->entry, named_values(from.tolerances, from.tolerance, "tolerance"));
       made->scene = completed(made->entry.scene);
     }
     *model = made.release();

@@ -5,7 +5,6 @@
 #include <diracstep/command/arguments.hpp>
 #include <diracstep/command/session.hpp>
 #include <diracstep/core/numerics/errors.hpp>
-#include <diracstep/core/numerics/near_names.hpp>
 
 namespace diracstep::command {
 
@@ -80,27 +79,10 @@ std::vector<std::string> scene_names(const Session& session) {
   return names;
 }
 
-namespace {
-
-void set_tolerances(CatalogueScene& entry, const Parameters& tolerances) {
-  auto scene = std::make_shared<Scene>(*entry.scene);
-  if (scene->tolerances.size() == 0) scene->tolerances.setZero(scene->dimension());
-  for (const auto& [name, tolerance] : tolerances) {
-    const auto found = std::ranges::find(scene->coordinates, name);
-    if (found == scene->coordinates.end())
-      throw Misuse(fmt::format("--tolerance: scene '{}' has no coordinate '{}'{}", scene->name, name,
-                               did_you_mean(name, scene->coordinates)));
-    scene->tolerances[found - scene->coordinates.begin()] = tolerance;
-  }
-  entry.scene = std::move(scene);
-}
-
-}  // namespace
-
 CatalogueScene make_scene(const Session& session, const std::string& name, const Parameters& changes) {
   CatalogueScene entry = made(session, name, changes);
   if (session.drop_redundant_rows) drop_redundant_rows(entry);
-  if (!session.tolerances.empty()) set_tolerances(entry, parameters(session.tolerances, "--tolerance"));
+  set_tolerances(entry, parameters(session.tolerances, "--tolerance"));
   for (const std::string& change : entry.changes) say(entry.scene->name + ": " + change);
   return entry;
 }

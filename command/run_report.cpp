@@ -115,8 +115,11 @@ std::string search_text(const ErrorControlReport& search) {
   std::string text = search_table(search);
   if (!search.division.empty()) text += search.division + '\n';
   if (search.ok())
-    text += fmt::format("estimated error {:.2e}, observed order {:.1f}, {} solves in all\n", search.estimate,
-                        search.observed_order, search.work.solves);
+    text += fmt::format("estimated error {:.2e}, {}, {} solves in all\n", search.estimate,
+                        std::isnan(search.observed_order)
+                            ? "that of round-off: the runs differ by no more, and show no order"
+                            : fmt::format("observed order {:.1f}", search.observed_order),
+                        search.work.solves);
   return text + (search.warning.empty() ? "" : "warning: " + search.warning + "\n") + "\n";
 }
 

@@ -78,6 +78,15 @@ void add_redundancy_option(CLI::App& verb, Session& session) {
                 "Leave out redundant constraints, and say which, instead of refusing the scene");
 }
 
+void add_tolerance_option(CLI::App& verb, Session& session) {
+  verb.add_option(
+          "--tolerance", session.tolerances,
+          "A coordinate that is far smaller than others is solved to this in each step, not to 1e-15\n"
+          "of the largest; may be repeated")
+      ->type_name("COORDINATE=VALUE")
+      ->allow_extra_args(false);
+}
+
 void say(std::string_view message) {
   const std::string line = "diracstep: " + shown_lines(message) + '\n';
   std::fwrite(line.data(), 1, line.size(), stderr);  // where nobody can be told, the work goes on

@@ -67,6 +67,7 @@ void add_set_option(CLI::App& verb, std::vector<std::string>& assignments);
 
 /// Adds --drop-redundant, which is kept in the session.
 void add_redundancy_option(CLI::App& verb, Session& session);
+void add_tolerance_option(CLI::App& verb, Session& session);
 
 /// Adds --solver and --jacobian, which change the session's solvers when the command line is read.
 void add_solver_options(CLI::App& verb, Session& session);

@@ -1,5 +1,8 @@
+#include <algorithm>
+#include <cmath>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/numerics/near_names.hpp>
+#include <diracstep/core/system/contradictory_rows.hpp>
 #include <diracstep/core/system/redundant_rows.hpp>
 #include <diracstep/scene_format/loader/shipped_scenes.hpp>
 #include <diracstep/scene_format/scene_catalogue.hpp>
@@ -18,10 +21,27 @@ void drop_redundant_rows(CatalogueScene& entry) {
   if (!scene->start.q.allFinite() || scene->start.q.size() != scene->dimension()) return;  // refused by runs
   const std::vector<std::string> dependent = redundant_rows(*scene, scene->start);
   if (dependent.empty() || row_dependence(*scene, scene->start, dependent) != RowDependence::lasting) return;
+  if (!contradiction(*scene, scene->start, dependent).empty()) return;  // refused by runs, with the reason
   entry.scene = without_rows(*entry.scene, dependent);
   std::string names;
   for (const std::string& name : dependent) names += (names.empty() ? "'" : ", '") + name + "'";
   entry.changes.push_back("redundant constraints left out: " + names);
+}
+
+void set_tolerances(CatalogueScene& entry, const Parameters& tolerances) {
+  if (tolerances.empty()) return;
+  auto scene = std::make_shared<Scene>(*entry.scene);
+  if (scene->tolerances.size() == 0) scene->tolerances.setZero(scene->dimension());
+  for (const auto& [name, tolerance] : tolerances) {
+    const auto found = std::ranges::find(scene->coordinates, name);
+    if (found == scene->coordinates.end())
+      throw Misuse("tolerance: scene '" + scene->name + "' has no coordinate '" + name + "'" +
+                   did_you_mean(name, scene->coordinates));
+    if (!(tolerance > 0.0 && tolerance < HUGE_VAL))
+      throw Misuse("tolerance: " + to_text(tolerance) + " for '" + name + "'; a number above 0 is needed");
+    scene->tolerances[found - scene->coordinates.begin()] = tolerance;
+  }
+  entry.scene = std::move(scene);
 }
 
 CatalogueScene make_scene(const std::string& name, const Parameters& changes) {

@@ -98,4 +98,8 @@ CatalogueScene make_scene(const std::string& name, const Parameters& changes = {
 /// Leaves out the redundant constraints (redundant_rows.hpp) and notes which.
 void drop_redundant_rows(CatalogueScene& entry);
 
+/// Sets Scene::tolerances of the coordinates named.  Throws Misuse for a name that is none, and for a value
+/// that is not above 0 and finite.
+void set_tolerances(CatalogueScene& entry, const Parameters& tolerances);
+
 }  // namespace diracstep

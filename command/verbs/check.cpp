@@ -189,6 +189,7 @@ void add_check(CLI::App& app, Session& session) {
       ->type_name("NAME=VALUE")
       ->allow_extra_args(false);
   add_redundancy_option(*verb, session);
+  add_tolerance_option(*verb, session);
   verb->add_flag("--json", options->json, "One JSON document on standard output");
   verb->footer(
       "Examples:\n"

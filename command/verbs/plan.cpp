@@ -8,6 +8,7 @@
 #include <diracstep/command/verbs.hpp>
 #include <diracstep/core/adaptive/rate_survey.hpp>
 #include <diracstep/core/integrator/integrator.hpp>
+#include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/reports/json.hpp>
 #include <diracstep/reports/report.hpp>
 #include <diracstep/scene_format/scene_catalogue.hpp>
@@ -22,7 +23,7 @@ struct PlanArguments {
   std::string scene;
   MethodChoice method;
   bool adaptive = false;
-  double eps = 0.2;
+  std::optional<double> eps;
   std::vector<std::string> set;
   bool json = false;
 };
@@ -80,6 +81,7 @@ std::string as_text(const Integrator& integrator, const std::vector<PlanLine>& l
 }
 
 void plan(const PlanArguments& options, Session& session) {
+  if (options.eps && !options.adaptive) throw Misuse("--eps needs --adaptive");
   const CatalogueScene entry = make_scene(session, options.scene, parameters(options.set));
   MethodChoice choice = options.method;
   std::optional<double> step;
@@ -90,13 +92,15 @@ void plan(const PlanArguments& options, Session& session) {
   std::vector<PlanLine> lines = integrator.plan();
   if (options.adaptive)
     lines = AdaptiveIntegrator(entry.scene, session.registry, session.solvers, used,
-                               {.eps = options.eps, .end = entry.t_end})
+                               {.eps = options.eps.value_or(0.2), .end = entry.t_end})
                 .plan();
   else
     add_direct_line(entry, session, used, lines);
   for (const std::string& change : entry.changes) lines.push_back({"scene", "changed", change});
   if (choice.name != options.method.name)
     lines.push_back({"method", choice.name, "the scene's file recommends it"});
+  if (choice.order != options.method.order)
+    lines.push_back({"order", std::to_string(choice.order), "the scene's file recommends it"});
   lines.push_back(
       variable_steps_line(entry.scene, session.solvers, entry.t_end, entry.natural_step, "--adaptive"));
   print(options.json ? as_json(integrator, lines) : as_text(integrator, lines));
@@ -111,8 +115,9 @@ void add_plan(CLI::App& app, Session& session) {
   verb->add_option("SCENE", options->scene, "A scene; see diracstep list scenes")->required();
   add_method_options(*verb, options->method);
   verb->add_flag("--adaptive", options->adaptive, "The plan of reversible steps of varying size");
-  verb->add_option("--eps", options->eps, "Radians of a step of varying size")->capture_default_str();
+  verb->add_option("--eps", options->eps, "With --adaptive: radians of a step of varying size (0.2 without)");
   add_redundancy_option(*verb, session);
+  add_tolerance_option(*verb, session);
   add_set_option(*verb, options->set);
   verb->add_flag("--json", options->json, "One JSON document on standard output");
   verb->footer("Example:  diracstep plan knife_edge --method type1/midpoint --order 4");

@@ -40,12 +40,12 @@ struct RunArguments {
   long checkpoint_every = 0;
   std::string resume;
   bool adaptive = false;
-  double eps = 0.2;
-  std::string control = "integrating";
+  std::optional<double> eps;
+  std::optional<std::string> control;
   std::string at;
   std::optional<double> error;
   bool fixed = false;
-  long max_solves = ErrorControlOptions::usual_max_solves;
+  std::optional<long> max_solves;
   std::optional<double> max_time;
   std::optional<long> max_steps;
   double smallest_step = 0.0;
@@ -54,6 +54,8 @@ struct RunArguments {
   bool json = false;
 };
 
+constexpr double usual_eps = 0.2;
+constexpr const char* usual_control = "integrating";
 constexpr double stated_to = 1e-6;  ///< relative, of an invariant's stated value
 
 StepGrid fitted_steps(const CatalogueScene& entry, double end, double step, const RunArguments& options) {
@@ -68,8 +70,8 @@ StepGrid fitted_steps(const CatalogueScene& entry, double end, double step, cons
 }
 
 void require_limits(const RunArguments& options) {
-  if (options.max_solves < 1)
-    throw Misuse(fmt::format("--max-solves = {}; 1 or more is needed", options.max_solves));
+  if (options.max_solves && *options.max_solves < 1)
+    throw Misuse(fmt::format("--max-solves = {}; 1 or more is needed", *options.max_solves));
   if (options.max_steps && *options.max_steps < 1)
     throw Misuse(fmt::format("--max-steps = {}; 1 or more is needed", *options.max_steps));
   if (options.max_steps && options.error)
@@ -83,12 +85,26 @@ void require_limits(const RunArguments& options) {
                              options.smallest_step));
 }
 
+/// An option that nothing would read is a mistake.
+void require_use(const RunArguments& options) {
+  const bool variable = options.adaptive && !options.error;
+  if (options.eps && !variable)
+    throw Misuse("--eps needs --adaptive without --error: it is the size of variable steps");
+  if (options.control && !options.adaptive && !options.error) throw Misuse("--control needs --adaptive");
+  if (options.control && options.fixed) throw Misuse("--control and --fixed exclude each other");
+  if (options.max_solves && !options.error)
+    throw Misuse("--max-solves needs --error: --max-steps limits other runs");
+  if (options.fixed && !options.error)
+    throw Misuse("--fixed needs --error: without it steps are of fixed size unless --adaptive is given");
+}
+
 void require_sense(const RunArguments& options) {
   const bool checkpoints = !options.checkpoint.empty() || !options.resume.empty();
   if (options.every < 1) throw Misuse(fmt::format("--every = {}; 1 or more is needed", options.every));
   if (!options.at.empty() && !options.adaptive) throw Misuse("--at needs --adaptive");
   if (options.fixed && options.adaptive) throw Misuse("--fixed and --adaptive exclude each other");
   require_limits(options);
+  require_use(options);
   if (options.out == standard_output && (options.json || checkpoints))
     throw Misuse("--out - gives standard output to the points: --json, --checkpoint and --resume exclude it");
   if (options.doubt != "report" && options.doubt != "ignore")
@@ -205,8 +221,8 @@ IntegratorOptions run_once(const RunArguments& options, const CatalogueScene& en
   if (options.adaptive) {
     chosen.step = std::copysign(chosen.step, end - entry.scene->start.time);
     AdaptiveIntegrator integrator(entry.scene, session.registry, session.solvers, chosen,
-                                  {.eps = options.eps,
-                                   .control = step_control(options.control),
+                                  {.eps = options.eps.value_or(usual_eps),
+                                   .control = step_control(options.control.value_or(usual_control)),
                                    .end = end,
                                    .smallest_step = options.smallest_step,
                                    .max_steps = options.max_steps.value_or(AdaptiveOptions{}.max_steps)});
@@ -234,13 +250,13 @@ ErrorControlReport search(const RunArguments& options, const CatalogueScene& ent
   wanted.method = options.method.name;
   wanted.order = options.method.order;
   if (options.adaptive || options.fixed) wanted.adaptive = options.adaptive;
-  wanted.control = step_control(options.control);
+  wanted.control = step_control(options.control.value_or(usual_control));
   if (options.step)
     wanted.first_step = std::abs(*options.step);
   else if (!has_accelerations(*completed(entry.scene)))
     wanted.first_step = std::abs(entry.natural_step);
   wanted.integrator = chosen;
-  wanted.max_solves = options.max_solves;
+  wanted.max_solves = options.max_solves.value_or(wanted.max_solves);
   wanted.max_time = options.max_time.value_or(wanted.max_time);
   wanted.go_on = [] { return !interrupted(); };
   return solve_to_error(entry.scene, session.registry, session.solvers, end, wanted);
@@ -383,10 +399,9 @@ void add_run(CLI::App& app, Session& session) {
                    "with --error the whole search, which then shows its best answer (30 without)")
       ->type_name("S");
   verb->add_flag("--adaptive", options->adaptive, "Reversible steps of varying size");
-  verb->add_option("--eps", options->eps, "Radians of a step of varying size")->capture_default_str();
+  verb->add_option("--eps", options->eps, "With --adaptive: radians of a step of varying size (0.2 without)");
   verb->add_option("--control", options->control,
-                   "How its size is found: integrating, in-step, or irreversible (for comparison)")
-      ->capture_default_str();
+                   "How its size is found: integrating (without), in-step, or irreversible (for comparison)");
   verb->add_option("--at", options->at, "Times T1,T2,… to show instead of the steps; needs --adaptive");
   verb->add_option(
           "--error", options->error,
@@ -398,9 +413,8 @@ void add_run(CLI::App& app, Session& session) {
                  "With --error: steps of fixed size, also where variable ones are cheaper");
   verb->add_option("--max-solves", options->max_solves,
                    "With --error: nonlinear systems, of each kind of steps tried; the best answer so far is "
-                   "then shown")
-      ->type_name("N")
-      ->capture_default_str();
+                   "then shown (1000000 without)")
+      ->type_name("N");
   verb->add_option("--smallest-step", options->smallest_step,
                    "With --adaptive: steps do not become smaller; 0: 1e-9 of the motion")
       ->type_name("H")
@@ -410,12 +424,7 @@ void add_run(CLI::App& app, Session& session) {
       ->type_name("WHAT")
       ->capture_default_str();
   add_set_option(*verb, options->set);
-  verb->add_option(
-          "--tolerance", session.tolerances,
-          "A coordinate that is far smaller than others is solved to this in each step, not to 1e-15\n"
-          "of the largest; may be repeated")
-      ->type_name("COORDINATE=VALUE")
-      ->allow_extra_args(false);
+  add_tolerance_option(*verb, session);
   verb->add_flag("--json", options->json, "One JSON document on standard output");
   verb->footer(
       "Examples:\n"

@@ -472,6 +472,7 @@ void add_study(CLI::App& app, Session& session) {
   verb->add_option("--table", options->table, "Markdown file: CPU time of each method at the compared errors")
       ->type_name("FILE");
   add_redundancy_option(*verb, session);
+  add_tolerance_option(*verb, session);
   add_set_option(*verb, options->set);
   verb->add_flag("--json", options->json, "One JSON document on standard output");
   verb->footer(

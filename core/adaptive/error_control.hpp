@@ -60,10 +60,11 @@ struct ErrorControlReport {
   bool compensated_sums = false;
   Sample end;  ///< of the accepted run, or of the last good one; p projected
   /// Of the error of `end`: relative maximum norm, the larger of those of q and p, absolute where a column is
-  /// zero.
+  /// zero.  Never below the round-off of the run, 2.2e-16 √steps: runs that agree to the bit prove no more.
   double estimate = std::numeric_limits<double>::quiet_NaN();
-  double observed_order = std::numeric_limits<double>::quiet_NaN();
-  Work work;  ///< of all runs, output included
+  double observed_order = std::numeric_limits<double>::quiet_NaN();  ///< NaN where the runs differ by
+                                                                     ///< round-off alone
+  Work work;                                                         ///< of all runs, output included
   std::vector<ErrorControlRun> runs;
 
   /// What repeats the run that `end` is of: see run_again().

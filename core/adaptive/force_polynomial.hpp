@@ -1,30 +1,11 @@
 #pragma once
 
+#include <diracstep/core/runs/path_cubic.hpp>
 #include <diracstep/core/system/constraint_distribution.hpp>
 #include <diracstep/core/system/scene.hpp>
 #include <vector>
 
 namespace diracstep {
-
-/// A point of a run: what it steps over is looked for between such points.
-struct PathPoint {
-  double time;
-  Vector q, v;
-};
-
-/// The cubic with the positions and velocities of two points.
-struct PathCubic {
-  const PathPoint &from, &to;
-
-  double begin() const { return from.time; }
-  double end() const { return to.time; }
-  void at(double t, Vector& q, Vector& v) const {
-    const double h = end() - begin(), s = (t - begin()) / h, r = 1.0 - s;
-    q = (1.0 + 2.0 * s) * r * r * from.q + s * r * r * h * from.v + s * s * (1.0 + 2.0 * r) * to.q -
-        s * s * r * h * to.v;
-    v = 6.0 * s * r / h * (to.q - from.q) + r * (1.0 - 3.0 * s) * from.v + s * (3.0 * s - 2.0) * to.v;
-  }
-};
 
 /// F = (∂L/∂q + f, ∂L/∂v, A v + b) along a run, and the polynomial through its values at 12 Chebyshev points
 /// of a part of the run.

@@ -8,61 +8,20 @@ namespace {
 
 constexpr long points_of_smooth = 2'000, all_points = 20'000, fewest_points = 2'000;
 constexpr long most_parts = 3'000, most_readings = 2'000'000;  // the latter of a small scene
+constexpr int looks_for_kinks = 16;                            // in a step
 constexpr double widest_gap = 32.0;                            // in closest times, at a jump
 
 }  // namespace
 
 ForceSurvey::ForceSurvey(const Scene& scene, double error)
-    : kinks_(scene.kinks), size_(scene.dimension() + scene.rows()), force_(scene, error) {
-  if (kinks_) switches_ = before_ = Vector::Zero(kinks_->count());
-}
-
-/// Where a switching function whose sign at `a` is given has changed its sign in (a, b].
-double ForceSurvey::crossing(const PathCubic& path, double a, double b, int number, bool sign) {
-  while (std::abs(b - a) > 0.25 * force_.closest(b)) {
-    const double t = 0.5 * (a + b);
-    if (t == a || t == b) break;
-    path.at(t, q_, v_);
-    kinks_->evaluate(t, q_, v_, switches_);
-    (std::signbit(switches_[number]) == sign ? a : b) = t;
-  }
-  return b;
-}
-
-void ForceSurvey::crossings(const PathCubic& path, double a, double b, std::vector<double>& times) {
-  constexpr int looks = 16;
-  const auto at = [&](double t) {
-    path.at(t, q_, v_);
-    kinks_->evaluate(t, q_, v_, switches_);
-  };
-  at(a);
-  before_ = switches_;
-  double last = a;
-  for (int k = 1; k <= looks; ++k) {
-    const double t = k == looks ? b : a + k * (b - a) / looks;
-    at(t);
-    const Vector now = switches_;
-    for (int j = 0; j < kinks_->count(); ++j)
-      if (std::signbit(now[j]) != std::signbit(before_[j]))
-        times.push_back(crossing(path, last, t, j, std::signbit(before_[j])));
-    before_ = now;
-    last = t;
-  }
-}
+    : kinks_(scene.kinks), size_(scene.dimension() + scene.rows()), force_(scene, error) {}
 
 /// Times in (a, b) where the scene's formulas show that F may change fast, in the order of the motion.
 std::vector<double> ForceSurvey::known_times(const PathCubic& path, double a, double b) {
   std::vector<double> times;
-  if (!kinks_) return times;
-  if (kinks_->count() > 0) crossings(path, a, b, times);
-  for (const auto& [time, width] : instants_)
-    for (const double off : {0.0, -6.0, 6.0, -1.0, 1.0})
-      if (off == 0.0 || width < std::abs(b - a)) times.push_back(time + off * width);
-  std::erase_if(times, [&](double t) { return !((t - a) * (b - t) > 0.0); });
-  std::ranges::sort(times);
-  if (b < a) std::ranges::reverse(times);
-  const auto same = [this](double s, double t) { return std::abs(t - s) <= force_.closest(t); };
-  times.erase(std::unique(times.begin(), times.end(), same), times.end());
+  for (const KinkCrossing& crossing :
+       crossings_->along(path, a, b, looks_for_kinks, 0.25 * force_.closest(b)))
+    times.push_back(crossing.time);
   return times;
 }
 
@@ -117,19 +76,20 @@ void ForceSurvey::divide(const PathCubic& path, double a, double b, const std::v
   }
 }
 
-/// Adds what the polynomial of (a, b) misses of F in its parts: the difference in the middle of each times
-/// its length.
+/// Adds what the polynomial of (a, b) misses of F in its parts: the integral of the difference in each.
 void ForceSurvey::count_missed(const PathCubic& path, double a, double b, std::size_t first,
                                ForceSurveyReport& report) {
   force_.fit(path, a, b, 0, {});
   double missed = 0.0, most = 0.0, time = a;
   for (std::size_t k = first; k < report.stretches.size(); ++k) {
-    const double from = report.stretches[k].begin, to = report.stretches[k].end, t = 0.5 * (from + to);
-    const double here = force_.miss(path, t) * std::abs(to - from);
+    const double from = report.stretches[k].begin, to = report.stretches[k].end;
+    double here = 0.0;
+    for (const GaussPoint& point : gauss_points)
+      here += point.weight * force_.miss(path, from + point.place * (to - from)) * std::abs(to - from);
     missed += here;
     if (here > most) {
       most = here;
-      time = t;
+      time = 0.5 * (from + to);
     }
   }
   if (!report.followed) missed = HUGE_VAL;
@@ -165,7 +125,7 @@ ForceSurveyReport ForceSurvey::along(const std::vector<PathPoint>& path, long pa
   parts_ = 0;
   most_missed_ = 0.0;
   whole_ = false;
-  if (kinks_) instants_ = kinks_->instants(std::min(start, end), std::max(start, end));
+  crossings_.emplace(kinks_, start, end);
   force_.find_scales(path);
   double gap = 0.0;  // at the beginning of the next step
   for (std::size_t k = 0; k + 1 < path.size() && report.followed; ++k) {

@@ -2,7 +2,9 @@
 
 #include <diracstep/core/adaptive/force_polynomial.hpp>
 #include <diracstep/core/adaptive/step_plan.hpp>
+#include <diracstep/core/runs/kink_crossings.hpp>
 #include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -42,8 +44,6 @@ class ForceSurvey {
 
  private:
   std::vector<double> known_times(const PathCubic& path, double a, double b);
-  void crossings(const PathCubic& path, double a, double b, std::vector<double>& times);
-  double crossing(const PathCubic& path, double a, double b, int number, bool sign);
   void examine(const PathCubic& path, double a, double b, ForceSurveyReport& report);
   void divide(const PathCubic& path, double a, double b, const std::vector<double>& known,
               ForceSurveyReport& report);
@@ -53,8 +53,7 @@ class ForceSurvey {
   std::shared_ptr<const Kinks> kinks_;
   long size_;
   ForcePolynomial force_;
-  std::vector<Kinks::Instant> instants_;
-  Vector q_, v_, switches_, before_;
+  std::optional<KinkCrossings> crossings_;  ///< of the run at hand
   double most_missed_ = 0.0;
   long points_ = 0, parts_ = 0;
   bool whole_ = false;  ///< the last stretch consists of undivided steps

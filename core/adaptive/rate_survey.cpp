@@ -17,12 +17,23 @@ constexpr double largest_power = 20.0;  // of the time, by which ω is taken to 
 constexpr long longer_survey = 8;       // times the steps, once, where ω falls so
 constexpr double most_of_fixed = 20.0;  // times the fixed steps that variable ones may take
 constexpr long most_steps = 5000;       // of a survey that is made longer
+constexpr double no_typical = -1.0;     // in place of ω0
 
 /// The motion over one step of the survey: mean squares of v and a, and of ȧ from their difference.
 struct SurveyStep {
   double duration, v2, a2, jerk2;
 
+  /// Without a typical rate ω0: |ȧ|/|a|, and where the acceleration passes through zero, as that of a
+  /// pendulum at its lowest point, sqrt(|ȧ|/|v|).
+  double rate_alone() const {
+    const double by_a = a2 > 0.0 ? std::sqrt(jerk2 / a2) : HUGE_VAL;
+    const double by_v = v2 > 0.0 ? std::pow(jerk2 / v2, 0.25) : HUGE_VAL;
+    const double least = std::min(by_a, by_v);
+    return least < HUGE_VAL ? least : 0.0;
+  }
+
   double rate(double typical) const {
+    if (typical == no_typical) return rate_alone();
     const double w2 = typical * typical, below = w2 * v2 + a2;
     return below > 0.0 ? std::sqrt((w2 * a2 + jerk2) / below) : 0.0;
   }
@@ -157,8 +168,14 @@ RateSurvey survey_rate(const Scene& scene, const SolverFactory& solvers, double 
   // ω0 is not known beforehand; a first pass by |ȧ|/|a| alone, with ω0 = 0, finds it.
   SurveyRun first(motion, scene, end, 0.0);
   survey.failure = first.go(max_steps / 2);
-  const double typical =
-      median(first.stretches, [](const SurveyStep& s) { return s.v2 > 0.0 ? std::sqrt(s.a2 / s.v2) : 0.0; });
+  const auto a_over_v = [](const SurveyStep& s) { return s.v2 > 0.0 ? std::sqrt(s.a2 / s.v2) : 0.0; };
+  double typical = median(first.stretches, a_over_v);
+  if (first.covered <
+      short_part * span) {  // an acceleration of zero at the start: |ȧ|/|a| has no bound there
+    SurveyRun other(motion, scene, end, no_typical);
+    if (other.go(max_steps / 2).empty() && other.covered > first.covered)
+      typical = median(other.stretches, a_over_v);
+  }
   SurveyRun second(motion, scene, end, typical);
   survey.failure = second.go(max_steps - max_steps / 2);
   if (longer_survey * max_steps <= most_steps && survey.failure.empty() &&

@@ -3,7 +3,8 @@
 #include <diracstep/core/adaptive/refinement_search.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/numerics/scales.hpp>
-#include <diracstep/core/runs/node_check.hpp>
+#include <diracstep/core/runs/run_checks.hpp>
+#include <limits>
 #include <utility>
 
 namespace diracstep::detail {
@@ -17,14 +18,24 @@ constexpr long fewest_steps = 4;              // of a run with variable steps th
 constexpr double missed_allowed = 0.1;        // by the forces surveyed, in parts of the error asked for
 constexpr double error_out_of_reach = 1e-15;  // differences of runs hold nothing but round-off below it
 constexpr long nodes_between_looks = 64;
+constexpr long energies_read = 100;  // of a run
 
 constexpr double no_size = 1e-14;  // of the largest on the way: an end that comes back to zero
 
-/// In parts of b; of the largest on the way where nothing is left of b.
+/// What errors of a column at the end are parts of: of the largest on the way where nothing is left of it.
+double size_at_end(const Vector& column, double largest) {
+  const double size = max_norm(column);
+  return size > no_size * largest ? size : largest;
+}
+
+/// What rounding adds up to in a run: no error is known to be smaller.
+double round_off_of(long steps) {
+  return std::numeric_limits<double>::epsilon() * std::sqrt(static_cast<double>(std::max(1L, steps)));
+}
+
 double relative_change(const Vector& a, const Vector& b, double largest) {
-  const double size = max_norm(b), change = max_norm(a - b);
-  if (change == 0.0) return 0.0;
-  return change / (size > no_size * largest ? size : largest);
+  const double change = max_norm(a - b);
+  return change == 0.0 ? 0.0 : change / size_at_end(b, largest);
 }
 
 std::string text(double value) { return to_text(value, 3); }
@@ -126,11 +137,15 @@ RefinementSearch::Outcome RefinementSearch::run(long refinement) {
   Work work;
   long nodes = 0;
   SolveReport read_end;
-  NodeCheck rest(*motion_.scene, 0, true);
+  NodeCheck windows(*motion_.scene, 0);
+  EnergyCheck energy(*motion_.scene);
+  const long between_energies = std::max(1L, plan_.steps() * refinement / energies_read);
   Sample node;
   const auto at_node = [&](const ReadNode& read, bool last) {
-    if (!last && rest.wants(nodes) && read(Momentum::projected, node).ok()) {
-      rest.see(nodes, node);
+    const bool wanted = windows.wants(nodes);
+    if (!last && (wanted || nodes % between_energies == 0) && read(Momentum::projected, node).ok()) {
+      if (wanted) windows.see(nodes, node);
+      energy.see(node);
       largest_position_ = std::max(largest_position_, max_norm(node.q));
       largest_momentum_ = std::max(largest_momentum_, max_norm(node.p));
     }
@@ -157,13 +172,16 @@ RefinementSearch::Outcome RefinementSearch::run(long refinement) {
     return Outcome::does_not_count;
   }
   last_steps_ = work.steps;
-  frozen_ = rest.text();
+  energy.see(end);
+  doubt_ = joined_doubts({energy.denied(end, motion_.options.error, size_at_end(end.q, largest_position_),
+                                        size_at_end(end.p, largest_momentum_)),
+                          energy.text(), windows.text()});
   if (first) first_good_ = refinement;
   if (!first)
     now.difference = std::max(relative_change(end.q, report_.end.q, largest_position_),
                               relative_change(end.p, report_.end.p, largest_momentum_));
   convergence_.add(now.step, now.difference);
-  now.estimate = convergence_.estimate();
+  now.estimate = std::max(convergence_.estimate(), round_off_of(work.steps));
   now.observed_order = convergence_.observed_order();
   report_.end = std::move(end);
   report_.step = report_.adaptive ? now.step : plan_.mean_step(refinement);
@@ -280,9 +298,9 @@ void RefinementSearch::divide(const ForceSurveyReport& found) {
 
 void RefinementSearch::accept() {
   accepted_ = true;
-  if (!frozen_.empty()) report_.warning = frozen_;
-  report_.estimate = convergence_.estimate();
-  report_.observed_order = convergence_.observed_order();
+  report_.warning = doubt_;
+  // Orders of differences that are round-off say nothing.
+  if (convergence_.difference() <= round_off_of(last_steps_)) report_.observed_order = std::nan("");
 }
 
 /// Ends the search, for which false stands.

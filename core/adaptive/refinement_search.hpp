@@ -57,8 +57,8 @@ class RefinementSearch {
   double largest_position_ = 0.0, largest_momentum_ = 0.0;  ///< at the nodes read
   int failures_ = 0, divisions_ = 0;
   bool surveyed_ = false, ended_ = false, accepted_ = false;
-  std::string fast_;    ///< empty, or where the forces change fast
-  std::string frozen_;  ///< empty, or what does not move while a force acts on it
+  std::string fast_;   ///< empty, or where the forces change fast
+  std::string doubt_;  ///< empty, or what the checks of a run say of the last one
 };
 
 }  // namespace diracstep::detail

@@ -23,6 +23,7 @@ bool VariableRunChecks::divide(double size) {
 }
 
 void VariableRunChecks::after_step() {
+  kinks_.after(integrator_.integrator());
   if (!looking_) return;
   next_look_ += std::min(most_steps_for_a_look, std::max(steps_for_a_look, next_look_));
   if (!integrator_.sample(Momentum::projected, whole_).ok()) return;
@@ -32,8 +33,8 @@ void VariableRunChecks::after_step() {
 
 std::string VariableRunChecks::text() const {
   const Scene& scene = integrator_.integrator().scene();
-  return joined_doubts(
-      {energy_.text(), comparison_.text(), nodes_.text(), scene.doubt ? scene.doubt() : std::string()});
+  return joined_doubts({energy_.text(), comparison_.text(), nodes_.text(), kinks_.text(),
+                        scene.doubt ? scene.doubt() : std::string()});
 }
 
 }  // namespace diracstep

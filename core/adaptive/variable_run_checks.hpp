@@ -2,6 +2,7 @@
 
 #include <diracstep/core/adaptive/adaptive_integrator.hpp>
 #include <diracstep/core/runs/energy_check.hpp>
+#include <diracstep/core/runs/kink_check.hpp>
 #include <diracstep/core/runs/node_check.hpp>
 #include <diracstep/core/runs/run_checks.hpp>
 #include <diracstep/core/runs/step_comparison.hpp>
@@ -18,7 +19,11 @@ class VariableRunChecks {
       : integrator_(integrator),
         side_(std::move(side)),
         energy_(integrator.integrator().scene()),
-        nodes_(integrator.integrator().scene(), 0) {}
+        nodes_(integrator.integrator().scene(), 0),
+        comparison_(integrator.integrator().scene()),
+        kinks_(integrator.integrator(),
+               integrator.adaptive().end.value_or(integrator.time() +
+                                                  100.0 * integrator.integrator().options().step)) {}
 
   void before_step();
   void after_step();
@@ -35,6 +40,7 @@ class VariableRunChecks {
   EnergyCheck energy_;
   NodeCheck nodes_;
   StepComparison comparison_;
+  KinkCheck kinks_;
   long next_look_ = 1;
   bool looking_ = false;
   Sample node_, start_, whole_, parts_;

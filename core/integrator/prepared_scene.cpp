@@ -2,6 +2,7 @@
 #include <diracstep/core/integrator/prepared_scene.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/system/consistent_start.hpp>
+#include <diracstep/core/system/contradictory_rows.hpp>
 #include <diracstep/core/system/hidden_rows.hpp>
 #include <diracstep/core/system/redundant_rows.hpp>
 #include <span>
@@ -32,6 +33,34 @@ void require_start(const Scene& scene) {
   }
 }
 
+/// So close to depending on each other, rows have forces that no double can tell from each other's.
+constexpr double nearly_dependent = 3e-8;
+
+/// The rows that can be left out, where they may be; throws Misuse for others that depend on each other.
+std::vector<std::string> dependent_rows(const Scene& scene, bool may_be_left_out) {
+  if (scene.rows() == 0 || !scene.start.q.allFinite()) return {};
+  const std::vector<std::string> nearly = redundant_rows(scene, scene.start, nearly_dependent);
+  if (nearly.empty()) return {};
+  const std::string of_scene = "scene '" + scene.name + "': ";
+  const std::vector<std::string> dependent = redundant_rows(scene, scene.start);
+  if (dependent.empty())
+    throw Misuse(
+        of_scene + "rows that nearly depend on others at the start, to within 3e-8 of their size: " +
+        joined(nearly) + " beside " + joined(combined_rows(scene, scene.start, nearly.front(), nearly)) +
+        "; their forces cannot be told apart: write rows that differ by more, such as the difference "
+        "of two divided by what is small in it");
+  if (const std::string against = contradiction(scene, scene.start, dependent); !against.empty())
+    throw Misuse(of_scene + "contradictory constraints: " + against);
+  const std::string redundant = of_scene + "redundant constraints at the start: " + joined(dependent) + "; ";
+  const std::string kept_for = why_not_left_out(row_dependence(scene, scene.start, dependent));
+  if (!kept_for.empty()) throw Misuse(redundant + kept_for);
+  if (!may_be_left_out)
+    throw Misuse(redundant +
+                 "remove them, or drop them: --drop-redundant, redundant = \"drop\" in a scene file, or "
+                 "IntegratorOptions::drop_redundant_rows");
+  return dependent;
+}
+
 }  // namespace
 
 PreparedScene prepared(std::shared_ptr<const Scene> given, const IntegratorOptions& options,
@@ -39,21 +68,10 @@ PreparedScene prepared(std::shared_ptr<const Scene> given, const IntegratorOptio
   PreparedScene result{completed(std::move(given)), {}};
   auto& scene = result.scene;
   require_size("scene '" + scene->name + "': the start q", scene->start.q.size(), scene->storage_size());
-  if (scene->rows() > 0 && scene->start.q.allFinite()) {
-    const std::vector<std::string> dependent = redundant_rows(*scene, scene->start);
-    const std::string kept_for =
-        dependent.empty() ? "" : why_not_left_out(row_dependence(*scene, scene->start, dependent));
-    if (!kept_for.empty())
-      throw Misuse("scene '" + scene->name + "': redundant constraints at the start: " + joined(dependent) +
-                   "; " + kept_for);
-    if (!dependent.empty() && !options.drop_redundant_rows)
-      throw Misuse("scene '" + scene->name + "': redundant constraints at the start: " + joined(dependent) +
-                   "; remove them, or drop them: --drop-redundant, redundant = \"drop\" in a scene file, or "
-                   "IntegratorOptions::drop_redundant_rows");
-    if (!dependent.empty()) {
-      scene = without_rows(*scene, dependent);
-      result.lines.push_back({"dropped rows", joined(dependent), "redundant constraints at the start"});
-    }
+  if (const std::vector<std::string> dropped = dependent_rows(*scene, options.drop_redundant_rows);
+      !dropped.empty()) {
+    scene = without_rows(*scene, dropped);
+    result.lines.push_back({"dropped rows", joined(dropped), "redundant constraints at the start"});
   }
   const int own_rows = scene->rows();
   scene = with_hidden_rows(scene);

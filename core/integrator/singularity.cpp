@@ -55,7 +55,9 @@ std::string describe_singularity(NonlinearProblem& problem, ConstVectorRef x, co
   if (problem.size() == 0 || problem.size() > largest_full_matrix || !x.allFinite()) return {};
   Vector values(problem.pattern().nonzeros());
   problem.jacobian(x, values);
-  if (!values.allFinite()) return "; the Jacobian is not finite there";
+  if (!values.allFinite())
+    return "; the Jacobian is not finite there: a formula or its derivative leaves the range of numbers, as "
+           "exp(u) does above u = 709, where tanh(u) and atan(u) do not";
   Eigen::FullPivLU<Columns> lu;
   lu.setThreshold(singular);
   lu.compute(balanced(problem.pattern().full(values)).transpose());

@@ -30,7 +30,7 @@ struct Order {
 };
 
 Order order_of(const MethodRequest& request, int size) {
-  if (request.order > 0) return {request.order, "the order asked for"};
+  if (request.order > 0) return {request.order, "the order given"};
   if (request.error > 0.0)
     return {order_for(request.error, size),
             "for an error of " + to_text(request.error, 3) + " with " + std::to_string(size) + " unknowns"};

@@ -21,6 +21,7 @@ bool keeps_energy(const Scene& scene) {
 EnergyCheck::EnergyCheck(const Scene& scene)
     : scene_(scene),
       keeps_energy_(keeps_energy(scene)),
+      rest_(scene),
       force_(Vector::Zero(scene.dimension())),
       momentum_(force_) {}
 
@@ -29,7 +30,11 @@ void EnergyCheck::see(const Sample& point) {
   if (start_position_.size() == 0) {
     start_energy_ = point.energy;
     start_position_ = point.q;
+    rest_.see(point.time, point.q, point.v);
+    last_time_ = point.time;
   }
+  longest_time_ = std::max(longest_time_, std::abs(point.time - last_time_));
+  last_time_ = point.time;
   const double way = max_norm(point.q - start_position_);
   // At rest what moves is round-off, and so are the energies at play.
   if (std::isfinite(point.energy) && way <= at_rest * max_norm(start_position_)) return;
@@ -57,7 +62,23 @@ void EnergyCheck::add_at_play(const Sample& point) {
 }
 
 bool EnergyCheck::too_large(double at_play) const {
-  return worst_change_ > std::max(doubted * at_play, at_rest * std::abs(start_energy_));
+  const double rounding = at_rest * std::max(std::abs(start_energy_), rest_.energy(longest_time_));
+  return worst_change_ > std::max(doubted * at_play, rounding);
+}
+
+std::string EnergyCheck::denied(const Sample& point, double error, double position_size,
+                                double momentum_size) {
+  if (!keeps_energy_ || start_position_.size() == 0) return {};
+  scene_.lagrangian->gradient(point.time, point.q, point.v, force_, momentum_);
+  const double terms = momentum_size * point.v.cwiseAbs().sum() + position_size * force_.cwiseAbs().sum();
+  const double rounding = at_rest * std::max({std::abs(start_energy_), std::abs(point.energy), terms});
+  const double change = std::abs(point.energy - start_energy_);
+  if (!(change > 2.0 * error * terms + rounding)) return {};
+  std::ostringstream text;
+  text << "the energy, which this scene keeps, went from " << start_energy_ << " to " << point.energy
+       << ", by " << change << ": an error of " << error << " allows " << error * terms
+       << ", so that the runs agree on a wrong motion; forces may change fast where it goes";
+  return text.str();
 }
 
 std::string EnergyCheck::text() const {

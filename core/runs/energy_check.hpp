@@ -1,6 +1,7 @@
 #pragma once
 
 #include <diracstep/core/integrator/integrator.hpp>
+#include <diracstep/core/runs/rest_sizes.hpp>
 #include <string>
 
 namespace diracstep {
@@ -20,8 +21,10 @@ bool keeps_energy(const Scene& scene);
 /// end, from the 32nd point on; where fewer were seen, by the largest of all.  Methods of order 1 are off by
 /// 1/k of the kinetic energy k steps after a start from rest.
 ///
-/// Points that have not moved from the start are not looked at.  No method here changes the energy so much at
-/// a step that resolves the motion.  Silence proves nothing: an energy can be kept on a wrong path.
+/// Points that have not moved from the start are not looked at, and changes by the round-off of the energy,
+/// or of what forces in balance would do between two points seen (RestSizes), are none.  No method here
+/// changes the energy so much at a step that resolves the motion.  Silence proves nothing: an energy can be
+/// kept on a wrong path.
 class EnergyCheck {
  public:
   /// The scene, one with a Lagrangian, must outlive this.
@@ -32,6 +35,14 @@ class EnergyCheck {
   /// Empty, or a line that names the worst point so far.
   std::string text() const;
 
+  /// Empty, or a line that says that a point cannot have so small an error: relative errors e of q and p,
+  /// in parts of the sizes Q and P, change the energy by no more than
+  ///
+  ///   e (P Σ |v_i| + Q Σ |∂L/∂q_i|)
+  ///
+  /// to first order; doubted above twice that and the round-off of the energy.
+  std::string denied(const Sample& point, double error, double position_size, double momentum_size);
+
  private:
   void add_at_play(const Sample& point);
   /// Beside such energies at play; a change by the round-off of the energy itself is none.
@@ -40,9 +51,10 @@ class EnergyCheck {
 
   const Scene& scene_;
   bool keeps_energy_;
+  RestSizes rest_;
   Vector force_, momentum_;
   Vector start_position_;  ///< empty before the first point
-  double start_energy_ = 0.0;
+  double start_energy_ = 0.0, last_time_ = 0.0, longest_time_ = 0.0;
   double at_play_ = 0.0;  ///< the largest so far
   double sum_at_play_ = 0.0;
   long points_ = 0;

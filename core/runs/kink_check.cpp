@@ -2,70 +2,97 @@
 #include <cmath>
 #include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/core/runs/kink_check.hpp>
+#include <limits>
 #include <sstream>
 
 namespace diracstep {
 
 namespace {
 
-constexpr double part_of_jump = 0.1;  // of h J, that the momentum of a step over a jump is off by
-constexpr double too_much = 0.01;     // of the largest momentum
+constexpr double part_unknown = 0.25;  // of the impulse that a step cannot know, by which it ends off
+constexpr double too_much = 0.005, too_much_at_instants = 0.0005;  // of the largest momentum
+constexpr int looks_in_a_step = 2;
+constexpr double finest_cut = 1e-12;  // in parts of a step
 
 }  // namespace
 
-KinkCheck::KinkCheck(const Integrator& integrator)
-    : scene_(integrator.scene()), kinks_(scene_.kinks && scene_.kinks->count() > 0 ? scene_.kinks : nullptr) {
+KinkCheck::KinkCheck(const Integrator& integrator, double end)
+    : scene_(integrator.scene()), kinks_(scene_.kinks), crossings_(kinks_, integrator.time(), end) {
+  if (crossings_.none()) kinks_ = nullptr;
   if (!kinks_) return;
-  switches_.setZero(kinks_->count());
-  for (Vector* column : {&force_, &momentum_, &own_}) column->setZero(scene_.dimension());
-  read(integrator);
+  for (Vector* column : {&force_, &between_, &momentum_, &own_}) column->setZero(scene_.dimension());
+  read(integrator, to_);
+  force_at(to_.time, to_.q, to_.v, force_);
 }
 
-void KinkCheck::read(const Integrator& integrator) {
-  const double t = integrator.time();
-  const Vector &q = integrator.position(), &v = integrator.velocity_estimate();
-  kinks_->evaluate(t, q, v, switches_);
-  scene_.lagrangian->gradient(t, q, v, force_, momentum_);
+void KinkCheck::read(const Integrator& integrator, PathPoint& point) const {
+  point.time = integrator.time();
+  point.q = integrator.position();
+  point.v = integrator.velocity_estimate();
+}
+
+void KinkCheck::force_at(double t, const Vector& q, const Vector& v, Vector& force) {
+  scene_.lagrangian->gradient(t, q, v, force, momentum_);
   if (!scene_.force) return;
   scene_.force->value(t, q, v, own_);
-  force_ += own_;
+  force += own_;
 }
 
-int KinkCheck::crossed() const {
-  for (int k = 0; k < kinks_->count(); ++k)
-    if (kinks_->kinds()[static_cast<std::size_t>(k)] == Kinks::Kind::kink &&
-        switches_[k] * switches_before_[k] < 0.0)
-      return k;
-  return -1;
+double KinkCheck::missed(const std::vector<KinkCrossing>& cuts, const PathCubic& path) {
+  const double h = path.end() - path.begin();
+  double sum = 0.0, begin = path.begin();
+  for (std::size_t k = 0; k <= cuts.size(); ++k) {
+    const double end = k < cuts.size() ? cuts[k].time : path.end();
+    double beside = 0.0;
+    for (const auto& [place, weight] : gauss_points) {
+      const double t = begin + place * (end - begin), s = (t - path.begin()) / h;
+      path.at(t, q_, v_);
+      force_at(t, q_, v_, between_);
+      between_ -= (1.0 - s) * force_before_ + s * force_;
+      beside += weight * max_norm(between_);
+    }
+    sum += std::max(0.0, beside - 2.0 * change_) * std::abs(end - begin);
+    begin = end;
+  }
+  return sum;
 }
 
 void KinkCheck::look(const Integrator& integrator) {
-  switches_before_ = switches_;
+  std::swap(from_, to_);
   force_before_ = force_;
-  read(integrator);
+  read(integrator, to_);
+  force_at(to_.time, to_.q, to_.v, force_);
   largest_momentum_ = std::max(largest_momentum_, max_norm(integrator.momentum()));
+  const PathCubic path{from_, to_};
+  const double h = path.end() - path.begin();
+  const std::vector<KinkCrossing> cuts = crossings_.along(
+      path, path.begin(), path.end(), looks_in_a_step,
+      std::max(finest_cut * std::abs(h), std::numeric_limits<double>::epsilon() * std::abs(path.end())));
   const double change = max_norm(force_ - force_before_);
-  const double jump = change - 2.0 * change_;
-  const int kink = crossed();
-  if (kink < 0) {
+  if (cuts.empty()) {
     change_ = change;
     return;
   }
-  if (!(jump > 0.0)) return;
-  sum_ += part_of_jump * std::abs(integrator.options().step) * jump;
+  const double impulse = missed(cuts, path);
+  if (!(impulse > 0.0)) return;
+  const bool instants = std::ranges::any_of(cuts, &KinkCrossing::instant);
+  (instants ? sum_of_instants_ : sum_) += part_unknown * impulse;
   if (++jumps_ > 1) return;
-  first_ = kink;
+  first_ = cuts.front().number;
   first_time_ = integrator.time();
 }
 
 std::string KinkCheck::text() const {
-  if (!(sum_ > too_much * largest_momentum_)) return {};
+  if (!(sum_of_instants_ > too_much_at_instants * largest_momentum_) &&
+      !(sum_ + sum_of_instants_ > too_much * largest_momentum_))
+    return {};
   std::ostringstream text;
   text.precision(4);
-  text << "forces jump where the motion crosses kinks of the formulas, " << jumps_
-       << " times, first before t = " << first_time_ << " ("
-       << kinks_->names()[static_cast<std::size_t>(first_)]
-       << "): steps over them are of order 1 only; ask for an error, --error, which divides the motion there";
+  text << "forces change fast at kinks or pulses that the formulas show, " << jumps_
+       << " times, first before t = " << first_time_;
+  if (first_ >= 0) text << " (" << kinks_->names()[static_cast<std::size_t>(first_)] << ")";
+  text << ": steps over them do not know them, or are of order 1 only; ask for an error, --error, which "
+          "divides the motion there";
   return text.str();
 }
 

@@ -1,23 +1,30 @@
 #pragma once
 
 #include <diracstep/core/integrator/integrator.hpp>
-#include <diracstep/core/system/kinks.hpp>
+#include <diracstep/core/runs/kink_crossings.hpp>
 #include <memory>
 #include <string>
 
 namespace diracstep {
 
-/// Follows a run of fixed steps over the kinks that the scene's formulas show (Scene::kinks), to say when
-/// forces that jump there spoil it: a step over a jump of size J in ∂L/∂q + f ends about h J/10 beside the
-/// momentum of the motion, whatever its order.  Doubted where these add up to more than a hundredth of the
-/// largest momentum.
+/// Follows a run over the kinks and pulses that the scene's formulas show (Scene::kinks), to say when forces
+/// that change there spoil it.  A step from t0 to t1 that crosses some is cut there, along a cubic between
+/// its ends, and
 ///
-/// J is how much more the force changes in such a step than twice what it did in the one before.  Kinks at
-/// which forces stay continuous, as of a contact, count for nothing.
+///   Σ over its parts of  (mean of |F − F between those of t0 and t1| − 2 |ΔF of the step before|) · length,
+///   F = ∂L/∂q + f,
+///
+/// is what a step cannot know of its impulse: h J/4 to h J/2 of a jump by J, all of a pulse between two
+/// nodes. A quarter of it, about what a step over a jump ends beside the motion whatever its order, is added
+/// up, and doubted above a hundredth of the largest momentum.
+///
+/// Steps that resolve what changes, and kinks at which forces stay continuous, as of a contact, count for
+/// little or nothing.  Not seen is what Kinks do not show.
 class KinkCheck {
  public:
+  /// For a run to about `end`: the instants of the time are looked up until then.
   /// The integrator's scene must outlive this.
-  explicit KinkCheck(const Integrator& integrator);
+  KinkCheck(const Integrator& integrator, double end);
 
   /// After each step.
   void after(const Integrator& integrator) {
@@ -29,14 +36,16 @@ class KinkCheck {
 
  private:
   void look(const Integrator& integrator);
-  void read(const Integrator& integrator);
-  /// The number of a kink that changes its sign, or -1.
-  int crossed() const;
+  void read(const Integrator& integrator, PathPoint& point) const;
+  void force_at(double t, const Vector& q, const Vector& v, Vector& force);
+  double missed(const std::vector<KinkCrossing>& cuts, const PathCubic& path);
 
   const Scene& scene_;
   std::shared_ptr<const Kinks> kinks_;
-  Vector switches_, switches_before_, force_, force_before_, momentum_, own_;
-  double change_ = 0.0, sum_ = 0.0, largest_momentum_ = 0.0, first_time_ = 0.0;
+  KinkCrossings crossings_;
+  PathPoint from_, to_;
+  Vector force_, force_before_, between_, momentum_, own_, q_, v_;
+  double change_ = 0.0, sum_ = 0.0, sum_of_instants_ = 0.0, largest_momentum_ = 0.0, first_time_ = 0.0;
   long jumps_ = 0;
   int first_ = -1;
 };

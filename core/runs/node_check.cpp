@@ -16,10 +16,9 @@ constexpr double frozen = 1e-3;
 
 }  // namespace
 
-NodeCheck::NodeCheck(const Scene& scene, long steps, bool only_rest)
+NodeCheck::NodeCheck(const Scene& scene, long steps)
     : scene_(scene),
       rows_(scene.constraints, scene.dimension()),
-      only_rest_(only_rest),
       growing_(steps == 0),
       between_(growing_ ? 2L * static_cast<long>(window)
                         : std::clamp(steps / fewest_windows, static_cast<long>(window), steps_for_a_window)) {
@@ -35,11 +34,10 @@ void NodeCheck::see(long step, const Sample& node) {
 }
 
 void NodeCheck::judge() {
-  if (!only_rest_) {  // first: a force that alternates has large impulses, which cancel in the momentum
-    look_for_alternation("velocity", &Sample::v, scene_.coordinates);
-    look_for_alternation("momentum", &Sample::p, scene_.coordinates);
-    look_for_alternation("multiplier", &Sample::lambda, scene_.row_names());
-  }
+  // First: a force that alternates has large impulses, which cancel in the momentum.
+  look_for_alternation("velocity", &Sample::v, scene_.coordinates);
+  look_for_alternation("momentum", &Sample::p, scene_.coordinates);
+  look_for_alternation("multiplier", &Sample::lambda, scene_.row_names());
   look_for_rest();
 }
 
@@ -66,13 +64,19 @@ void NodeCheck::look_for_alternation(const char* what, Vector Sample::*column,
   }
 }
 
-/// F = ∂L/∂q + f + AᵀΛ and the sum of the sizes of its terms.
+/// F = ∂L/∂q + f + AᵀΛ and the sum of the sizes of its terms; what cancels within ∂L/∂q shows in the products
+/// of velocities with ∂²L/∂q∂v.
 void NodeCheck::add_force(const Sample& node, Vector& force, Vector& terms) {
   const Eigen::Index n = scene_.dimension();
   Vector momentum(n);
   force.resize(n);
   scene_.lagrangian->gradient(node.time, node.q, node.v, force, momentum);
   terms = force.cwiseAbs();
+  const SparsityPattern& pattern = scene_.lagrangian->pattern();
+  Vector qq(pattern.nonzeros()), qv(pattern.nonzeros()), vv(pattern.nonzeros());
+  scene_.lagrangian->hessian(node.time, node.q, node.v, qq, qv, vv);
+  qv = qv.cwiseAbs();
+  pattern.multiply_add(qv.data(), node.v.cwiseAbs().eval().data(), terms.data());
   if (scene_.force) {
     scene_.force->value(node.time, node.q, node.v, momentum);
     force += momentum;

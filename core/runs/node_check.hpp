@@ -18,10 +18,9 @@ namespace diracstep {
 ///    F = ∂L/∂q + f + AᵀΛ: a frozen motion, whose forces have been taken for round-off.
 class NodeCheck {
  public:
-  /// For a run of about so many steps; 0 where that is not known: windows then come less and less often.
-  /// `only_rest` looks for frozen momenta alone.  The
+  /// For a run of about so many steps; 0 where that is not known: windows then come less and less often.  The
   /// scene, one with a Lagrangian, must outlive this.
-  NodeCheck(const Scene& scene, long steps, bool only_rest = false);
+  NodeCheck(const Scene& scene, long steps);
 
   /// Whether the node after so many steps, counted by the caller, is to be shown; nodes are asked for in
   /// order.
@@ -41,7 +40,7 @@ class NodeCheck {
 
   const Scene& scene_;
   ConstraintsAtPoint rows_;
-  bool only_rest_, growing_;
+  bool growing_;
   long between_, first_ = 0;
   std::size_t seen_ = 0;
   std::array<Sample, window> nodes_;

@@ -30,7 +30,7 @@ class RunChecks {
         step_(integrator, steps),
         nodes_(integrator.scene(), steps),
         branch_(integrator),
-        kinks_(integrator) {}
+        kinks_(integrator, integrator.time() + static_cast<double>(steps) * integrator.options().step) {}
 
   void before_step(Integrator& integrator) {
     if (nodes_.wants(step_number_)) see_node(integrator);

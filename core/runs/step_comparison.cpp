@@ -40,12 +40,14 @@ void StepComparison::add(const Sample& start, double h, const Sample& whole, con
   ++steps_;
   longest_way_ = std::max({longest_way_, std::abs(h) * max_norm(start.v), max_norm(whole.q - start.q),
                            max_norm(parts.q - start.q)});
-  const double difference = max_norm(whole.q - parts.q) / std::max(longest_way_, at_rest * max_norm(start.q));
+  rest_.see(start.time, start.q, start.v);
+  const double rounding = at_rest * std::max(max_norm(start.q), std::abs(h) * rest_.speed(h));
+  const double difference = max_norm(whole.q - parts.q) / std::max(longest_way_, rounding);
   if (difference > 0.0 && !(difference <= worst_)) {
     worst_ = difference;
     worst_time_ = start.time;
   }
-  if (longest_way_ <= at_rest * max_norm(start.q)) return;  // velocities and momenta are round-off
+  if (longest_way_ <= rounding) return;  // velocities and momenta are round-off
   velocity_.add(start.v, whole.v, parts.v, start.time);
   momentum_.add(start.p, whole.p, parts.p, start.time);
 }

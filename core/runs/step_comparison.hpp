@@ -1,6 +1,7 @@
 #pragma once
 
 #include <diracstep/core/integrator/integrator.hpp>
+#include <diracstep/core/runs/rest_sizes.hpp>
 #include <string>
 
 namespace diracstep {
@@ -15,6 +16,9 @@ namespace diracstep {
 class StepComparison {
  public:
   static constexpr double first_part = 0.382;
+
+  /// The scene, one with a Lagrangian, must outlive this.
+  explicit StepComparison(const Scene& scene) : rest_(scene) {}
 
   /// A step of size h from `start`, where it led, and where its parts did.  q, v and p are read.
   void add(const Sample& start, double h, const Sample& whole, const Sample& parts);
@@ -31,6 +35,7 @@ class StepComparison {
     bool doubted() const;
   };
 
+  RestSizes rest_;
   double longest_way_ = 0.0, worst_ = std::numeric_limits<double>::quiet_NaN(), worst_time_ = 0.0;
   Differences velocity_, momentum_;
   long steps_ = 0;

@@ -10,7 +10,8 @@ constexpr long steps_for_a_look = 600, fewest_looks = 3;
 }  // namespace
 
 StepSizeCheck::StepSizeCheck(const Integrator& integrator, long steps)
-    : between_looks_(std::clamp(steps / fewest_looks, 1L, steps_for_a_look)),
+    : comparison_(integrator.scene()),
+      between_looks_(std::clamp(steps / fewest_looks, 1L, steps_for_a_look)),
       next_look_(integrator.work().steps + std::min(1L, steps - 1)) {}  // the first step may be one from rest
 
 void StepSizeCheck::divide(Integrator& integrator) {

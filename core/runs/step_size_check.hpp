@@ -34,10 +34,10 @@ class StepSizeCheck {
   void divide(Integrator& integrator);
   void compare(Integrator& integrator);
 
+  StepComparison comparison_;
   long between_looks_, next_look_;
   bool divided_ = false;
   Sample start_, whole_, parts_;
-  StepComparison comparison_;
 };
 
 }  // namespace diracstep

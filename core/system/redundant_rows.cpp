@@ -87,15 +87,6 @@ constexpr double pose_tolerance = 1e-7;
 /// touch, poses are found to the square root of round-off only, and seem regular by so much.
 constexpr double crossing = 1e-3;
 
-/// A start moved by this part of its size in all coordinates.
-Vector moved(const Start& start, double distance) {
-  const double size = std::max(start.q.lpNorm<Eigen::Infinity>(), 1e-2);
-  Vector q = start.q;
-  for (Eigen::Index i = 0; i < q.size(); ++i)
-    q[i] += distance * size * std::sin(1.0 + 1.7 * static_cast<double>(i));
-  return q;
-}
-
 /// One-forms at the start, and at poses around it that the rows allow.
 std::vector<Columns> one_forms_around(const Scene& scene, const Start& start) {
   ConstraintsAtPoint rows(scene.constraints, scene.dimension());
@@ -175,6 +166,14 @@ bool broken_by_the_others(const Scene& scene, const Start& start, const std::vec
 }
 
 }  // namespace
+
+Vector moved(const Start& start, double distance) {
+  const double size = std::max(start.q.lpNorm<Eigen::Infinity>(), 1e-2);
+  Vector q = start.q;
+  for (Eigen::Index i = 0; i < q.size(); ++i)
+    q[i] += distance * size * std::sin(1.0 + 1.7 * static_cast<double>(i));
+  return q;
+}
 
 std::optional<Vector> pose_near(const ConstraintBlocks& holonomic, double t, Vector q,
                                 const std::vector<int>& held) {

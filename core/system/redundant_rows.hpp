@@ -9,6 +9,9 @@
 
 namespace diracstep {
 
+/// The positions of a start, all coordinates moved by this part of their size.
+Vector moved(const Start& start, double distance);
+
 /// A point of the holonomic rows near q that differs from it in what is not `held`, by Gauss and Newton's
 /// method in least squares, so that the rows may depend on each other; nothing where it does not converge.
 std::optional<Vector> pose_near(const ConstraintBlocks& holonomic, double t, Vector q,

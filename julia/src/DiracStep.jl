@@ -13,7 +13,7 @@ using Libdl
 
 export load, parse_scene, integrator, step!, state, reset!, save, restore!, Scene, Integrator, Run
 
-const interface_version = Cuint(2)  # DIRACSTEP_VERSION_OF_C_INTERFACE
+const interface_version = Cuint(3)  # DIRACSTEP_VERSION_OF_C_INTERFACE
 const momenta = (projected = 0, plus = 1, minus = 2)
 const library = Ref{String}("libdiracstep.so.0.1")
 
@@ -44,6 +44,8 @@ struct Source
     plugin::Ptr{Cstring}
     linked::Cint
     linked_plugin::Ptr{Ptr{Cvoid}}
+    tolerances::Cint
+    tolerance::Ptr{Parameter}
 end
 struct Facts
     dimension::Cint
@@ -145,7 +147,7 @@ function open_scene(name, text, changes)
         pointer_of(string) = string === nothing ? Cstring(C_NULL) : Base.unsafe_convert(Cstring, string)
         GC.@preserve parameters begin
             source = Ref(Source(pointer_of(name), pointer_of(text), C_NULL, length(parameters), pointer(parameters), 0, 0, C_NULL,
-                                0, C_NULL))
+                                0, C_NULL, 0, C_NULL))
             check(ccall(symbol("open"), Cint, (Cuint, Ref{Source}, Ref{Ptr{Cvoid}}), interface_version, source, handle))
         end
     end

@@ -13,7 +13,7 @@ from typing import Any, Callable
 
 from .errors import raised
 
-VERSION = 2  # DIRACSTEP_VERSION_OF_C_INTERFACE
+VERSION = 3  # DIRACSTEP_VERSION_OF_C_INTERFACE
 PLUGIN_VERSION = 1  # DIRACSTEP_PLUGIN_VERSION
 FILE = "libdiracstep.so.0.1"
 
@@ -98,7 +98,7 @@ class Source(Structure):
     _fields_ = [("name", c_char_p), ("text", c_char_p), ("callbacks", POINTER(CallbackScene)),
                 ("parameters", c_int), ("parameter", POINTER(Parameter)), ("drop_redundant", c_int),
                 ("plugins", c_int), ("plugin", POINTER(c_char_p)), ("linked", c_int),
-                ("linked_plugin", POINTER(POINTER(Plugin)))]
+                ("linked_plugin", POINTER(POINTER(Plugin))), ("tolerances", c_int), ("tolerance", POINTER(Parameter))]
 
 
 class Facts(Structure):

@@ -47,6 +47,7 @@ class Scene:
     q, v, p, t: where the motion starts; a column or {coordinate: value}, 0 where nothing is said.
     until, step: where runs end that are given no other end, and a coarse but sensible step.
     invariants: {name: function}, quantities that the motion keeps.
+    tolerances: {coordinate: absolute tolerance in its unit}, for one far smaller than the others.
     callback: True calls the Python functions at every evaluation instead; its cost is measured and warned of.
     """
 
@@ -56,7 +57,7 @@ class Scene:
                  v: Any = None, p: Any = None, t: float = 0.0, until: float = 1.0, step: float = 0.1,
                  invariants: Mapping[str, Callable[..., Any]] | None = None, name: str = "scene", description: str = "",
                  callback: bool = False, plugins: Sequence[str] = (), methods: Sequence[GeneratingFunction] = (),
-                 drop_redundant: bool = False) -> None:
+                 drop_redundant: bool = False, tolerances: Mapping[str, float] | None = None) -> None:
         if getattr(self, "_handle", 0):
             raise Misuse("a scene is made once")
         coordinates, parameters = list(coordinates), dict(parameters or {})
@@ -70,7 +71,8 @@ class Scene:
                                    zeros if q is None else column(q, coordinates, "q"),
                                    zeros if v is None else column(v, coordinates, "v"), real(t, "t"), real(until, "until"),
                                    real(step, "step"))
-            self._open(callbacks=source, coordinates=coordinates, plugins=plugins, methods=methods, drop_redundant=drop_redundant)
+            self._open(callbacks=source, coordinates=coordinates, plugins=plugins, methods=methods, drop_redundant=drop_redundant,
+                       tolerances=tolerances)
             _say_cost(self, source)
             return
         writer = SceneText(name, coordinates, parameters)
@@ -81,19 +83,22 @@ class Scene:
         writer.add_force(force)
         writer.add_invariants(invariants or {})
         text = writer.text(start_values(coordinates, q, v, p, t), until, step, {"description": description})
-        self._open(text=text, name=name, coordinates=coordinates, plugins=plugins, methods=methods, drop_redundant=drop_redundant)
+        self._open(text=text, name=name, coordinates=coordinates, plugins=plugins, methods=methods, drop_redundant=drop_redundant,
+                       tolerances=tolerances)
 
     # ---- opening ----
     def _open(self, *, name: str | None = None, text: str | None = None, callbacks: CallbackScene | None = None,
               coordinates: Sequence[str] | None = None, parameters: Mapping[str, float] | None = None,
-              plugins: Sequence[str] = (), methods: Sequence[GeneratingFunction] = (), drop_redundant: bool = False) -> None:
+              plugins: Sequence[str] = (), methods: Sequence[GeneratingFunction] = (), drop_redundant: bool = False,
+              tolerances: Mapping[str, float] | None = None) -> None:
         self._handle = 0
         self._callbacks = callbacks
         self._methods = list(methods)
         self._again: dict[str, Any] = {"name": name, "text": text, "coordinates": coordinates, "plugins": list(plugins),
-                                       "methods": list(methods), "drop_redundant": drop_redundant}
+                                       "methods": list(methods), "drop_redundant": drop_redundant, "tolerances": tolerances}
+        self._tolerances = {key: float(value) for key, value in (tolerances or {}).items()}
         self._changes = {key: float(value) for key, value in (parameters or {}).items()}
-        source, kept = _source(name, text, callbacks, self._changes, plugins, self._methods, drop_redundant)
+        source, kept = _source(name, text, callbacks, self._changes, plugins, self._methods, drop_redundant, self._tolerances)
         handle = ctypes.c_void_p()
         self._check(c.lib.open(c.VERSION, ctypes.byref(source), ctypes.byref(handle)))
         del kept
@@ -314,7 +319,8 @@ class Scene:
 
 
 def _source(name: str | None, text: str | None, callbacks: CallbackScene | None, changes: Mapping[str, float],
-            plugins: Sequence[str], methods: Sequence[GeneratingFunction], drop_redundant: bool) -> tuple[c.Source, Any]:
+            plugins: Sequence[str], methods: Sequence[GeneratingFunction], drop_redundant: bool,
+            tolerances: Mapping[str, float]) -> tuple[c.Source, Any]:
     source = c.Source(name=c.encoded(name), text=c.encoded(text), drop_redundant=int(drop_redundant))
     if callbacks is not None:
         source.callbacks = ctypes.pointer(callbacks.struct)
@@ -324,7 +330,9 @@ def _source(name: str | None, text: str | None, callbacks: CallbackScene | None,
     source.plugins, source.plugin = len(plugins), files
     linked = (ctypes.POINTER(c.Plugin) * max(1, len(methods)))(*(ctypes.pointer(method.struct) for method in methods))
     source.linked, source.linked_plugin = len(methods), linked
-    return source, (parameters, files, linked)
+    own = (c.Parameter * max(1, len(tolerances)))(*(c.Parameter(key.encode(), value) for key, value in tolerances.items()))
+    source.tolerances, source.tolerance = len(tolerances), own
+    return source, (parameters, files, linked, own)
 
 
 def _course(every: int, momentum: str, steps: int | None, at: Any) -> tuple[Any, np.ndarray]:
@@ -368,18 +376,20 @@ def _say_cost(scene: Scene, source: CallbackScene) -> None:
 
 
 def load(name: str | os.PathLike[str], *, plugins: Sequence[str] = (), methods: Sequence[GeneratingFunction] = (),
-         drop_redundant: bool = False, **parameters: float) -> Scene:
+         drop_redundant: bool = False, tolerances: Mapping[str, float] | None = None, **parameters: float) -> Scene:
     """A scene from a file NAME.toml, or one of the catalogue or of a plugin by its name; parameters and sizes changed."""
     scene = Scene.__new__(Scene)
-    scene._open(name=os.fspath(name), parameters=parameters, plugins=plugins, methods=methods, drop_redundant=drop_redundant)
+    scene._open(name=os.fspath(name), parameters=parameters, plugins=plugins, methods=methods, drop_redundant=drop_redundant,
+                       tolerances=tolerances)
     return scene
 
 
 def parse(text: str, *, name: str = "text", plugins: Sequence[str] = (), methods: Sequence[GeneratingFunction] = (),
-          drop_redundant: bool = False, **parameters: float) -> Scene:
+          drop_redundant: bool = False, tolerances: Mapping[str, float] | None = None, **parameters: float) -> Scene:
     """A scene from the text of a scene file; ``name`` stands in messages."""
     scene = Scene.__new__(Scene)
-    scene._open(name=name, text=text, parameters=parameters, plugins=plugins, methods=methods, drop_redundant=drop_redundant)
+    scene._open(name=name, text=text, parameters=parameters, plugins=plugins, methods=methods, drop_redundant=drop_redundant,
+                       tolerances=tolerances)
     return scene
 
 
@@ -387,7 +397,7 @@ class _Lists:
     """A model without a scene, for the lists of the library."""
 
     def __init__(self, plugins: Sequence[str] = ()) -> None:
-        source, kept = _source(None, None, None, {}, plugins, (), False)
+        source, kept = _source(None, None, None, {}, plugins, (), False, {})
         self._handle = ctypes.c_void_p()
         c.check(c.lib.open(c.VERSION, ctypes.byref(source), ctypes.byref(self._handle)))
         del kept

@@ -89,6 +89,8 @@ def run_study(scene: Scene, *, methods: Sequence[str], orders: Sequence[int], st
                 call += [option, ",".join(str(value) for value in values)]
         for name, value in scene._changes.items():
             call += ["--set", f"{name}={value!r}"]
+        for name, value in scene._tolerances.items():
+            call += ["--tolerance", f"{name}={value!r}"]
         call += ["--end", repr(float(until))] if until is not None else []
         call += ["--drop-redundant"] if scene._again["drop_redundant"] else []
         call += [] if ida else ["--without-ida"]

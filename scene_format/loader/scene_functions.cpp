@@ -1,7 +1,9 @@
 #include <algorithm>
 #include <array>
+#include <diracstep/scene_format/compiler/evaluator.hpp>
 #include <diracstep/scene_format/loader/loaded_function.hpp>
 #include <diracstep/scene_format/loader/scene_functions.hpp>
+#include <set>
 #include <utility>
 
 namespace diracstep {
@@ -264,6 +266,31 @@ class FileForce final : public Force {
   LoadedFunction function_;
 };
 
+/// Whether products with parameters that are zero make all outputs zero, as a damper's of the value 0.
+bool vanishes(const LoadedScene& scene, const SceneFunction& function) {
+  const FormulaGraph& graph = scene.program->graph;
+  std::vector<Node> outputs;
+  for (const Piece& piece : function.pieces)
+    outputs.insert(outputs.end(), piece.outputs.begin(), piece.outputs.end());
+  const std::vector<Node> nodes = graph.reachable(outputs);
+  std::vector<Node> known;
+  for (const Node node : nodes)
+    if (graph.known(node) == Known::once && graph[node].op != Op::list) known.push_back(node);
+  Evaluator values(*scene.program, scene.parameters, known);
+  values.evaluate();
+  std::set<Node> zero;
+  for (std::size_t k = 0; k < known.size(); ++k)
+    if (values.value(k) == 0.0L) zero.insert(known[k]);
+  for (const Node node : nodes) {  // arguments before what holds them
+    const NodeData& data = graph[node];
+    const bool a = zero.contains(data.a), b = zero.contains(data.b);
+    const bool both = data.op == Op::add || data.op == Op::subtract;
+    const bool first = data.op == Op::negative || data.op == Op::divide || data.op == Op::sum;
+    if ((data.op == Op::multiply && (a || b)) || (both && a && b) || (first && a)) zero.insert(node);
+  }
+  return std::ranges::all_of(outputs, [&](Node node) { return zero.contains(node); });
+}
+
 }  // namespace
 
 std::shared_ptr<const Lagrangian> file_lagrangian(const LoadedScenePtr& scene) {
@@ -278,7 +305,7 @@ std::shared_ptr<const Hamiltonian> file_hamiltonian(const LoadedScenePtr& scene)
 }
 
 std::shared_ptr<const Force> file_force(const LoadedScenePtr& scene) {
-  if (!scene->program->force) return nullptr;
+  if (!scene->program->force || vanishes(*scene, *scene->program->force)) return nullptr;
   return std::make_shared<FileForce>(LoadedFunction(scene, *scene->program->force));
 }
 

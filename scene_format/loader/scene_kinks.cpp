@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <diracstep/core/system/sign_changes.hpp>
 #include <diracstep/scene_format/loader/loaded_function.hpp>
 #include <diracstep/scene_format/loader/scene_kinks.hpp>
 #include <limits>
@@ -15,8 +16,6 @@ constexpr long samples = 4000, most_samples = 400'000;
 constexpr double most_values = 4e6;  // of all events at all samples
 constexpr std::size_t most_instants = 100'000;
 constexpr double round_off = 4.0 * std::numeric_limits<double>::epsilon();
-
-int sign(double x) { return x > 0.0 ? 1 : x < 0.0 ? -1 : 0; }
 
 /// A function of the time alone, or of the motion as well, with one value for each row.
 class Values {
@@ -62,18 +61,11 @@ class FileKinks final : public Kinks {
     if (first > last) std::swap(first, last);
     std::vector<Instant> found;
     if (events_.rows() == 0 || !(last > first)) return found;
-    const long n = sample_count(first, last);
-    double here = first;
-    Vector g = events_.at(here);
-    for (long k = 1; k <= n && found.size() < most_instants; ++k) {
-      const double next =
-          k == n ? last : first + (last - first) * static_cast<double>(k) / static_cast<double>(n);
-      const Vector later = events_.at(next);
-      for (Eigen::Index r = 0; r < g.size(); ++r)
-        if (sign(g[r]) != sign(later[r])) add(found, r, zero(r, here, g[r], next, later[r]));
-      here = next;
-      g = later;
-    }
+    const auto changes = [&](Eigen::Index r, double a, double b) {
+      if (found.size() < most_instants) add(found, r, zero(r, a, events_.at(a)[r], b, events_.at(b)[r]));
+    };
+    const auto values = [this](double t, Vector& g) { g = events_.at(t); };
+    SignChanges(events_.rows(), values, changes).look(first, last, sample_count(first, last), true);
     std::ranges::sort(found, {}, [](const Instant& i) { return std::pair(i.time, i.width); });
     const auto same = [](const Instant& a, const Instant& b) {
       return std::abs(a.time - b.time) <= 16.0 * round_off * std::abs(a.time) && a.width == b.width;
@@ -108,8 +100,8 @@ class FileKinks final : public Kinks {
 
   /// Where event r changes its sign between a and b.
   double zero(Eigen::Index r, double a, double at_a, double b, double at_b) const {
-    const int before = sign(at_a);
-    const auto passed = [&](double t) { return sign(events_.at(t)[r]) != before; };
+    const int before = sign_of(at_a);
+    const auto passed = [&](double t) { return sign_of(events_.at(t)[r]) != before; };
     const double guess = a + (b - a) * (at_a / (at_a - at_b));  // exact where the event is affine in t
     const double margin = round_off * std::max(std::abs(a), std::abs(b));
     if (guess > a && guess < b && !passed(guess - margin) && passed(guess + margin)) return guess;

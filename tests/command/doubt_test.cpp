@@ -138,6 +138,179 @@ TEST_F(Doubt, IsNotRaisedAtRest) {
   }
 }
 
+/// x = t up to a wall of 0.8 in energy and 1e-7 in width, from which it is reflected; kinetic energy 1/2.
+const char* const steep_wall = R"toml(
+lagrangian = "v_x^2/2 - 0.8*min(1, max(0, 1e7*(x - 0.75395)))"
+[coordinates]
+x = {}
+[start]
+v_x = 1
+[span]
+end = 2
+step = 0.1
+)toml";
+
+TEST_F(Doubt, AnErrorIsDeniedByTheEnergy) {
+  const std::string wall = scene("wall", steep_wall);
+  for (const char* error : {"1e-2", "1e-6"}) {
+    const Outcome outcome = run("run " + wall + " --json --error " + error);
+    const Json json = Json::parse(outcome.out);
+    const double x = json["end"]["q"]["x"], exact = 2 * 0.75395 - 2.0;
+    EXPECT_TRUE(outcome.status != 0 || std::abs(x - exact) < 1e-2 * std::abs(exact)) << error;
+  }
+  EXPECT_NE(run("run " + wall + " --error 1e-2").err.find("the runs agree on a wrong motion"),
+            std::string::npos);
+}
+
+/// Passes within a hundredth of a step; the force has no mean over it.
+TEST_F(Doubt, ABumpOfThePotentialIsFound) {
+  const Outcome outcome = run("run " + scene("bump", R"toml(
+lagrangian = "v_x^2/2 - 0.8*max(0, 1 - ((x-1.03817)/1e-3)^2)"
+[coordinates]
+x = {}
+[start]
+v_x = 1
+[span]
+end = 2
+step = 0.1
+)toml") + " --error 1e-6 --json");
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  const Json json = Json::parse(outcome.out);
+  // Within: u'' = 1600000 u about the top, so that it turns at u = −1e-3 sqrt(1 − 0.625) after
+  // artanh(...) of a time; back at the rim with v = −1.
+  const double rate = std::sqrt(1.6e6), rim = 1e-3;
+  const double inside = 2.0 / rate * std::atanh(1.0 / (rate * rim));
+  EXPECT_NEAR(json["end"]["q"]["x"].get<double>(), 2.0 * (1.03817 - rim) - (2.0 - inside), 1e-7);
+}
+
+TEST_F(Doubt, NoErrorIsStatedBelowRoundOff) {
+  const Outcome outcome = run("run " + scene("free", R"toml(
+lagrangian = "v_x^2/2"
+[coordinates]
+x = {}
+[start]
+v_x = 0.75
+[span]
+end = 1
+step = 0.1
+)toml") + " --error 1e-6 --json");
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  const Json json = Json::parse(outcome.out)["error_control"];
+  EXPECT_GT(json["estimate"].get<double>(), 1e-16);
+  EXPECT_TRUE(json["observed_order"].is_null());
+}
+
+/// In the origin, where no coordinate has a size: gravity in balance with the row sets what is round-off.
+TEST_F(Doubt, IsNotRaisedAtRestInTheOrigin) {
+  const Outcome outcome = run("run " + scene("bowl", R"toml(
+lagrangian = "(v_x^2+v_y^2)/2 - 10*y"
+[coordinates]
+x = {}
+y = {}
+[[rows]]
+equation = "y = x^2"
+[span]
+end = 1
+step = 0.001
+)toml"));
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+}
+
+/// ∂L/∂p = v_q − p vanishes by cancellation, and p has no momentum that could move.
+TEST_F(Doubt, IsNotRaisedByCanonicalLagrangians) {
+  const Outcome outcome = run("run " + scene("canonical", R"toml(
+lagrangian = "p*v_q - p^2/2 + cos(q)"
+[coordinates]
+q = {}
+p = {}
+[start]
+q = 1
+[span]
+end = 10
+step = 0.1
+)toml"));
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+}
+
+/// Switched on and off between nodes, an error of 0.14 % of the momentum at any order.
+TEST_F(Doubt, IsRaisedWhereStepsPassASwitchOfTheTime) {
+  const Outcome outcome = run("run " + scene("kicked", R"toml(
+lagrangian = "v_x^2/2 - x^2/2"
+[coordinates]
+x = {}
+[force]
+x = "min(1, max(0, 1e9*(t - 1.0007))) - min(1, max(0, 1e9*(t - 2.5003)))"
+[span]
+end = 10
+step = 0.05
+)toml"));
+  EXPECT_EQ(outcome.status, 3) << outcome.err;
+  EXPECT_NE(outcome.err.find("before t = 1.05"), std::string::npos) << outcome.err;
+}
+
+TEST_F(Doubt, ADamperOfTheValueZeroDoesNotSwitchOffTheEnergy) {
+  const std::string file = scene("stiff", R"toml(
+lagrangian = "v_x^2/2 - k*max(0, x)^2/2"
+[coordinates]
+x = {}
+[parameters]
+k = 1e6
+d = 0
+[force]
+x = "-d*v_x"
+[start]
+x = -1
+v_x = 1
+[span]
+end = 2
+step = 0.1
+)toml");
+  EXPECT_NE(run("run " + file).err.find("the energy, which this scene keeps"), std::string::npos);
+  EXPECT_EQ(run("run " + file + " --set d=0.1").err.find("the energy, which this scene keeps"),
+            std::string::npos);
+}
+
+/// p = m v of a mass of 1e-27 beside a reference whose velocity is half as large again.
+TEST_F(Doubt, AnErrorAgainstAReferenceHasNoUnit) {
+  const Outcome outcome = run("run " + scene("light", R"toml(
+lagrangian = "m*v_x^2/2 - m*x^2/2"
+[coordinates]
+x = {}
+[parameters]
+m = 1e-27
+[start]
+x = 1
+[span]
+end = 10
+step = 0.5
+[[reference]]
+kind = "exact"
+digits = 15
+how = "wrong on purpose"
+x = "cos(t)"
+v_x = "-1.5*sin(t)"
+)toml") + " --json");
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_NEAR(Json::parse(outcome.out)["error_p"].get<double>(), 1.0 / 3.0, 1e-3) << outcome.out;
+}
+
+/// From the lowest point the acceleration is zero at the start.
+TEST_F(Doubt, VariableStepsFromTheLowestPointOfAPendulumAreFew) {
+  const std::string file = scene("swing", R"toml(
+lagrangian = "v_a^2/2 + 9.81*cos(a)"
+[coordinates]
+a = {}
+[start]
+v_a = 2
+[span]
+end = 10
+step = 0.05
+)toml");
+  const Json json = Json::parse(run("run " + file + " --adaptive --json").out);
+  EXPECT_LT(json["steps"].get<long>(), 400) << json;
+  EXPECT_GT(json["steps"].get<long>(), 50) << json;
+}
+
 /// A drag that follows a fast drive: variable steps would take a thousand times those of the scene.
 TEST_F(Doubt, APlanDoesNotAdviseVariableStepsThatAreTooMany) {
   const std::string file = scene("drag", R"toml(

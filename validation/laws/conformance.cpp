@@ -108,7 +108,7 @@ OrderMeasurement measure_order(const Registry& registry, const OrderScene& scene
   const Vector expected = everything(scene.reference);
   const double claimed = options.order > 0 ? options.order : registry.method(options.method).info.order;
   std::vector<Point> points;
-  OrderMeasurement result{std::nan(""), 0.0, 0.0, {}};
+  OrderMeasurement result{std::nan(""), 0.0, 0.0, {}, false};
   for (int quarter_octave = 0; quarter_octave <= 40; ++quarter_octave) {
     const long steps = std::lround(4.0 * std::pow(2.0, 0.25 * quarter_octave));
     options.step = scene.t_end / static_cast<double>(steps);
@@ -136,11 +136,13 @@ OrderMeasurement measure_order(const Registry& registry, const OrderScene& scene
     if (settled(points)) break;
   }
   if (std::ssize(points) < fitted_points) {
-    if (result.failure.empty()) result.failure = "too few points above round-off";
+    if (!result.failure.empty()) return result;
+    result.failure = "too few points above round-off";
+    result.in_round_off = true;
     return result;
   }
   points.erase(points.begin(), points.end() - fitted_points);
-  return {slope_of(points), points.back().error, points.back().step, result.failure};
+  return {slope_of(points), points.back().error, points.back().step, result.failure, false};
 }
 
 double reversal_defect(const Registry& registry, const std::shared_ptr<const Scene>& scene,

@@ -21,6 +21,9 @@ struct OrderScene {
 /// The scene of `validation/laws/law_scenes.hpp` for degenerate circuits, in the same way.
 OrderScene degenerate_order_scene();
 
+/// The leading errors of order 10 are below round-off where they begin to dominate.
+constexpr int highest_visible_order = 8;
+
 /// One scene of each class: unconstrained, holonomic, nonholonomic, mixed, affine and time-dependent, forced,
 /// and a phase-space Lagrangian.
 std::vector<OrderScene> order_scenes();
@@ -30,7 +33,8 @@ struct OrderMeasurement {
   double order = 0.0;  ///< NaN where it could not be measured
   double error = 0.0;  ///< at the finer step of the last pair
   double step = 0.0;
-  std::string failure;  ///< empty, or why there is no order
+  std::string failure;        ///< empty, or why there is no order
+  bool in_round_off = false;  ///< no order, since too few steps have errors above round-off
 };
 
 /// Whether a method is for a scene: type 4 takes no forces, and phase-space Lagrangians are for the

@@ -250,6 +250,11 @@ std::vector<Place> places(const std::vector<MotionPoint>& points) {
 }
 
 Finding finding(const std::string& what, const Deviation& deviation) {
+  if (!std::isfinite(deviation.largest))
+    return {what, false,
+            "not finite where the values are: a derivative leaves the range of numbers, as that of 1/(1 + "
+            "exp(u)) "
+            "does above u = 709; write (1 - tanh(u/2))/2 for it"};
   return {what, deviation.largest <= derivative_tolerance,
           fmt::format("differs from differences by {:.1e}, allowed {:.0e}", deviation.largest,
                       derivative_tolerance)};

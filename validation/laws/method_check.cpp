@@ -50,6 +50,9 @@ Check check_order(const Subject& subject, const OrderScene& scene) {
     return not_applicable(scene.scene->force ? "type 4 takes no forces" : "only the Gauss-Lobatto family");
   const int claimed = claimed_order(info, *scene.scene);
   const OrderMeasurement measured = measure_order(subject.registry, scene, subject.stepping());
+  if (claimed > highest_visible_order && (measured.failure.empty() || measured.in_round_off))
+    return pass_if(!(measured.order < highest_visible_order - order_tolerance), measured.order, claimed,
+                   "8 or more is measured; the rest of so high an order is lost in round-off");
   if (!measured.failure.empty()) return pass_if(false, measured.order, claimed, measured.failure);
   return pass_if(std::abs(measured.order - claimed) <= order_tolerance, measured.order, claimed,
                  "measured and claimed order");

@@ -12,9 +12,6 @@ namespace {
 
 constexpr double defect_step = 0.05;
 
-/// Of compositions: the leading errors of order 10 are below round-off where they begin to dominate.
-constexpr int highest_visible_order = 8;
-
 bool degenerate(const OrderScene& scene) { return scene.scene->lagrangian->structure().y_hessian_zero; }
 
 std::string number(double value) { return std::isfinite(value) ? fmt::format("{:.1e}", value) : "–"; }
@@ -48,7 +45,7 @@ OrderTableRow measure_row(const Registry& registry, const TableMethod& method,
   const MethodInfo& info = known.info;
   const bool composed = method.order != info.order;
   for (const OrderScene& scene : scenes) {
-    OrderMeasurement measured{std::nan(""), 0.0, 0.0, {}};
+    OrderMeasurement measured{std::nan(""), 0.0, 0.0, {}, false};
     if (takes(known, scene)) measured = measure_order(registry, scene, options);
     row.measured.push_back(measured);
     if (!composed && info.constrained_order > 0) row.claimed.push_back(claimed_order(info, *scene.scene));

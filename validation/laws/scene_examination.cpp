@@ -7,6 +7,7 @@
 #include <diracstep/core/methods/default_method.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/steps/matrix_form.hpp>
+#include <diracstep/core/system/contradictory_rows.hpp>
 #include <diracstep/core/system/redundant_rows.hpp>
 #include <diracstep/validation/laws/scene_examination.hpp>
 #include <optional>
@@ -17,7 +18,7 @@ namespace {
 
 constexpr long dense_limit = 1500;  // rows or unknowns of a full matrix that is taken apart
 constexpr long steps_looked_at = 16;
-constexpr double ill_conditioned = 1e13;
+constexpr double ill_conditioned = 1e13, no_digit_left = 4.5e15;
 
 Eigen::MatrixXd full(const SparsityPattern& pattern, const Vector& values) {
   Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(pattern.rows(), pattern.columns());
@@ -57,9 +58,13 @@ Finding examine_rank(const Scene& scene) {
   const std::vector<std::string> dependent = redundant_rows(scene, scene.start);
   Finding finding{"rank of the rows", dependent.empty(),
                   fmt::format("rank {} of {} at the start", m - static_cast<int>(dependent.size()), m)};
+  if (dependent.empty()) return finding;
+  if (const std::string against = contradiction(scene, scene.start, dependent); !against.empty()) {
+    finding.detail += "; contradictory: " + against;
+    return finding;
+  }
   for (const std::string& name : dependent)
     finding.detail += fmt::format("{}'{}'", &name == dependent.data() ? "; redundant: " : ", ", name);
-  if (dependent.empty()) return finding;
   const std::string kept_for = why_not_left_out(row_dependence(scene, scene.start, dependent));
   finding.detail += kept_for.empty()
                         ? "; remove it, or leave it out with --drop-redundant or redundant = \"drop\""
@@ -132,9 +137,12 @@ void examine_steps(const CatalogueScene& entry, const Registry& registry, const 
                    read.ok() ? why_velocities(integrator) : describe(read.status)};
       if (read.ok()) motion.push_back({sample.time, sample.q, entry.scene->lagrangian ? sample.v : sample.p});
     }
-    steps.passed = report.ok() && condition < ill_conditioned;
+    steps.passed = report.ok() && condition < no_digit_left;
     steps.detail = fmt::format("{} of order {}, step {:g}: condition of the Jacobian {:.1e}",
                                integrator.options().method, integrator.options().order, h, condition);
+    if (condition > ill_conditioned)
+      steps.detail += fmt::format("; of the 16 digits of some component {:.0f} may be left",
+                                  std::max(0.0, 16.0 - std::log10(condition)));
     if (!report.ok()) steps.detail += "; " + report.failure;
   } catch (const Misuse& misuse) {
     steps.detail = misuse.what();

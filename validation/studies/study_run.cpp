@@ -119,6 +119,35 @@ ReferenceEnd reference_end(const CatalogueScene& scene, double t_end) {
   return true_end_by_ida(*completed(scene.scene), t_end);
 }
 
+namespace {
+
+/// Sizes of q and p that zero is told by: the largest of both ends, and what the speeds and masses ∂²L/∂v_i²
+/// make of each other in the time between.
+struct NaturalSizes {
+  double q, p;
+};
+
+NaturalSizes natural_sizes(const Scene& scene, const Sample& end) {
+  const double time = std::abs(end.time - scene.start.time);
+  const auto larger = [](const Vector& a, const Vector& b) {
+    double size = 0.0;
+    for (const Vector* column : {&a, &b})
+      if (column->size() > 0 && column->allFinite()) size = std::max(size, column->lpNorm<Eigen::Infinity>());
+    return size;
+  };
+  const double speed = larger(scene.start.v, end.v), q = std::max(larger(scene.start.q, end.q), speed * time);
+  const SparsityPattern& pattern = scene.lagrangian->pattern();
+  Vector qq(pattern.nonzeros()), qv(pattern.nonzeros()), vv(pattern.nonzeros());
+  scene.lagrangian->hessian(end.time, end.q, end.v, qq, qv, vv);
+  double mass = 0.0;
+  pattern.for_each([&](Eigen::Index k, int i, int j) {
+    if (i == j && std::isfinite(vv[k])) mass = std::max(mass, std::abs(vv[k]));
+  });
+  return {q, std::max(larger(scene.start.p, end.p), mass * (time > 0.0 ? std::max(speed, q / time) : speed))};
+}
+
+}  // namespace
+
 void judge(StudyRow& row, const Scene& scene, const Sample& end, const ReferenceEnd& reference) {
   const double energy = scene.energy(scene.start.time, scene.start.q, scene.start.v);
   row.constraint = largest_violation(scene, end);
@@ -126,8 +155,9 @@ void judge(StudyRow& row, const Scene& scene, const Sample& end, const Reference
   const double size = std::max({std::abs(energy), std::abs(end.energy), 0.5 * std::abs(end.p.dot(end.v))});
   row.energy_error = change == 0.0 ? 0.0 : change / size;
   if (reference.missing.empty()) {
-    row.error_q = relative_error(end.q, reference.q);
-    row.error_p = relative_error(end.p, reference.p);
+    const NaturalSizes natural = natural_sizes(scene, end);
+    row.error_q = relative_error(end.q, reference.q, natural.q);
+    row.error_p = relative_error(end.p, reference.p, natural.p);
   }
   if (!end.q.allFinite() || !end.p.allFinite())
     row.status = "the end point is not finite";

@@ -7,7 +7,7 @@ namespace diracstep {
 
 namespace {
 
-constexpr double zero_reference = 1e-14;  // a body at rest has such momenta in a closed form
+constexpr double zero_reference = 1e-14;
 constexpr double pre_asymptotic = 1e-2;
 constexpr double round_off = 1e-11;
 constexpr double round_off_margin = 30.0;
@@ -62,12 +62,13 @@ double least_squares_slope(const std::vector<WorkPoint>& points) {
 
 }  // namespace
 
-double relative_error(ConstVectorRef value, ConstVectorRef reference) {
+double relative_error(ConstVectorRef value, ConstVectorRef reference, double natural) {
   if (value.size() == 0) return 0.0;
   const Vector difference = value - reference;
   if (!difference.allFinite()) return std::numeric_limits<double>::quiet_NaN();
   const double size = reference.lpNorm<Eigen::Infinity>(), error = difference.lpNorm<Eigen::Infinity>();
-  return size > zero_reference ? error / size : error;
+  if (size > zero_reference * natural) return error / size;
+  return natural > 0.0 ? error / natural : error;
 }
 
 std::optional<OrderFit> measure_order(std::vector<WorkPoint> points) {

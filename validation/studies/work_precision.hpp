@@ -16,8 +16,9 @@ struct WorkPoint {
   double cpu_seconds = 0.0;
 };
 
-/// ‖value − reference‖∞ / ‖reference‖∞, absolute where the reference is zero, that is below 1e-14.
-double relative_error(ConstVectorRef value, ConstVectorRef reference);
+/// ‖value − reference‖∞ / ‖reference‖∞.  The reference is zero where it is below 1e-14 of the size that is
+/// natural where it comes from, as the momentum of a body at rest in a closed form: then in parts of that.
+double relative_error(ConstVectorRef value, ConstVectorRef reference, double natural = 1.0);
 
 /// An order as measured: the slope of log(error) over log(step), and the number of points it rests on.
 struct OrderFit {

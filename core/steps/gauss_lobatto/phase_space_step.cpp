@@ -27,14 +27,13 @@ class PhaseSpaceStep final : public StepProblem {
         zero_(Vector::Zero(n_)),
         sum_(stage_sum(n_, s)),
         start_(*lagrangian_),
-        start_along_(*lagrangian_),
         end_(*lagrangian_),
         end_along_(*lagrangian_) {
     for (Columns* stages : {&q_, &lq_, &lv_}) stages->setZero(n_, s_);
     for (Columns* stages : {&lqq_, &lqv_, &lvv_}) stages->setZero(lagrangian_->pattern().nonzeros(), s_);
     times_.setZero(s_);
     stiffness_.setZero(lqq_.rows());
-    for (Vector* column : {&q0_, &p0_, &q1_, &p_start_, &p_end_, &sizes_, &largest_, &largest_q_})
+    for (Vector* column : {&q0_, &p0_, &q1_, &p_start_, &p_end_, &along_, &sizes_, &largest_, &largest_q_})
       column->setZero(n_);
     last_x_.setConstant(size(), std::nan(""));
     dense_ = dense;
@@ -101,15 +100,14 @@ class PhaseSpaceStep final : public StepProblem {
     for (int i = 0; i < s_; ++i)
       for (int r = 0; r < n_; ++r) f[n_ * i + r] = lv_(r, i) - p_start_[r];
     add_stages(lq_.data(), force_weights_, f.data());
-    f.tail(n_) = end_.v - p_end_ - sign_ * (end_along_.q - end_.q);
+    f.tail(n_) = end_.v - p_end_ - sign_ / enlarged_ * (end_along_.q - end_.q);
   }
 
   void jacobian(ConstVectorRef x, VectorRef values) override {
     evaluate(x);
-    const auto nu = x.tail(n_);
     lagrangian_->hessians({s_, times_.data(), q_.data(), x.data()}, lqq_.data(), lqv_.data(), lvv_.data());
     end_.take_second(*lagrangian_, step_.end(), q1_, zero_);
-    end_along_.take_second(*lagrangian_, step_.end(), q1_, nu);
+    end_along_.take_second(*lagrangian_, step_.end(), q1_, along_);
     values.setZero();
     for (int row = 0; row < s_; ++row) {
       for (int k = 0; k < s_; ++k) {
@@ -193,8 +191,8 @@ class PhaseSpaceStep final : public StepProblem {
     const double h = step_.size;
     const auto v = x.head(n_ * s_).reshaped(n_, s_);
     const auto nu = x.tail(n_);
-    start_along_.take_first(*lagrangian_, step_.start, q0_, nu);
-    p_start_ = p0_ + start_along_.q - start_.q;  // Dθ(q0)ᵀν, since L is linear in v
+    p_start_ = p0_;
+    lagrangian_->pattern().multiply_add(start_.qv.data(), nu.data(), p_start_.data());  // Dθ(q0)ᵀν
     p_end_ = p_start_;
     q1_ = q0_ + (1.0 + sign_) * nu;
     for (int i = 0; i < s_; ++i)
@@ -207,9 +205,18 @@ class PhaseSpaceStep final : public StepProblem {
         q1_[r] += h * table_.b[i] * v(r, i);
       }
     end_.take_first(*lagrangian_, step_.end(), q1_, zero_);
-    end_along_.take_first(*lagrangian_, step_.end(), q1_, nu);
+    enlarge(nu, x.head(n_ * s_));
+    end_along_.take_first(*lagrangian_, step_.end(), q1_, along_);
     if (blocks_[0].scale <= smallest_scale)  // no term was known before: at rest in the origin
       blocks_[0].scale = blocks_[1].scale = scale_of(std::max(std::abs(h) * max_norm(lq_), max_norm(lv_)));
+  }
+
+  /// Dθ(q1)ᵀν is a difference of ∂L/∂q, which is linear in v: with ν made as large as the velocities it loses
+  /// no digits beside ∂H/∂q, whatever the unit of the time.
+  void enlarge(ConstVectorRef nu, ConstVectorRef velocities) {
+    const double factor = max_norm(velocities) / max_norm(nu);
+    enlarged_ = std::isfinite(factor) && factor > 0.0 ? std::exp2(std::round(std::log2(factor))) : 1.0;
+    along_ = enlarged_ * nu;
   }
 
   template <class Entry>
@@ -234,7 +241,7 @@ class PhaseSpaceStep final : public StepProblem {
   }
   /// ∂(θ(q1) − σ Dθ(q1)ᵀν)/∂q1.
   double end_by_position(Eigen::Index e) const {
-    return theta(end_, e) - sign_ * (end_along_.qq[e] - end_.qq[e]);
+    return theta(end_, e) - sign_ / enlarged_ * (end_along_.qq[e] - end_.qq[e]);
   }
   double end_by_velocity(int k, Eigen::Index e) const {
     const double h = step_.size;
@@ -261,16 +268,17 @@ class PhaseSpaceStep final : public StepProblem {
 
   Interval step_{0.0, 1.0};
   Vector zero_;
-  Vector q0_, p0_, q1_, p_start_, p_end_, last_x_;
+  Vector q0_, p0_, q1_, p_start_, p_end_, along_, last_x_;
   Columns q_;
   StageSum sum_;  ///< null for many coordinates
   double scaled_to_ = 0.0;
   Columns position_weights_, force_weights_;  ///< h a_ik and −h â_ik, column i
   Columns stiffness_weights_;                 ///< −h² â_ij a_jk over j, column i s + k
   Vector times_, stiffness_;
-  Columns lq_, lv_, lqq_, lqv_, lvv_;          ///< derivatives of L at the stages
-  LagrangianDerivatives start_, start_along_;  ///< at q0 with v = 0 and with v = ν
-  LagrangianDerivatives end_, end_along_;      ///< at q1, likewise
+  Columns lq_, lv_, lqq_, lqv_, lvv_;      ///< derivatives of L at the stages
+  LagrangianDerivatives start_;            ///< at q0 with v = 0
+  LagrangianDerivatives end_, end_along_;  ///< at q1 with v = 0 and with v = along_
+  double enlarged_ = 1.0;                  ///< times ν is along_
   Columns unmix_, two_form_, split_, mixed_;
   Eigen::PartialPivLU<Columns> two_form_factors_;
   bool dense_ = false, two_form_known_ = false;

@@ -1,9 +1,12 @@
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <diracstep/core/adaptive/error_control.hpp>
 #include <diracstep/core/runs/run_checks.hpp>
 #include <diracstep/scene_format/scene_file.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
+#include <random>
 
 /// What the compiler knows of kinks, steep ramps and pulses.
 namespace diracstep {
@@ -72,6 +75,14 @@ TEST(Kinks, ZerosOfOtherFunctionsOfTheTimeAreFound) {
     EXPECT_NEAR(at[k].time, static_cast<double>(k) * M_PI / 300.0, 1e-12);
 }
 
+TEST(Kinks, PairsOfZerosThatLieCloseToEachOtherAreFound) {
+  const auto at =
+      kinks_of("max(0, 1 - abs(t - 2.0001)/5e-6) + max(0, 1 - ((t - 7.00007)/1e-6)^2)")->instants(0.0, 10.0);
+  ASSERT_EQ(at.size(), 5u);
+  const double expected[] = {2.0001 - 5e-6, 2.0001, 2.0001 + 5e-6, 7.00007 - 1e-6, 7.00007 + 1e-6};
+  for (std::size_t k = 0; k < at.size(); ++k) EXPECT_NEAR(at[k].time, expected[k], 1e-13) << k;
+}
+
 TEST(Kinks, RepeatedElementsHaveTheirOwn) {
   const CatalogueScene entry = scene_from_text("chain.toml", R"toml(
 name = "chain"
@@ -95,11 +106,12 @@ step = 0.1
   EXPECT_NEAR(instants[0].time, 1.0, 1e-14);
 }
 
-/// What a run of 200 steps of 0.1 from x = 1 under this potential says.
-std::string doubt_of_potential(const std::string& potential) {
-  const CatalogueScene entry = scene_from_text(
-      "well.toml", "name = \"well\"\nlagrangian = \"v_x^2/2 - (" + potential +
-                       ")\"\n[coordinates]\nx = {}\n[start]\nx = 1\n[span]\nend = 20\nstep = 0.1\n");
+/// What a run of 200 steps of 0.1 from x = 1 under this potential and force says.
+std::string doubt_of_potential(const std::string& potential, const std::string& force = "0") {
+  const CatalogueScene entry =
+      scene_from_text("well.toml", "name = \"well\"\nlagrangian = \"v_x^2/2 - (" + potential +
+                                       ")\"\n[coordinates]\nx = {}\n[force]\nx = \"" + force +
+                                       "\"\n[start]\nx = 1\nv_x = 1\n[span]\nend = 20\nstep = 0.1\n");
   Integrator integrator(entry.scene, Registry::with_built_ins(), kinsol(), {.step = 0.1});
   RunChecks checks(integrator, 200);
   for (int k = 0; k < 200; ++k) {
@@ -116,6 +128,42 @@ TEST(KinkCheck, ForcesThatJumpOnTheWayAreToldOf) {
       << doubt_of_potential("abs(x)");
   EXPECT_EQ(doubt_of_potential("max(0, x)^2 + max(0, -x)^2"), "") << "the force is continuous";
   EXPECT_EQ(doubt_of_potential("x^2"), "");
+}
+
+TEST(KinkCheck, WhatLiesBetweenTwoNodesIsToldOf) {
+  const std::string bump = "0.8*max(0, 1 - ((x - 2.03817)/1e-3)^2)";  // x = 1 + t passes it within a step
+  EXPECT_NE(doubt_of_potential(bump).find("before t = 1.1 (max in line 2)"), std::string::npos)
+      << doubt_of_potential(bump);
+  EXPECT_NE(doubt_of_potential("x^2/2", "max(0, 1 - abs(t - 2.0421)/5e-5)/5e-5").find("before t = 2.1"),
+            std::string::npos);
+  EXPECT_NE(doubt_of_potential("x^2/2", "exp(-((t - 2.0421)/1e-4)^2)/1e-4").find("before t = 2.1"),
+            std::string::npos);
+  EXPECT_EQ(doubt_of_potential("x^2/2", "1e-4*max(0, 1 - abs(t - 2.0421)/5e-5)/5e-5"), "")
+      << "an impulse of 1e-4 of the momentum";
+}
+
+/// Pulses shorter than a millionth of the motion and longer ones, at errors from 1e-2 on.
+TEST(SwitchedForcesOfAFile, ArePassedByNoSearchWithoutAWord) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> uniform(0.0, 1.0);
+  for (int k = 0; k < 60; ++k) {
+    const double width = std::pow(10.0, -6.0 + 3.5 * uniform(random)), center = 0.5 + 9.0 * uniform(random);
+    const double error = std::pow(10.0, -2.0 - 4.0 * uniform(random));
+    const CatalogueScene entry = scene_from_text(
+        "pulse.toml",
+        fmt::format("name = \"pulse\"\nlagrangian = \"v_x^2/2 - x^2/2\"\n[coordinates]\nx = {{}}\n[force]\n"
+                    "x = \"max(0, 1 - abs(t - {:.17g})/{:.17g})/{:.17g}\"\n[start]\nx = 1\n[span]\nend = 10\n"
+                    "step = 0.5\n",
+                    center, width, width));
+    const ErrorControlReport report =
+        solve_to_error(entry.scene, Registry::with_built_ins(), kinsol(), 10.0, {.error = error});
+    if (!report.ok() || !report.warning.empty()) continue;
+    const double of_width = 1.0 - width * width / 12.0;  // ∫ pulse · sin, to its fourth power
+    const double x = std::cos(10.0) + of_width * std::sin(10.0 - center);
+    const double v = -std::sin(10.0) + of_width * std::cos(10.0 - center);
+    EXPECT_LT(std::abs(report.end.q[0] - x), error * std::abs(x)) << center << ' ' << width;
+    EXPECT_LT(std::abs(report.end.p[0] - v), error * std::abs(v)) << center << ' ' << width;
+  }
 }
 
 }  // namespace

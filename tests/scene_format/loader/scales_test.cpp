@@ -329,5 +329,22 @@ step = 0.1
   EXPECT_NEAR(end_of(floor, "type1/gl:3", 20, 0.1).lambda[0], 9.8, 1e-9);
 }
 
+/// ∂L/∂q holds θ'v of the size of 1/time and ∂H/∂q of its square.
+TEST(Scales, LagrangiansLinearInTheVelocityHaveNoUnitOfTime) {
+  const auto end_at = [](double w, const std::string& method) {
+    const CatalogueScene entry = scene_from_text(
+        "linear.toml",
+        "name = \"linear\"\nlagrangian = \"w*(x*v_y - y*v_x)/2 - w*w*(x^2 + 2*y^2)/2 - 0.1*w^2*x^4\"\n"
+        "[coordinates]\nx = {}\ny = {}\n[parameters]\nw = 1\n[start]\nx = 1\n[span]\nend = 1\nstep = 1\n",
+        {{"w", w}});
+    return end_of(entry, method, 60, 0.05 / w).q;
+  };
+  for (const char* method : {"type1/gl:2", "type1/gl:3", "type1/gl:4", "type1/gl:5"}) {
+    const Vector expected = end_at(1.0, method);
+    for (const double w : {1e6, 1e11, 1e-9})
+      EXPECT_LT(apart(end_at(w, method), expected), 1e-13) << method << ", w = " << w;
+  }
+}
+
 }  // namespace
 }  // namespace diracstep

@@ -54,5 +54,24 @@ TEST(Conformance, AStepThatIsNotTheStatedOneFails) {
   EXPECT_EQ(failed, (std::set<std::string>{"stated step", "membership"}));
 }
 
+/// Orders above 8 are lost in round-off before they show: 8 is asked for.
+TEST(Conformance, HighOrdersAreHeldToWhatShows) {
+  const std::vector<OrderScene> scenes = order_scenes();
+  CheckOptions options;
+  options.proceed = [](const std::string& check) { return check.starts_with("order, "); };
+  Registry registry = Registry::with_built_ins();
+  for (const char* name : {"type1/gl:5", "type1/gl:9"})
+    for (const Check& check : check_method(registry, name, scenes, options).checks)
+      EXPECT_NE(check.result, Check::Result::fail) << name << ", " << check.name << ": " << check.figure;
+  Method method = registry.method("type1/gl:3");
+  method.info.name = "type1/mislabelled";
+  method.info.order = method.info.constrained_order = 10;
+  registry.add(method);
+  long failed = 0;
+  for (const Check& check : check_method(registry, "type1/mislabelled", scenes, options).checks)
+    failed += check.result == Check::Result::fail ? 1 : 0;
+  EXPECT_EQ(failed, static_cast<long>(scenes.size()));
+}
+
 }  // namespace
 }  // namespace diracstep

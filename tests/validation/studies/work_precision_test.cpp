@@ -23,6 +23,13 @@ TEST(RelativeError, IsAbsoluteWhereTheReferenceIsZero) {
   EXPECT_TRUE(std::isnan(relative_error(Vector::Constant(1, NAN), Vector::Ones(1))));
 }
 
+TEST(RelativeError, ZeroIsToldByTheSizeThatIsNatural) {
+  const Vector value = Vector::Constant(1, 1e-27), reference = Vector::Constant(1, 2e-27);
+  EXPECT_DOUBLE_EQ(relative_error(value, reference, 1e-27), 0.5);
+  EXPECT_DOUBLE_EQ(relative_error(Vector::Constant(1, 3e-43), Vector::Constant(1, 1e-43), 1e-27), 2e-16);
+  EXPECT_DOUBLE_EQ(relative_error(value, Vector::Zero(1), 0.0), 1e-27);
+}
+
 TEST(MeasureOrder, ReadsThePowerOffItsPoints) {
   for (const double order : {1.0, 2.0, 4.0, 8.0}) {
     const auto fit = measure_order(power_law(0.1, order, 0.0, 6));

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <cmath>
+#include <diracstep/core/system/scene.hpp>
+
+namespace diracstep {
+
+/// What the forces of a scene would do in a time, were they not balanced: a scene at rest moves by the
+/// round-off of this, also where its coordinates are zero.
+class RestSizes {
+ public:
+  /// The scene, one with a Lagrangian, must outlive this.
+  explicit RestSizes(const Scene& scene);
+
+  /// Reads the forces ∂L/∂q + f and the masses ∂²L/∂v_i² at a point.
+  void see(double t, const Vector& q, const Vector& v);
+  /// max h |F_i|/m_i over the coordinates with a mass.
+  double speed(double h) const { return std::abs(h) * speed_; }
+  /// Σ (h F_i)²/m_i
+  double energy(double h) const { return h * h * energy_; }
+
+ private:
+  const Scene& scene_;
+  Vector force_, momentum_, own_, qq_, qv_, vv_;
+  double speed_ = 0.0, energy_ = 0.0;
+};
+
+}  // namespace diracstep

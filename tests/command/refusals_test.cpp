@@ -1,0 +1,102 @@
+#include <nlohmann/json.hpp>
+
+#include "run_command.hpp"
+
+/// What is refused, and that the reason is the true one.
+namespace diracstep::testing {
+namespace {
+
+using Json = nlohmann::json;
+
+class Refusals : public Command {
+ protected:
+  /// A scene file of this text, and its path.
+  std::string scene(const std::string& name, const std::string& text) const {
+    std::ofstream(path(name + ".toml")) << "name = \"" << name << "\"\n" << text;
+    return path(name + ".toml");
+  }
+
+  /// A particle in the plane with two rows.
+  std::string two_rows(const std::string& name, const std::string& first, const std::string& second) const {
+    return scene(name,
+                 "lagrangian = \"(v_x^2 + v_y^2 + v_z^2)/2 - y - z\"\n"
+                 "[coordinates]\nx = {}\ny = {}\nz = {}\n[[rows]]\nname = \"one\"\nequation = \"" +
+                     first + "\"\n[[rows]]\nname = \"other\"\nequation = \"" + second +
+                     "\"\n[start]\nv_y = 1\n[span]\nend = 1\nstep = 0.1\n");
+  }
+
+  void expect_told(const Outcome& outcome, const std::vector<std::string>& parts) const {
+    EXPECT_EQ(outcome.status, 2) << outcome.out << outcome.err;
+    for (const std::string& part : parts)
+      EXPECT_NE(outcome.err.find(part), std::string::npos) << part << " in " << outcome.err;
+  }
+};
+
+TEST_F(Refusals, RowsThatContradictEachOtherAreNotRedundant) {
+  const std::vector<std::string> files{
+      two_rows("positions", "x = t^2", "x = 0"), two_rows("rates", "v_x = y", "v_x = 0"),
+      two_rows("later", "v_x = max(0, t - 0.5)", "v_x = 0"), two_rows("scaled", "2*x = 1e3*t^2", "x = 0")};
+  for (const std::string& file : files)
+    for (const char* how : {"", " --drop-redundant", " --drop-redundant --error 1e-3"}) {
+      const Outcome outcome = run("run " + file + how);
+      expect_told(outcome, {"contradict", "'one'", "'other'", "at t = "});
+      EXPECT_EQ(outcome.err.find("redundant"), std::string::npos) << outcome.err;
+    }
+  EXPECT_NE(run("check " + files[1]).out.find("contradicts"), std::string::npos);
+  // The same said twice, in other units and with a time, is redundant.
+  for (const std::string& file :
+       {two_rows("twice", "x = t^2", "1e6*x = 1e6*t^2"), two_rows("mixed", "x = t^2", "v_x = 2*t"),
+        two_rows("linear", "v_x = y", "3*v_x = 3*y")}) {
+    EXPECT_EQ(run("run " + file + " --drop-redundant").status, 0) << file;
+    expect_told(run("run " + file), {"redundant"});
+  }
+}
+
+TEST_F(Refusals, RowsThatAreNearlyParallelAreNamed) {
+  for (const char* part : {"1e-9", "1e-8"})
+    expect_told(run("run " + two_rows("parallel", "x = y", std::string("x = y + ") + part + "*z")),
+                {"nearly depend", "'one'", "'other'"});
+  EXPECT_EQ(run("run " + two_rows("apart", "x = y", "x = y + 1e-5*z")).status, 0);
+}
+
+TEST_F(Refusals, OptionsThatNothingWouldReadAreNamed) {
+  for (const char* option : {"--eps 0.1", "--control in-step", "--max-solves 100", "--fixed"})
+    expect_told(run(std::string("run kepler_e06 --end 1 ") + option),
+                {std::string(option).substr(0, std::string(option).find(' ')) + " needs"});
+  expect_told(run("run kepler_e06 --end 1 --error 1e-3 --eps 0.1"), {"--eps needs"});
+  expect_told(run("plan kepler_e06 --eps 0.1"), {"--eps needs --adaptive"});
+  EXPECT_EQ(run("run kepler_e06 --end 1 --adaptive --eps 0.1 --control in-step").status, 0);
+}
+
+TEST_F(Refusals, TolerancesAreTakenByEveryVerbThatSteps) {
+  for (const char* verb : {"run kepler_e06 --end 1", "plan kepler_e06", "check kepler_e06"}) {
+    EXPECT_EQ(run(std::string(verb) + " --tolerance x=1e-20").status, 0) << verb;
+    expect_told(run(std::string(verb) + " --tolerance nothing=1e-20"), {"no coordinate 'nothing'"});
+    expect_told(run(std::string(verb) + " --tolerance x=-1"), {"above 0"});
+  }
+  expect_told(run("study kepler_e06 --tolerance nothing=1e-20"), {"no coordinate 'nothing'"});
+}
+
+TEST_F(Refusals, APlanSaysWhereItsOrderIsFrom) {
+  const std::string file = scene("recommended", R"toml(
+lagrangian = "v_x^2/2 - x^2/2"
+[coordinates]
+x = {}
+[start]
+x = 1
+[span]
+end = 1
+step = 0.1
+[recommended]
+order = 4
+step = 0.1
+tolerance = 1e-3
+)toml");
+  const Outcome plan = run("plan " + file);
+  EXPECT_EQ(plan.status, 0) << plan.err;
+  EXPECT_EQ(plan.out.find("asked for"), std::string::npos) << plan.out;
+  EXPECT_NE(plan.out.find("the scene's file recommends it"), std::string::npos) << plan.out;
+}
+
+}  // namespace
+}  // namespace diracstep::testing
