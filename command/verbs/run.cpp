@@ -40,7 +40,7 @@ struct RunArguments {
   long checkpoint_every = 0;
   std::string resume;
   bool adaptive = false;
-  double eps = 0.2;
+  double eps = 0.0;
   std::string control = "integrating";
   std::string at;
   std::optional<double> error;
@@ -382,10 +382,13 @@ void add_run(CLI::App& app, Session& session) {
                    "End the run after so many seconds, as an interrupt does: with its checkpoint;\n"
                    "with --error the whole search, which then shows its best answer (30 without)")
       ->type_name("S");
-  verb->add_flag("--adaptive", options->adaptive, "Reversible steps of varying size");
-  verb->add_option("--eps", options->eps, "Radians of a step of varying size")->capture_default_str();
+  verb->add_flag("--adaptive", options->adaptive,
+                 "Steps of varying size: reversible ones, or by their local error with damped/radau:S");
+  verb->add_option("--eps", options->eps,
+                   "Of a step of varying size its radians, 0.2 without; or its local error, 1e-6 without");
   verb->add_option("--control", options->control,
-                   "How its size is found: integrating, in-step, or irreversible (for comparison)")
+                   "How its size is found: integrating, in-step, or irreversible (for comparison);\n"
+                   "for damped/radau:S always local-error")
       ->capture_default_str();
   verb->add_option("--at", options->at, "Times T1,T2,… to show instead of the steps; needs --adaptive");
   verb->add_option(

@@ -58,6 +58,7 @@ class RadauStep final : public StepProblem {
     StepTraits traits{counted("stage velocities", n_), s_ * n_, StageSizes::stored, m_ * s_};
     if (m_ > 0) traits.unknowns += ", " + counted("multipliers", m_);
     if (m_h_ > 0) traits.unknowns += ", " + counted("projections", m_h_);
+    traits.damped = true;
     if (s_ == 1) return traits;  // one stage is no polynomial
     const Columns ahead = lagrange_basis(table_.c, table_.c.array() + 1.0).transpose();
     for (const int each : {n_, m_, m_h_})
