@@ -10,6 +10,7 @@
 #include <diracstep/command/run_identity.hpp>
 #include <diracstep/command/verbs.hpp>
 #include <diracstep/core/adaptive/adaptive_run.hpp>
+#include <diracstep/core/adaptive/damping_survey.hpp>
 #include <diracstep/core/adaptive/error_control.hpp>
 #include <diracstep/core/adaptive/rate_monitor.hpp>
 #include <diracstep/core/adaptive/variable_run_checks.hpp>
@@ -314,6 +315,23 @@ void report(const RunResult& result, const RunArguments& options, const Catalogu
   session.exit_status = failed;
 }
 
+/// The method where none is named, for the motion at hand.  Strong damping takes steps of varying size, where
+/// none is asked for and nothing else needs fixed ones.
+void choose_method(RunArguments& options, const CatalogueScene& entry, const Session& session, double end,
+                   bool step_given, IntegratorOptions& used) {
+  if (used.method != automatic_method) return;
+  const DefaultMethod choice =
+      default_method_of_motion(entry.scene, session.registry, session.solvers, end, std::abs(used.step), used,
+                               {used.order, 0.0, used.constraint_rule, large_from(used.dense_limit)});
+  if (!session.registry.method(choice.method).info.damped) return;
+  used.method = choice.method;
+  const bool fixed = step_given || options.fixed || options.substeps > 1 || !options.checkpoint.empty() ||
+                     !options.resume.empty();
+  if (!fixed) options.adaptive = true;
+  say(fmt::format("{}; {}{}", choice.method, choice.reason,
+                  fixed ? "" : "; steps vary by their local error, --step H takes fixed ones"));
+}
+
 void run(const RunArguments& given, Session& session) {
   RunArguments options = given;
   require_sense(options);
@@ -340,6 +358,7 @@ void run(const RunArguments& given, Session& session) {
     result.search = search(options, entry, session, end, used);
     used = take_found(options, entry, session, result);
   } else {
+    choose_method(options, entry, session, end, given.step.has_value(), used);
     used = run_once(options, entry, session, used, end, result);
   }
   compare_with_reference(result, entry, *completed(entry.scene));

@@ -265,6 +265,8 @@ StepReport AdaptiveIntegrator::solve_size(double eps, double guess, double& size
 
 void AdaptiveIntegrator::start_local_control() {
   local_->start(main_);
+  whole_->reset();
+  local_work_ = {};
   landing_ = 0;
   next_size_ = up_to_landing(sign_ * local_->first_size());
 }
@@ -281,6 +283,10 @@ StepReport AdaptiveIntegrator::error_step() {
   double size = next_size_;
   StepReport report = local_->advance(main_, *whole_, size, next_size_);
   report_.refused = local_->refused();
+  const long steps = local_work_.steps;
+  local_work_ = main_.work();
+  local_work_.add(whole_->work());
+  local_work_.steps = report.ok() ? steps + 1 : steps;
   if (!report.ok()) return report;
   note(size);
   const double same_time = 1e-9 * std::abs(size);

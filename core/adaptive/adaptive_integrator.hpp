@@ -86,7 +86,8 @@ class AdaptiveIntegrator {
   /// The size of the next step; a prediction where it is solved for in the step.
   double next_size() const { return next_size_; }
   double time() const { return main_.time(); }
-  const Work& work() const { return main_.work(); }  ///< of the main sequence
+  /// Of the main sequence, with the whole steps beside halves of them, which are one step.
+  const Work& work() const { return local_ ? local_work_ : main_.work(); }
   const Work& side_work() const { return side_.work(); }
   const ControlReport& control() const { return report_; }
   const Integrator& integrator() const { return main_; }
@@ -124,6 +125,7 @@ class AdaptiveIntegrator {
   std::optional<LocalErrorControl> local_;  ///< one of the two
   std::optional<RateMeter> meter_;
   std::optional<Integrator> whole_;  ///< the whole steps beside halves of them
+  Work local_work_;                  ///< of these and of the main sequence
   std::vector<Landing> landings_;
   std::size_t landing_ = 0;  ///< the next one
   double sign_;
