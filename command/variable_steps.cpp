@@ -15,6 +15,11 @@ std::string short_number(double value) { return std::isnan(value) ? "" : fmt::fo
 
 std::string summary(const VariableSteps& steps) {
   const ControlReport& report = steps.report;
+  if (steps.control == StepControl::local_error)
+    return fmt::format(
+        "variable steps: local error {:g}, sizes {:.3g} to {:.3g}, each of two halves, {} refused, {} side "
+        "steps for output\n",
+        steps.eps, report.smallest_step, report.largest_step, report.refused, report.side_steps);
   return fmt::format(
       "variable steps: eps {:g}, {} control, sizes {:.3g} to {:.3g}, {} resets, {} side steps for output, {} "
       "accelerations\n",

@@ -176,7 +176,7 @@ Json method_json(const Session& session, const AllMeasured& measured) {
   for (std::size_t i = 0; i < names.size(); ++i) {
     const MethodInfo info = session.registry.method(names[i]).info;
     methods.push_back({{"name", info.name},
-                       {"type", static_cast<int>(info.type)},
+                       {"type", info.type ? Json(static_cast<int>(*info.type)) : Json()},
                        {"order", info.order},
                        {"measured_order", slopes_json(info, measured_of(measured, i))},
                        {"orders", possible_orders(info)},

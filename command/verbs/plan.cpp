@@ -6,6 +6,7 @@
 #include <ctime>
 #include <diracstep/command/arguments.hpp>
 #include <diracstep/command/verbs.hpp>
+#include <diracstep/core/adaptive/damping_survey.hpp>
 #include <diracstep/core/adaptive/rate_survey.hpp>
 #include <diracstep/core/integrator/integrator.hpp>
 #include <diracstep/core/numerics/errors.hpp>
@@ -88,21 +89,34 @@ void plan(const PlanArguments& options, Session& session) {
   take_recommendation(entry, choice, step);
   IntegratorOptions used = integrator_options(session, choice);
   used.step = step.value_or(entry.natural_step);
+  std::optional<DefaultMethod> chosen;
+  if (used.method == automatic_method)
+    chosen = default_method_of_motion(entry.scene, session.registry, session.solvers, entry.t_end,
+                                      std::abs(used.step), used,
+                                      {used.order, 0.0, used.constraint_rule, large_from(used.dense_limit)});
+  const bool damped = session.registry.method(chosen ? chosen->method : used.method).info.damped;
+  if (chosen && damped) used.method = chosen->method;
   const Integrator integrator(entry.scene, session.registry, session.solvers, used);
   std::vector<PlanLine> lines = integrator.plan();
   if (options.adaptive)
     lines = AdaptiveIntegrator(entry.scene, session.registry, session.solvers, used,
-                               {.eps = options.eps.value_or(0.2), .end = entry.t_end})
+                               {.eps = options.eps.value_or(0.0), .end = entry.t_end})
                 .plan();
   else
     add_direct_line(entry, session, used, lines);
+  if (chosen && damped) lines.insert(lines.begin(), {"method", "by default", chosen->reason});
   for (const std::string& change : entry.changes) lines.push_back({"scene", "changed", change});
   if (choice.name != options.method.name)
     lines.push_back({"method", choice.name, "the scene's file recommends it"});
   if (choice.order != options.method.order)
     lines.push_back({"order", std::to_string(choice.order), "the scene's file recommends it"});
-  lines.push_back(
-      variable_steps_line(entry.scene, session.solvers, entry.t_end, entry.natural_step, "--adaptive"));
+  if (damped)
+    lines.push_back(
+        {"variable steps", "by their local error",
+         "--adaptive, and where the method is chosen by default: large where nothing fast is left"});
+  else
+    lines.push_back(
+        variable_steps_line(entry.scene, session.solvers, entry.t_end, entry.natural_step, "--adaptive"));
   print(options.json ? as_json(integrator, lines) : as_text(integrator, lines));
 }
 
@@ -114,8 +128,10 @@ void add_plan(CLI::App& app, Session& session) {
   const auto options = std::make_shared<PlanArguments>();
   verb->add_option("SCENE", options->scene, "A scene; see diracstep list scenes")->required();
   add_method_options(*verb, options->method);
-  verb->add_flag("--adaptive", options->adaptive, "The plan of reversible steps of varying size");
-  verb->add_option("--eps", options->eps, "With --adaptive: radians of a step of varying size (0.2 without)");
+  verb->add_flag("--adaptive", options->adaptive, "The plan of steps of varying size");
+  verb->add_option("--eps", options->eps,
+                   "With --adaptive: radians of a step of varying size, 0.2 without; or its local error,\n"
+                   "1e-6 without");
   add_redundancy_option(*verb, session);
   add_tolerance_option(*verb, session);
   add_set_option(*verb, options->set);

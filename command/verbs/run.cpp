@@ -10,6 +10,7 @@
 #include <diracstep/command/run_identity.hpp>
 #include <diracstep/command/verbs.hpp>
 #include <diracstep/core/adaptive/adaptive_run.hpp>
+#include <diracstep/core/adaptive/damping_survey.hpp>
 #include <diracstep/core/adaptive/error_control.hpp>
 #include <diracstep/core/adaptive/rate_monitor.hpp>
 #include <diracstep/core/adaptive/variable_run_checks.hpp>
@@ -54,7 +55,6 @@ struct RunArguments {
   bool json = false;
 };
 
-constexpr double usual_eps = 0.2;
 constexpr const char* usual_control = "integrating";
 constexpr double stated_to = 1e-6;  ///< relative, of an invariant's stated value
 
@@ -221,7 +221,7 @@ IntegratorOptions run_once(const RunArguments& options, const CatalogueScene& en
   if (options.adaptive) {
     chosen.step = std::copysign(chosen.step, end - entry.scene->start.time);
     AdaptiveIntegrator integrator(entry.scene, session.registry, session.solvers, chosen,
-                                  {.eps = options.eps.value_or(usual_eps),
+                                  {.eps = options.eps.value_or(0.0),
                                    .control = step_control(options.control.value_or(usual_control)),
                                    .end = end,
                                    .smallest_step = options.smallest_step,
@@ -330,6 +330,23 @@ void report(const RunResult& result, const RunArguments& options, const Catalogu
   session.exit_status = failed;
 }
 
+/// The method where none is named, for the motion at hand.  Strong damping takes steps of varying size, where
+/// none is asked for and nothing else needs fixed ones.
+void choose_method(RunArguments& options, const CatalogueScene& entry, const Session& session, double end,
+                   bool step_given, IntegratorOptions& used) {
+  if (used.method != automatic_method) return;
+  const DefaultMethod choice =
+      default_method_of_motion(entry.scene, session.registry, session.solvers, end, std::abs(used.step), used,
+                               {used.order, 0.0, used.constraint_rule, large_from(used.dense_limit)});
+  if (!session.registry.method(choice.method).info.damped) return;
+  used.method = choice.method;
+  const bool fixed = step_given || options.fixed || options.substeps > 1 || !options.checkpoint.empty() ||
+                     !options.resume.empty();
+  if (!fixed) options.adaptive = true;
+  say(fmt::format("{}; {}{}", choice.method, choice.reason,
+                  fixed ? "" : "; steps vary by their local error, --step H takes fixed ones"));
+}
+
 void run(const RunArguments& given, Session& session) {
   RunArguments options = given;
   require_sense(options);
@@ -356,6 +373,7 @@ void run(const RunArguments& given, Session& session) {
     result.search = search(options, entry, session, end, used);
     used = take_found(options, entry, session, result);
   } else {
+    choose_method(options, entry, session, end, given.step.has_value(), used);
     used = run_once(options, entry, session, used, end, result);
   }
   compare_with_reference(result, entry, *completed(entry.scene));
@@ -398,10 +416,14 @@ void add_run(CLI::App& app, Session& session) {
                    "End the run after so many seconds, as an interrupt does: with its checkpoint;\n"
                    "with --error the whole search, which then shows its best answer (30 without)")
       ->type_name("S");
-  verb->add_flag("--adaptive", options->adaptive, "Reversible steps of varying size");
-  verb->add_option("--eps", options->eps, "With --adaptive: radians of a step of varying size (0.2 without)");
+  verb->add_flag("--adaptive", options->adaptive,
+                 "Steps of varying size: reversible ones, or by their local error with damped/radau:S");
+  verb->add_option("--eps", options->eps,
+                   "With --adaptive: radians of a step of varying size, 0.2 without; or its local error,\n"
+                   "1e-6 without");
   verb->add_option("--control", options->control,
-                   "How its size is found: integrating (without), in-step, or irreversible (for comparison)");
+                   "How its size is found: integrating (without), in-step, or irreversible (for comparison);\n"
+                   "for damped/radau:S always local-error");
   verb->add_option("--at", options->at, "Times T1,T2,… to show instead of the steps; needs --adaptive");
   verb->add_option(
           "--error", options->error,

@@ -18,15 +18,21 @@ constexpr double size_tolerance = 1e-10;  // relative, of an equation in the ste
 constexpr int max_sizes = 30;             // tried for one step
 constexpr long scale_survey_steps = 120;
 
-constexpr std::array<std::pair<const char*, StepControl>, 3> controls{
+constexpr std::array<std::pair<const char*, StepControl>, 4> controls{
     {{"integrating", StepControl::integrating},
      {"in-step", StepControl::in_step},
-     {"irreversible", StepControl::irreversible}}};
+     {"irreversible", StepControl::irreversible},
+     {"local-error", StepControl::local_error}}};
 
 /// The options of the integrator under the control: a step that solves for its size is no composition itself.
 IntegratorOptions inner_options(IntegratorOptions options, const Registry& registry, StepControl control) {
   const MethodInfo info = registry.method(options.method).info;
   const bool composed = options.order != 0 && options.order != info.order;
+  if (info.damped != (control == StepControl::local_error))
+    throw Misuse(info.damped ? "method '" + info.name + "' varies its steps by their local error only"
+                             : "steps by their local error are for damped/radau:S; those of '" + info.name +
+                                   "' would lose what it keeps over long times");
+  if (info.damped) return options;
   if (!info.self_adjoint && !composed)
     throw Misuse(
         "method '" + info.name +
@@ -52,9 +58,15 @@ std::vector<double> eps_fractions(const IntegratorOptions& given, int inner_orde
   return {fractions.begin(), fractions.end()};
 }
 
-const AdaptiveOptions& checked(const AdaptiveOptions& adaptive) {
-  if (!(adaptive.eps > 0.0) || !std::isfinite(adaptive.eps))
-    throw Misuse("eps = " + to_text(adaptive.eps) + "; radians of a step, above 0, are needed");
+/// With what the defaults stand for.
+AdaptiveOptions checked(AdaptiveOptions adaptive, const MethodInfo& method) {
+  if (!(adaptive.eps >= 0.0) || !std::isfinite(adaptive.eps))
+    throw Misuse("eps = " + to_text(adaptive.eps) +
+                 "; radians of a step or its local error, above 0, are needed");
+  if (method.damped && adaptive.control == StepControl::integrating)
+    adaptive.control = StepControl::local_error;
+  if (adaptive.eps == 0.0)
+    adaptive.eps = method.damped ? AdaptiveOptions::usual_local_error : AdaptiveOptions::usual_radians;
   return adaptive;
 }
 
@@ -83,18 +95,24 @@ const char* name(StepControl control) {
 StepControl step_control(const std::string& name) {
   for (const auto& [known, control] : controls)
     if (name == known) return control;
-  throw Misuse("control: '" + name + "' is not one of integrating, in-step, irreversible");
+  throw Misuse("control: '" + name + "' is not one of integrating, in-step, irreversible, local-error");
 }
 
 AdaptiveIntegrator::AdaptiveIntegrator(const std::shared_ptr<const Scene>& scene, const Registry& registry,
                                        const SolverFactory& solvers, IntegratorOptions options,
                                        const AdaptiveOptions& adaptive)
-    : adaptive_(checked(adaptive)),
-      options_(with_method(std::move(options), *completed(scene))),
-      main_(scene, registry, solvers, inner_options(options_, registry, adaptive.control)),
+    : options_(with_method(std::move(options), *completed(scene))),
+      adaptive_(checked(adaptive, registry.method(options_.method).info)),
+      main_(scene, registry, solvers, inner_options(options_, registry, adaptive_.control)),
       side_(std::make_shared<const Scene>(main_.scene()), registry, solvers, options_),
-      meter_(make_meter(main_.scene(), solvers, adaptive_, options_.step, report_.accelerations)),
       sign_(options_.step > 0.0 ? 1.0 : -1.0) {
+  if (adaptive_.control == StepControl::local_error) {
+    whole_.emplace(std::make_shared<const Scene>(main_.scene()), registry, solvers, options_);
+    local_.emplace(adaptive_.eps, main_.options().order, span(), adaptive_.smallest_step);
+    if (adaptive_.end) landings_ = landings(main_.scene(), *adaptive_.end);
+  } else {
+    meter_.emplace(make_meter(main_.scene(), solvers, adaptive_, options_.step, report_.accelerations));
+  }
   fractions_ = eps_fractions(options_, main_.options().order, adaptive_.control);
   options_.order = side_.options().order;
   reset();
@@ -109,16 +127,20 @@ void AdaptiveIntegrator::reset() {
   report_ = {};
   report_.accelerations = survey;
   report_.smallest_step = HUGE_VAL;
-  report_.slowest = HUGE_VAL;
+  report_.slowest = local_ ? 0.0 : HUGE_VAL;
   next_size_ = options_.step;
+  if (local_) return start_local_control();
   if (start_control()) return;
   throw Misuse("scene '" + main_.scene().name + "': " + rate_.failure);
 }
 
-double AdaptiveIntegrator::largest_rate() const {
+double AdaptiveIntegrator::span() const {
   const double start = main_.scene().start.time;
-  const double span = std::abs(adaptive_.end.value_or(start + 100.0 * options_.step) - start);
-  const double smallest = adaptive_.smallest_step > 0.0 ? adaptive_.smallest_step : 1e-9 * span;
+  return std::abs(adaptive_.end.value_or(start + 100.0 * options_.step) - start);
+}
+
+double AdaptiveIntegrator::largest_rate() const {
+  const double smallest = adaptive_.smallest_step > 0.0 ? adaptive_.smallest_step : 1e-9 * span();
   return adaptive_.eps / smallest;
 }
 
@@ -126,12 +148,12 @@ double AdaptiveIntegrator::largest_rate() const {
 /// in v as ω is.
 bool AdaptiveIntegrator::measure(bool growth) {
   const double t = main_.time();
-  const SolveReport report = meter_.motion().velocity(t, main_.position(), main_.momentum(), v_);
+  const SolveReport report = meter_->motion().velocity(t, main_.position(), main_.momentum(), v_);
   if (!report.ok())
     rate_ = {0.0, 0.0, std::string("no velocity for the monitor: ") + describe(report.status)};
   else
-    rate_ = growth ? meter_.rate_and_growth(t, main_.position(), v_, next_size_)
-                   : meter_.rate(t, main_.position(), v_, next_size_);
+    rate_ = growth ? meter_->rate_and_growth(t, main_.position(), v_, next_size_)
+                   : meter_->rate(t, main_.position(), v_, next_size_);
   if (!rate_.ok()) return false;
   if (const double largest = largest_rate(); rate_.rate > largest) rate_ = {largest, 0.0, {}};
   report_.slowest = std::min(report_.slowest, rate_.rate);
@@ -171,7 +193,8 @@ StepReport AdaptiveIntegrator::step() {
   if (work().steps >= adaptive_.max_steps)
     return failed(std::to_string(adaptive_.max_steps) +
                   " steps did not reach the end; take a larger eps, a fixed step, or more steps");
-  const long before = meter_.motion().accelerations();
+  if (local_) return error_step();
+  const long before = meter_->motion().accelerations();
   StepReport report;
   if (adaptive_.control == StepControl::in_step) {
     double whole = 0.0;
@@ -190,7 +213,7 @@ StepReport AdaptiveIntegrator::step() {
   } else {
     report = control_step(next_size_);
   }
-  report_.accelerations += meter_.motion().accelerations() - before;
+  report_.accelerations += meter_->motion().accelerations() - before;
   return report;
 }
 
@@ -240,6 +263,56 @@ StepReport AdaptiveIntegrator::solve_size(double eps, double guess, double& size
   return failed("no size of the step satisfies the equation for it; take a smaller eps");
 }
 
+void AdaptiveIntegrator::start_local_control() {
+  local_->start(main_);
+  whole_->reset();
+  local_work_ = {};
+  landing_ = 0;
+  next_size_ = up_to_landing(sign_ * local_->first_size());
+}
+
+/// The size, or a part of what is left to the next time that a step has to end at.
+double AdaptiveIntegrator::up_to_landing(double size) const {
+  if (landing_ == landings_.size()) return size;
+  const double left = landings_[landing_].time - main_.time();
+  if (std::abs(size) < 0.5 * std::abs(left)) return size;
+  return std::abs(size) < 0.99 * std::abs(left) ? 0.5 * left : left;
+}
+
+StepReport AdaptiveIntegrator::error_step() {
+  double size = next_size_;
+  StepReport report = local_->advance(main_, *whole_, size, next_size_);
+  report_.refused = local_->refused();
+  const long steps = local_work_.steps;
+  local_work_ = main_.work();
+  local_work_.add(whole_->work());
+  local_work_.steps = report.ok() ? steps + 1 : steps;
+  if (!report.ok()) return report;
+  note(size);
+  const double same_time = 1e-9 * std::abs(size);
+  if (landing_ < landings_.size() && std::abs(time() - landings_[landing_].time) <= same_time) {
+    main_.restart(landings_[landing_++].resume, Vector(main_.position()), Vector(main_.momentum()),
+                  Vector(main_.velocity_estimate()));
+    next_size_ = sign_ * std::min(std::abs(next_size_), local_->first_size());
+  }
+  next_size_ = up_to_landing(next_size_);
+  return report;
+}
+
+/// From the current node to t with the side integrator, each step judged as those of the motion are.
+StepReport AdaptiveIntegrator::side_steps_to(double t) {
+  LocalErrorControl beside = *local_;
+  StepReport report;
+  double next = t - time();
+  while (report.ok() && std::abs(t - side_.time()) > 1e-12 * std::abs(next_size_)) {
+    const double left = t - side_.time();
+    double size = std::abs(next) < std::abs(left) ? next : left;
+    report = beside.advance(side_, *whole_, size, next);
+    ++report_.side_steps;
+  }
+  return report;
+}
+
 StepReport AdaptiveIntegrator::sample_at(double t, Momentum momentum, Sample& sample) {
   const double size = t - time();
   if (!(std::abs(size) <= 2.0 * std::abs(next_size_)))
@@ -248,9 +321,9 @@ StepReport AdaptiveIntegrator::sample_at(double t, Momentum momentum, Sample& sa
   if (size == 0.0) {
     report.solve = main_.sample(momentum, sample);
   } else {
-    side_.restart(time(), main_.position(), main_.momentum(), v_);
-    ++report_.side_steps;
-    report = side_.step(size);
+    side_.restart(time(), main_.position(), main_.momentum(), local_ ? main_.velocity_estimate() : v_);
+    if (!local_) ++report_.side_steps;
+    report = local_ ? side_steps_to(t) : side_.step(size);
     if (!report.ok()) return report;
     report.solve = side_.sample(momentum, sample);
     sample.time = t;
@@ -262,16 +335,22 @@ StepReport AdaptiveIntegrator::sample_at(double t, Momentum momentum, Sample& sa
 
 std::vector<PlanLine> AdaptiveIntegrator::plan() const {
   std::vector<PlanLine> lines = main_.plan();
+  if (local_) {
+    lines.push_back({"step size", "by the local error",
+                     "a step and two halves of it differ by less than " + to_text(adaptive_.eps) +
+                         " of q and p; not reversible, as the method"});
+    return lines;
+  }
   const bool integrating = adaptive_.control == StepControl::integrating;
   lines.push_back({"step size",
                    integrating                                 ? "integrating controller"
                    : adaptive_.control == StepControl::in_step ? "equation in the step"
                                                                : "eps/ω at the node",
                    "eps = " + to_text(adaptive_.eps) + " radians"});
-  lines.push_back({"monitor", meter_.generic() ? "generic" : "the user's own",
-                   meter_.generic() ? "ω0 = " + to_text(meter_.scales().typical) +
-                                          ", ω_min = " + to_text(meter_.scales().lowest)
-                                    : "even in v at the start"});
+  lines.push_back({"monitor", meter_->generic() ? "generic" : "the user's own",
+                   meter_->generic() ? "ω0 = " + to_text(meter_->scales().typical) +
+                                           ", ω_min = " + to_text(meter_->scales().lowest)
+                                     : "even in v at the start"});
   return lines;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <diracstep/core/adaptive/local_error.hpp>
 #include <diracstep/core/adaptive/rate_monitor.hpp>
 #include <diracstep/core/integrator/integrator.hpp>
 #include <optional>
@@ -19,10 +20,14 @@ enum class StepControl {
   /// fraction of eps.  Takes about four solves where the controller takes one.
   in_step,
   /// h = eps/ω(y_0): not reversible, loses the long-run behaviour.  For comparison only.
-  irreversible
+  irreversible,
+  /// By the local error of a step, eps being the part of q and p that it may be (local_error.hpp).  The
+  /// control
+  /// of the damping family and of no other: it is not reversible.
+  local_error
 };
 
-/// "integrating", "in-step" or "irreversible".
+/// "integrating", "in-step", "irreversible" or "local-error".
 const char* name(StepControl control);
 
 /// The control of that name; throws Misuse for any other.
@@ -30,14 +35,18 @@ StepControl step_control(const std::string& name);
 
 /// How the step size varies.
 struct AdaptiveOptions {
-  double eps = 0.2;  ///< radians of a step
+  static constexpr double usual_radians = 0.2, usual_local_error = 1e-6;
+
+  double eps = 0.0;  ///< radians of a step, or its local error; 0: the usual ones
+  /// For a method of the damping family `integrating`, the default, stands for `local_error`.
   StepControl control = StepControl::integrating;
   Monitor monitor = {};            ///< empty: the generic one
   MonitorScales scales = {};       ///< of the generic monitor; zeros are taken from a survey towards `end`
   std::optional<double> end = {};  ///< where the motion will end, for the survey; 100 steps of the options'
                                    ///< size without it
   double smallest_step =
-      0.0;  ///< without sign: ω counts as at most eps over it; 0: 1e-9 of the time to `end`
+      0.0;  ///< without sign: ω counts as at most eps over it; 0: 1e-9 of the time to `end`.  Steps by their
+            ///< local error are accepted below it whatever their error; 0: never
   long max_steps = 10'000'000;  ///< the next one fails
 };
 
@@ -48,18 +57,22 @@ struct ControlReport {
   double slowest = 0.0, fastest = 0.0;             ///< ω at the nodes
   double lowest_ratio = 1.0, highest_ratio = 1.0;  ///< (z − eps G/2)/ω before a reset
   long side_steps = 0;                             ///< for output off the nodes
+  long refused = 0;                                ///< steps whose local error was too large, or that failed
   long accelerations = 0;                          ///< linear systems solved for the monitor, survey included
 };
 
-/// Steps of varying size that keep reversibility, and with it the long-run behaviour of a self-adjoint step.
+/// Steps of varying size: those that keep reversibility, and with it the long-run behaviour of a self-adjoint
+/// step, and for the damping family ordinary ones, by their local error.
 ///
 /// Output at times of the user's choice comes from side steps: a second integrator steps from the last node
 /// to that time, with the full order of the method, and leaves the main sequence untouched bit by bit.
 class AdaptiveIntegrator {
  public:
   /// The sign of options.step is the direction; its size matters only for the survey without an end.  Throws
-  /// Misuse as Integrator does, for a method that is not self-adjoint (composed ones are), for eps that is
-  /// not positive, for a monitor that is not positive or not even in v, and for a Lagrangian linear in v.
+  /// Misuse as Integrator does, for a method that is neither self-adjoint (composed ones are) nor of the
+  /// damping family, for a control that is not one of the method's, for a negative eps, and with a
+  /// self-adjoint method for a monitor that is not positive or not even in v, and for a Lagrangian linear in
+  /// v.
   AdaptiveIntegrator(const std::shared_ptr<const Scene>& scene, const Registry& registry,
                      const SolverFactory& solvers, IntegratorOptions options,
                      const AdaptiveOptions& adaptive);
@@ -73,7 +86,8 @@ class AdaptiveIntegrator {
   /// The size of the next step; a prediction where it is solved for in the step.
   double next_size() const { return next_size_; }
   double time() const { return main_.time(); }
-  const Work& work() const { return main_.work(); }  ///< of the main sequence
+  /// Of the main sequence, with the whole steps beside halves of them, which are one step.
+  const Work& work() const { return local_ ? local_work_ : main_.work(); }
   const Work& side_work() const { return side_.work(); }
   const ControlReport& control() const { return report_; }
   const Integrator& integrator() const { return main_; }
@@ -83,27 +97,37 @@ class AdaptiveIntegrator {
   /// Reads the current node.
   SolveReport sample(Momentum momentum, Sample& sample) { return main_.sample(momentum, sample); }
 
-  /// Reads the motion at another time by a side step from the current node.  Full order for times within
-  /// about a step from there; throws Misuse beyond two steps.
+  /// Reads the motion at another time by a side step from the current node, or by as many as their local
+  /// error asks for.  Full order for times within about a step from there; throws Misuse beyond two steps.
   StepReport sample_at(double t, Momentum momentum, Sample& sample);
 
   std::vector<PlanLine> plan() const;
 
  private:
+  void start_local_control();
+  StepReport error_step();
+  StepReport side_steps_to(double t);
+  double up_to_landing(double size) const;
   StepReport control_step(double size);
   StepReport solve_size(double eps, double guess, double& size);
   bool measure(bool growth);
+  double span() const;
   double largest_rate() const;
   bool start_control();
   StepReport failed(const std::string& what) const;
   void note(double size);
 
   ControlReport report_;
+  IntegratorOptions options_;  ///< as given: a composition's order
   AdaptiveOptions adaptive_;
-  IntegratorOptions options_;      ///< as given: a composition's order
   std::vector<double> fractions_;  ///< of eps, where each part of a composition solves for its size
   Integrator main_, side_;
-  RateMeter meter_;
+  std::optional<LocalErrorControl> local_;  ///< one of the two
+  std::optional<RateMeter> meter_;
+  std::optional<Integrator> whole_;  ///< the whole steps beside halves of them
+  Work local_work_;                  ///< of these and of the main sequence
+  std::vector<Landing> landings_;
+  std::size_t landing_ = 0;  ///< the next one
   double sign_;
   Rate rate_;  ///< at the current node
   Vector v_;   ///< there

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <diracstep/core/adaptive/damping_survey.hpp>
 #include <diracstep/core/adaptive/error_control.hpp>
 #include <diracstep/core/adaptive/rate_survey.hpp>
 #include <diracstep/core/adaptive/refinement_search.hpp>
@@ -82,7 +83,8 @@ ErrorControlReport search_both(const RefinementSearch::Motion& motion, const Err
 }
 
 /// The method and its order, and whether sums are compensated: for small errors, where the library chooses.
-void choose_method(const Scene& scene, const Registry& registry, const ErrorControlOptions& options,
+void choose_method(const std::shared_ptr<const Scene>& scene, const Registry& registry,
+                   const SolverFactory& solvers, double end, const ErrorControlOptions& options,
                    ErrorControlReport& report) {
   if (options.method != automatic_method) {
     const MethodInfo info = registry.method(options.method).info;
@@ -91,16 +93,19 @@ void choose_method(const Scene& scene, const Registry& registry, const ErrorCont
     report.compensated_sums = options.compensated_sums.value_or(false);
     return;
   }
-  const DefaultMethod choice = default_method(scene, {.order = options.order,
-                                                      .error = options.error,
-                                                      .rule = options.integrator.constraint_rule,
-                                                      .large = large_from(options.integrator.dense_limit)});
-  const bool has_compensated_sums = registry.method(choice.method).info.stages > 0;
+  const DefaultMethod choice =
+      default_method_of_motion(scene, registry, solvers, end, options.first_step, options.integrator,
+                               {.order = options.order,
+                                .error = options.error,
+                                .rule = options.integrator.constraint_rule,
+                                .large = large_from(options.integrator.dense_limit)});
+  const MethodInfo info = registry.method(choice.method).info;
+  const bool has_compensated_sums = info.stages > 0;
   report.method = choice.method;
-  report.order = choice.order;
+  report.order = choice.order == 0 ? info.order : choice.order;
   report.method_reason = choice.reason;
   report.compensated_sums = options.compensated_sums.value_or(
-      has_compensated_sums && has_accelerations(scene) && options.error < 1e-8);
+      has_compensated_sums && has_accelerations(*scene) && options.error < 1e-8);
 }
 
 }  // namespace
@@ -113,19 +118,21 @@ ErrorControlReport solve_to_error(const std::shared_ptr<const Scene>& given, con
   const auto scene = completed(given);
   const bool accelerates = has_accelerations(*scene);
   ErrorControlReport report;
-  choose_method(*scene, registry, options, report);
+  choose_method(scene, registry, solvers, end, options, report);
+  const bool damped = registry.method(report.method).info.damped;
   RateSurvey survey;
-  if (accelerates) survey = survey_rate(*scene, solvers, end);
+  if (accelerates && !damped) survey = survey_rate(*scene, solvers, end);
   const FirstSteps first = first_steps(options, survey, report.order, std::abs(end - scene->start.time));
   const RefinementSearch::Motion motion{
       scene, registry, solvers, end, options, survey.scales, RefinementSearch::Clock::now()};
   report.reason = options.adaptive       ? "as asked for"
+                  : damped               ? "by their local error, as the damping family allows"
                   : options.monitor.rate ? "a monitor is given"
                                          : "max ω / min ω = " + to_text(survey.ratio(), 3);
-  const bool may_pay =
-      accelerates && survey.failure.empty() && (options.monitor.rate || survey.variable_steps_pay());
+  const bool may_pay = accelerates && !damped && survey.failure.empty() &&
+                       (options.monitor.rate || survey.variable_steps_pay());
   if (!options.adaptive && may_pay) return search_both(motion, report, first);
-  report.adaptive = options.adaptive.value_or(false);
+  report.adaptive = options.adaptive.value_or(damped);
   RefinementSearch(motion, report, report.adaptive ? first.eps : first.fixed).go();
   return report;
 }

@@ -18,10 +18,11 @@ struct ErrorControlOptions {
   static constexpr double usual_max_time = 30.0;
 
   double error = 0.0;  ///< asked for at the end of the motion, see ErrorControlReport::estimate
-  std::string method = automatic_method;  ///< "auto": default_method() for this error
+  std::string method = automatic_method;  ///< "auto": default_method_of_motion() for this error
   int order = 0;  ///< as in IntegratorOptions; without a method, the one of default_method()
   std::optional<bool> adaptive = {};  ///< empty: where a survey finds max ω > 5 min ω and coarse runs of both
-                                      ///< kinds measure that variable steps need fewer solves
+                                      ///< kinds measure that variable steps need fewer solves; with the
+                                      ///< damping family always, by their local error
   Monitor monitor = {};  ///< for variable steps; empty: the generic one
   StepControl control = StepControl::integrating;
   double first_step = 0.0;                    ///< of a fixed step, without sign; 0: from the survey
@@ -86,7 +87,7 @@ struct ErrorControlReport {
 /// steps do not resolve.  Where it finds a switch or a pulse, the motion is divided there and the search
 /// begins anew, always with fixed steps.  Two runs with the same steps, or of fewer than four variable
 /// ones, prove nothing and do not count.  Local error estimates say nothing of the error at the end and are
-/// not used.
+/// not used for it.
 ///
 /// The search is refused, with the reason and the best answer so far, where the differences stop falling at
 /// round-off, where the forces change too fast, where steps fail at every size, or where the work or the time

@@ -49,6 +49,7 @@ RefinementSearch::RefinementSearch(const Motion& motion, ErrorControlReport& rep
     : motion_(motion),
       report_(report),
       convergence_(report.order, motion.options.error),
+      local_(report.adaptive && motion.registry.method(report.method).info.damped),
       first_(first),
       eps_step_(std::copysign(first, motion.end - motion.scene->start.time)) {
   if (!report.adaptive) plan_ = StepPlan(known_stretches(*motion.scene, motion.end), first);
@@ -63,7 +64,7 @@ ErrorControlReport::Steps RefinementSearch::steps_of(long refinement) const {
   steps.refinement = refinement;
   if (report_.adaptive) {
     steps.integrator.step = eps_step_;
-    steps.variable = {.eps = first_ / static_cast<double>(refinement),
+    steps.variable = {.eps = eps_of(refinement),
                       .control = motion_.options.control,
                       .monitor = motion_.options.monitor,
                       .scales = motion_.scales,
@@ -73,6 +74,12 @@ ErrorControlReport::Steps RefinementSearch::steps_of(long refinement) const {
     steps.integrator.step = plan_.first_step(refinement);
   }
   return steps;
+}
+
+/// Radians fall like the refinement; a local error falls so that the sizes of the steps do.
+double RefinementSearch::eps_of(long refinement) const {
+  const double fine = first_ / static_cast<double>(refinement);
+  return local_ ? std::pow(fine, report_.order + 1) : fine;
 }
 
 bool RefinementSearch::reached_end(double t) const {
@@ -180,7 +187,7 @@ RefinementSearch::Outcome RefinementSearch::run(long refinement) {
   if (!first)
     now.difference = std::max(relative_change(end.q, report_.end.q, largest_position_),
                               relative_change(end.p, report_.end.p, largest_momentum_));
-  convergence_.add(now.step, now.difference);
+  convergence_.add(local_ ? first_ / static_cast<double>(refinement) : now.step, now.difference);
   now.estimate = std::max(convergence_.estimate(), round_off_of(work.steps));
   now.observed_order = convergence_.observed_order();
   report_.end = std::move(end);
@@ -262,6 +269,7 @@ std::vector<PathPoint> RefinementSearch::path_of(long refinement) {
 /// search is refused.
 bool RefinementSearch::survey(bool accepted) {
   surveyed_ = true;
+  if (local_) return true;  // such steps are short where the forces change fast
   // A coarse run shows the way; after a division a fine one, for the place of a kink depends on the motion.
   const long way = divisions_ == 0 ? first_good_ : refinement_;
   const std::vector<PathPoint> path = path_of(way);

@@ -37,6 +37,7 @@ class RefinementSearch {
   bool next(long max_solves);
   Outcome run(long refinement);
   ErrorControlReport::Steps steps_of(long refinement) const;
+  double eps_of(long refinement) const;
   void count(ErrorControlRun& now, const Work& work);
   bool time_is_up() const;
   bool reached_end(double t) const;
@@ -51,6 +52,7 @@ class RefinementSearch {
   ErrorControlReport& report_;
   Convergence convergence_;
   StepPlan plan_;
+  bool local_;  ///< variable steps by their local error
   double first_;
   double eps_step_ = 0.0;  ///< of the options of variable steps, with its sign
   long refinement_ = 1, last_steps_ = 0, last_refinement_ = 1, first_good_ = 0;

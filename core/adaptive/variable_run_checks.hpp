@@ -18,7 +18,7 @@ class VariableRunChecks {
   VariableRunChecks(AdaptiveIntegrator& integrator, Integrator side)
       : integrator_(integrator),
         side_(std::move(side)),
-        energy_(integrator.integrator().scene()),
+        energy_(integrator.integrator().scene(), integrator.integrator().method().damped),
         nodes_(integrator.integrator().scene(), 0),
         comparison_(integrator.integrator().scene()),
         kinks_(integrator.integrator(),

@@ -60,6 +60,7 @@ class Integrator {
   const Work& work() const { return work_; }
   const Scene& scene() const { return *scene_; }
   const IntegratorOptions& options() const { return options_; }
+  const MethodInfo& method() const { return method_.info; }
 
   /// Reads the current point.  Stepping goes on as if nothing was read, bit by bit; the work is not counted.
   /// `minus` solves the next step, its first stage where it is composed, on a copy: it takes as long again.

@@ -31,19 +31,28 @@ std::vector<PlanLine> Integrator::plan() const {
   } else {
     const ConstraintRule rule = options_.constraint_rule.value_or(method_.info.constraint_rule);
     lines.push_back({"multipliers", std::to_string(m) + (method_.info.rows_inside ? " a node" : ""),
-                     method_.info.rows_inside
+                     method_.info.damped ? "all rows, and the rates of holonomic rows, at the Radau nodes"
+                     : method_.info.rows_inside
                          ? "nonholonomic rows at the Gauss, holonomic rows at the Lobatto nodes"
                          : std::string("nonholonomic rows by the ") + rule.description() +
                                " rule, holonomic rows at the end of the step"});
-    lines.push_back(
-        {"projection", "where the state is read", "p is defined up to the annihilator between steps"});
+    if (method_.info.damped)
+      lines.push_back({"projection", "left out", "a step ends on all rows, with the momentum of a velocity"});
+    else
+      lines.push_back(
+          {"projection", "where the state is read", "p is defined up to the annihilator between steps"});
   }
   lines.push_back({"composition",
                    sequence_->stages() == 1 ? "left out" : std::to_string(sequence_->stages()) + " stages",
                    "order " + std::to_string(options_.order) + ", the method's own is " +
                        std::to_string(method_.info.order)});
-  lines.push_back({"forces", scene_->force ? "two impulses a step" : "left out",
-                   scene_->force ? "by the rule of the rows" : "the scene has none"});
+  lines.push_back({"forces",
+                   !scene_->force        ? "left out"
+                   : method_.info.damped ? "at the Radau nodes"
+                                         : "two impulses a step",
+                   !scene_->force        ? "the scene has none"
+                   : method_.info.damped ? "with those of L"
+                                         : "by the rule of the rows"});
   lines.push_back(
       {"Hamiltonian", scene_->hamiltonian ? "given" : "derived only by methods that need it", ""});
   return lines;

@@ -31,6 +31,9 @@ std::function<std::unique_ptr<StepProblem>()> part(const std::shared_ptr<const S
 }
 
 std::vector<std::pair<double, std::size_t>> composed(const MethodInfo& info, int order) {
+  if (info.damped)
+    throw Misuse("method '" + info.name + "' of order " + std::to_string(info.order) +
+                 " is not composed; damped/radau:S has order 2S − 1, S = 1 … 5");
   const int own = info.self_adjoint ? info.order : info.order + info.order % 2;
   const auto fractions = composition_fractions(!info.self_adjoint && order == own ? 2 : order);
   if (order < own || order == info.order)

@@ -46,6 +46,21 @@ struct Work {
   long jacobian_evaluations = 0;
   Retries retries;
 
+  /// Adds the work of another integrator, whose steps count as well.
+  void add(const Work& other) {
+    steps += other.steps;
+    solves += other.solves;
+    iterations += other.iterations;
+    residual_evaluations += other.residual_evaluations;
+    jacobian_evaluations += other.jacobian_evaluations;
+    retries.line_searches += other.retries.line_searches;
+    retries.plain_guesses += other.retries.plain_guesses;
+    retries.previous_solutions += other.retries.previous_solutions;
+    retries.continuations += other.retries.continuations;
+    retries.other_branches += other.retries.other_branches;
+    retries.divided_steps += other.retries.divided_steps;
+  }
+
   void count(const SolveReport& report, long new_solves = 1) {
     solves += new_solves;
     retries.line_searches += report.line_searches;

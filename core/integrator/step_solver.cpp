@@ -27,6 +27,7 @@ StepSolver::StepSolver(std::unique_ptr<StepProblem> problem, const SolverFactory
   const StepTraits traits = problem_->traits();
   memory_.scales.setZero(traits.scales);
   memory_.multipliers.setZero(traits.multipliers);
+  damped_ = traits.damped;
   if (problem_->size() == 0) return;
   solver_ = solvers(*problem_);
   continuation_ = std::make_unique<StepContinuation>(*problem_, *solver_);
@@ -77,7 +78,7 @@ SolveReport StepSolver::find(const Task& task, Vector& x, Work& work) {
 /// Whether a solution may be another than the one smaller steps lead to: the first one of a run where it does
 /// not tend to the start as the step is halved, and any that Newton's method found far from its guess.
 bool StepSolver::doubtful(const Task& task, const Vector& x, const SolveReport& report, Work& work) {
-  if (affine()) return false;
+  if (affine() || damped_) return false;
   if (task.first) {
     start_velocity_ = task.start.v;
     if (!reader_->velocity(task.step.start, task.start.q, task.start.p, start_velocity_).ok()) return true;
@@ -106,6 +107,7 @@ SolveReport StepSolver::rescue(const Task& task, Guess guess, Vector& x, SolveRe
     x = task.predictor.last();
     (void)attempt(x, total, work);
   }
+  if (damped_ && total.ok()) return total;
   return follow(task, x, total, work);
 }
 
@@ -145,7 +147,7 @@ StepSolver::Turn StepSolver::turn(const Vector& v0) const {
 /// On a scene with rows a solution that turns sharply, far from where it was predicted, is solved again from
 /// the guess along the last velocity; that solution is taken where it is another one that turns less.
 void StepSolver::prefer_smaller_turn(const Task& task, Vector& x, SolveReport& total, Work& work) {
-  if (!solver_ || end_.impulse.size() == 0) return;
+  if (!solver_ || damped_ || end_.impulse.size() == 0) return;
   const Turn found = turn(task.start.v);
   if (!(found.size > sharp_turn * found.speed) || affine()) return;
   if (continuation_->distance(x, guess_) <= far_from_guess) return;  // expected

@@ -73,6 +73,7 @@ class StepSolver {
   PointReader* reader_;
   StepMemory memory_;
   StepEnd end_;
+  bool damped_;  ///< see StepTraits
   double reached_ = 1.0;
   Vector guess_, start_velocity_;
 };

@@ -5,6 +5,8 @@
 #include <diracstep/core/steps/gauss_lobatto/phase_space_step.hpp>
 #include <diracstep/core/steps/gauss_lobatto/step.hpp>
 #include <diracstep/core/steps/gauss_lobatto/tableau.hpp>
+#include <diracstep/core/steps/radau/step.hpp>
+#include <diracstep/core/steps/radau/tableau.hpp>
 #include <utility>
 
 namespace diracstep {
@@ -71,6 +73,27 @@ Method gauss_lobatto_method(GeneratingType type, int s) {
                          : "the same step as type1/gl:" + stages + ", solved for its stage velocities"};
   return {std::move(info), gauss_lobatto_factory(name, s),
           [s, type](const Scene& scene) { return gauss_lobatto_function(type, s, scene.lagrangian); }};
+}
+
+Method radau_method(int s) {
+  radau_tableau(s);  // throws for a number of stages that is not allowed
+  const std::string stages = std::to_string(s), name = "damped/radau:" + stages;
+  MethodInfo info{.name = name,
+                  .type = std::nullopt,
+                  .order = 2 * s - 1,
+                  .self_adjoint = false,
+                  .constraint_rule = StepRule::right,
+                  .summary = "Radau IIA, " + stages + (s == 1 ? " stage" : " stages") +
+                             "; damps what is too fast, no generating function",
+                  .damped = true,
+                  .rows_inside = true,
+                  .solved_as = "solved for its stage velocities"};
+  const auto make_step = [name, s](const Scene& scene, const StepChoices& choices) {
+    if (choices.rule)
+      throw Misuse("method '" + name + "' has its own nodes for the constraint; no other rule applies");
+    return radau_step(s, scene, choices.dense);
+  };
+  return {std::move(info), make_step};
 }
 
 Method midpoint_method() {

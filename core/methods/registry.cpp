@@ -6,6 +6,7 @@
 #include <diracstep/core/methods/registry.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/numerics/near_names.hpp>
+#include <diracstep/core/steps/radau/tableau.hpp>
 #include <optional>
 #include <utility>
 
@@ -60,6 +61,17 @@ std::optional<Method> read_gauss_lobatto(std::string_view name) {
   return gauss_lobatto_method(static_cast<GeneratingType>(*type), std::stoi(std::string(name)));
 }
 
+constexpr std::string_view radau_prefix = "damped/radau:";
+
+/// "damped/radau:S".
+std::optional<Method> read_radau(std::string_view name) {
+  if (!name.starts_with(radau_prefix)) return std::nullopt;
+  name.remove_prefix(radau_prefix.size());
+  if (name.empty() || name.size() > 4 || name.find_first_not_of("0123456789") != name.npos)
+    return std::nullopt;
+  return radau_method(std::stoi(std::string(name)));
+}
+
 }  // namespace
 
 Registry Registry::with_built_ins() {
@@ -78,7 +90,9 @@ Registry Registry::with_built_ins() {
 }
 
 void Registry::add(Method method) {
-  const std::string name = method.info.name, prefix = prefix_of(method.info.type);
+  const std::string name = method.info.name;
+  if (!method.info.type) throw Misuse("method '" + name + "' has no type of a generating function");
+  const std::string prefix = prefix_of(*method.info.type);
   const bool well_formed = name.starts_with(prefix) && name.size() > prefix.size() &&
                            name.find_first_not_of(letters, prefix.size()) == name.npos;
   if (!well_formed) throw Misuse("method name '" + name + "' is not of the form " + prefix + "construction");
@@ -99,6 +113,7 @@ Method Registry::method(const std::string& name) const {
   const auto found = methods_.find(name);
   if (found != methods_.end()) return found->second;
   if (auto gauss_lobatto = read_gauss_lobatto(name)) return *std::move(gauss_lobatto);
+  if (auto radau = read_radau(name)) return *std::move(radau);
   return transformed(name);
 }
 
@@ -125,9 +140,11 @@ Method Registry::transformed(const std::string& name) const {
     const std::vector<std::string> known = names();
     std::string message = "unknown method '" + name + "'" + did_you_mean(name, known) + "; the methods are";
     for (const std::string& each : known) message += " " + each;
-    throw Misuse(message + " typeN/gl:S typeN/adjoint(...)");
+    throw Misuse(message + " typeN/gl:S typeN/adjoint(...) damped/radau:S");
   }
   const Method inner = method(transform.inner);
+  if (inner.info.damped)
+    throw Misuse("'" + name + "': " + transform.inner + " has no generating function to transform");
   if (!inner.generating_function || inner.info.rows_inside)
     throw Misuse(
         "'" + name + "': " + transform.inner +
@@ -147,9 +164,9 @@ Method Registry::transformed(const std::string& name) const {
       return legendre(type, s(scene));
     });
   }
-  if (transform.type != adjoint_type(inner.info.type))
-    throw Misuse("'" + name + "': the adjoint is of another type; use " +
-                 prefix_of(adjoint_type(inner.info.type)) + "adjoint(" + transform.inner + ")");
+  if (const GeneratingType type = adjoint_type(*inner.info.type); transform.type != type)
+    throw Misuse("'" + name + "': the adjoint is of another type; use " + prefix_of(type) + "adjoint(" +
+                 transform.inner + ")");
   info.summary = "adjoint of " + transform.inner;
   info.constraint_rule = mirrored(inner.info.constraint_rule);
   return method_of(info, [s = inner.generating_function](const Scene& scene) { return adjoint(s(scene)); });
@@ -158,7 +175,8 @@ Method Registry::transformed(const std::string& name) const {
 Method Registry::adjoint_of(const Method& original) const {
   if (original.info.self_adjoint) return original;
   if (!original.info.adjoint.empty()) return method(original.info.adjoint);
-  return method(prefix_of(adjoint_type(original.info.type)) + "adjoint(" + original.info.name + ")");
+  if (!original.info.type) throw Misuse("method '" + original.info.name + "' has no adjoint");
+  return method(prefix_of(adjoint_type(*original.info.type)) + "adjoint(" + original.info.name + ")");
 }
 
 std::vector<std::string> Registry::names() const {
@@ -170,6 +188,7 @@ std::vector<std::string> Registry::names() const {
         names.push_back(std::string(type) + "/legendre(" + name + ")");
   for (const char* type : {"type1", "type2", "type3"})
     for (const char* stages : {"1", "2", "3", "4"}) names.push_back(std::string(type) + "/gl:" + stages);
+  for (int s = 1; s <= most_radau_stages; ++s) names.push_back(std::string(radau_prefix) + std::to_string(s));
   return names;
 }
 

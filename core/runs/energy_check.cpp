@@ -18,9 +18,10 @@ bool keeps_energy(const Scene& scene) {
          std::ranges::all_of(scene.constraints, [](const auto& rows) { return rows->workless(); });
 }
 
-EnergyCheck::EnergyCheck(const Scene& scene)
+EnergyCheck::EnergyCheck(const Scene& scene, bool damped)
     : scene_(scene),
       keeps_energy_(keeps_energy(scene)),
+      damped_(damped),
       rest_(scene),
       force_(Vector::Zero(scene.dimension())),
       momentum_(force_) {}
@@ -40,6 +41,7 @@ void EnergyCheck::see(const Sample& point) {
   if (std::isfinite(point.energy) && way <= at_rest * max_norm(start_position_)) return;
   add_at_play(point);
   double change = std::abs(point.energy - start_energy_);
+  if (damped_ && point.energy < start_energy_) change = 0.0;
   if (!std::isfinite(change)) change = HUGE_VAL;
   if (change > worst_change_) {
     worst_change_ = change;

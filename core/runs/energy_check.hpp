@@ -27,8 +27,9 @@ bool keeps_energy(const Scene& scene);
 /// kept on a wrong path.
 class EnergyCheck {
  public:
-  /// The scene, one with a Lagrangian, must outlive this.
-  explicit EnergyCheck(const Scene& scene);
+  /// The scene, one with a Lagrangian, must outlive this.  Where the method damps what is too fast for its
+  /// steps, energy that is lost is no doubt.
+  explicit EnergyCheck(const Scene& scene, bool damped = false);
 
   void see(const Sample& point);
 
@@ -50,7 +51,7 @@ class EnergyCheck {
   double mean_at_play() const { return sum_at_play_ / static_cast<double>(points_); }
 
   const Scene& scene_;
-  bool keeps_energy_;
+  bool keeps_energy_, damped_;
   RestSizes rest_;
   Vector force_, momentum_;
   Vector start_position_;  ///< empty before the first point

@@ -26,7 +26,7 @@ class RunChecks {
   /// For the next so many steps.  The integrator's scene must outlive this.
   RunChecks(const Integrator& integrator, long steps)
       : scene_(integrator.scene()),
-        energy_(integrator.scene()),
+        energy_(integrator.scene(), integrator.method().damped),
         step_(integrator, steps),
         nodes_(integrator.scene(), steps),
         branch_(integrator),

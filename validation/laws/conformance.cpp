@@ -93,7 +93,8 @@ OrderScene degenerate_order_scene() {
 }
 
 bool takes(const Method& method, const OrderScene& scene) {
-  if (scene.scene->lagrangian->structure().y_hessian_zero) return method.info.stages > 0;
+  if (scene.scene->lagrangian->structure().y_hessian_zero)
+    return method.info.stages > 0 || method.info.damped;
   return !(scene.scene->force && method.info.type == GeneratingType::four);
 }
 

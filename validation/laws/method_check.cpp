@@ -26,6 +26,7 @@ using namespace checks;
 constexpr double order_tolerance = 0.2;  // as in the order table
 
 Check check_symplecticity(const Subject& subject) {
+  if (subject.method.info.damped) return not_applicable("not claimed: the method damps");
   const double defect = symplecticity_defect(subject.registry, laws::unconstrained(), subject.stepping());
   return at_most(defect, 1e-8, "largest entry of MᵀΩM − Ω, h = 0.05");
 }
@@ -47,7 +48,8 @@ Check check_consistency(const Subject& subject) {
 Check check_order(const Subject& subject, const OrderScene& scene) {
   const MethodInfo& info = subject.method.info;
   if (!takes(subject.method, scene))
-    return not_applicable(scene.scene->force ? "type 4 takes no forces" : "only the Gauss-Lobatto family");
+    return not_applicable(scene.scene->force ? "type 4 takes no forces"
+                                             : "only the Gauss-Lobatto and the damping family");
   const int claimed = claimed_order(info, *scene.scene);
   const OrderMeasurement measured = measure_order(subject.registry, scene, subject.stepping());
   if (claimed > highest_visible_order && (measured.failure.empty() || measured.in_round_off))

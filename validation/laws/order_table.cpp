@@ -57,7 +57,7 @@ OrderTableRow measure_row(const Registry& registry, const TableMethod& method,
   const bool symmetric = info.self_adjoint || composed;
   row.reversal_defect = symmetric ? reversal_defect(registry, laws::mixed(), options) : std::nan("");
   row.symplecticity_defect =
-      composed ? std::nan("") : symplecticity_defect(registry, laws::unconstrained(), options);
+      composed || info.damped ? std::nan("") : symplecticity_defect(registry, laws::unconstrained(), options);
   if (composed) row.membership_residual = std::nan("");
   return row;
 }

@@ -74,7 +74,7 @@ std::vector<CircuitRow> measure_circuit(const Registry& registry) {
     const MethodInfo info = registry.method(method.name).info;
     const bool duplicate = method.name.starts_with("type2/gl") || method.name.starts_with("type3/gl");
     const bool from_lagrangian =
-        info.type == GeneratingType::one || method.name.find("legendre") != std::string::npos;
+        !info.type || info.type == GeneratingType::one || method.name.find("legendre") != std::string::npos;
     if (duplicate || !from_lagrangian) continue;
     const IntegratorOptions options{.method = method.name, .order = method.order};
     rows.push_back({method.name, method.order, measure_order(registry, scene, options)});

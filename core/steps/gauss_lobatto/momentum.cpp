@@ -35,7 +35,7 @@ void StageMomentum::plan(BlockPattern& layout) const {
     for (int k = 0; k < s_; ++k) layout.add(force_->pattern(), n_ * i, n_ * k);
 }
 
-void StageMomentum::evaluate(const StagePoints& at, ConstVectorRef x) {
+void StageMomentum::evaluate(const NodePoints& at, ConstVectorRef x) {
   lagrangian_->gradients(at.at_gauss(x.data()), lq_.data(), lv_.data());
   for (int i = 0; force_ && i < s_; ++i) {
     force_->value(at.gauss_time(i), at.gauss.col(i), x.segment(n_ * i, n_), f_);
@@ -43,7 +43,7 @@ void StageMomentum::evaluate(const StagePoints& at, ConstVectorRef x) {
   }
 }
 
-bool StageMomentum::second_derivatives(const StagePoints& at, ConstVectorRef x) {
+bool StageMomentum::second_derivatives(const NodePoints& at, ConstVectorRef x) {
   const bool taken = !hessians_known_;
   if (taken) lagrangian_->hessians(at.at_gauss(x.data()), lqq_.data(), lqv_.data(), lvv_.data());
   for (int i = 0; force_ && i < s_; ++i)
@@ -55,13 +55,14 @@ bool StageMomentum::second_derivatives(const StagePoints& at, ConstVectorRef x) 
 /// Those of a quadratic L are kept for good, where they are numbers.
 bool StageMomentum::all_finite() const { return lqq_.allFinite() && lqv_.allFinite() && lvv_.allFinite(); }
 
-void StageMomentum::second_derivatives(const StagePoints& at, ConstVectorRef x, int stage) {
+void StageMomentum::second_derivatives(const NodePoints& at, ConstVectorRef x, int stage) {
   lagrangian_->hessian(at.gauss_time(stage), at.gauss.col(stage), x.segment(n_ * stage, n_), lqq_.col(stage),
                        lqv_.col(stage), lvv_.col(stage));
 }
 
 /// Of a quadratic L the values are those of the last Jacobian with this step size.
-void StageMomentum::set_jacobian(const StagePoints& at, const BlockPattern& layout, VectorRef& values) {
+void StageMomentum::set_jacobian(const NodePoints& at, const NodeWeights& weights, const BlockPattern& layout,
+                                 VectorRef& values) {
   if (same_jacobian_ && jacobian_step_ == at.step.size) {
     values = jacobian_;
     return;
@@ -69,8 +70,8 @@ void StageMomentum::set_jacobian(const StagePoints& at, const BlockPattern& layo
   values.setZero();
   for (int i = 0; i < s_; ++i)
     for (int k = 0; k < s_; ++k) {
-      add_block(at, layout, i, k, values);
-      if (force_) add_force_block(at, layout, i, k, values);
+      add_block(weights, layout, i, k, values);
+      if (force_) add_force_block(weights, layout, i, k, values);
     }
   if (!same_jacobian_ || !hessians_known_) return;
   jacobian_ = values;
@@ -86,15 +87,14 @@ void StageMomentum::place(StageArrays& arrays) {
   arrays.lvv = lvv_.data();
 }
 
-bool StageMomentum::jacobian_known(const StagePoints& at) {
+bool StageMomentum::jacobian_known(const NodePoints& at) {
   const bool known = hessians_known_ && jacobian_step_ == at.step.size;
   jacobian_step_ = hessians_known_ ? at.step.size : 0.0;
   return known;
 }
 
-void StageMomentum::add_block(const StagePoints& at, const BlockPattern& layout, int i, int k,
+void StageMomentum::add_block(const NodeWeights& weights, const BlockPattern& layout, int i, int k,
                               VectorRef& values) {
-  const StageWeights& weights = at.weights;
   const auto size = static_cast<int>(lvv_.rows());
   double* const block = separable_ ? lqv_.data() : block_.data();  // nobody looks at a ∂²L/∂q∂v of zero
   combine(size, s_, &weights.stiffness(0, i * s_ + k), lqq_.data(), nullptr, block);
@@ -107,18 +107,15 @@ void StageMomentum::add_block(const StagePoints& at, const BlockPattern& layout,
   layout.add_to(values.data(), i * s_ + k, 1.0, block);
 }
 
-void StageMomentum::add_force_block(const StagePoints& at, const BlockPattern& layout, int i, int k,
+void StageMomentum::add_force_block(const NodeWeights& weights, const BlockPattern& layout, int i, int k,
                                     VectorRef& values) {
-  const StageWeights& weights = at.weights;
   combine(static_cast<int>(force_block_.size()), s_, &weights.stiffness(0, i * s_ + k), fq_.data(), nullptr,
           force_block_.data());
   force_block_ += weights.force(k, i) * fv_.col(k);
   layout.add_to(values.data(), s_ * s_ + i * s_ + k, 1.0, force_block_.data());
 }
 
-void StageMomentum::evaluate_start(const StagePoints& at, ConstVectorRef v0) {
-  const double t = at.step.start;
-  const auto q0 = at.lobatto.col(0);
+void StageMomentum::evaluate_start(double t, ConstVectorRef q0, ConstVectorRef v0) {
   lagrangian_->gradient(t, q0, v0, lq_.col(0), lv_.col(0));
   lagrangian_->hessian(t, q0, v0, lqq_.col(0), lqv_.col(0), lvv_.col(0));
   if (!force_) return;
@@ -126,7 +123,7 @@ void StageMomentum::evaluate_start(const StagePoints& at, ConstVectorRef v0) {
   lq_.col(0) += f_;
 }
 
-void StageMomentum::prepare_sizes(const StagePoints& at, ConstVectorRef x) {
+void StageMomentum::prepare_sizes(const NodePoints& at, ConstVectorRef x) {
   if (!hessians_known_) second_derivatives(at, x, 0);
   if (force_) force_->derivatives(at.gauss_time(0), at.gauss.col(0), x.head(n_), fq_.col(0), fv_.col(0));
 }

@@ -9,8 +9,8 @@
 
 namespace diracstep {
 
-/// L and the force in the step GL(s): ∂L/∂q + f and ∂L/∂v at the Gauss nodes, and their part of the rows of
-/// the momentum in its Jacobian,
+/// L and the force in a collocation step, GL(s) above all: ∂L/∂q + f and ∂L/∂v at its nodes, and their part
+/// of the rows of the momentum in its Jacobian,
 ///
 ///   −h² Σ_j â_ij a_jk ∂²L/∂q²_j − h â_ik ∂²L/∂q∂v_k + h a_ik ∂²L/∂v∂q_i + δ_ik ∂²L/∂v²_i
 ///
@@ -24,39 +24,43 @@ class StageMomentum {
   /// Adds the blocks of the Jacobian to its layout, as its first ones.
   void plan(BlockPattern& layout) const;
 
-  /// ∂L/∂q + f and ∂L/∂v at the Gauss points, with the stage velocities in x.
-  void evaluate(const StagePoints& at, ConstVectorRef x);
+  /// ∂L/∂q + f and ∂L/∂v at the nodes, with the stage velocities in x.
+  void evaluate(const NodePoints& at, ConstVectorRef x);
   const Columns& forces() const { return lq_; }
   const Columns& momenta() const { return lv_; }
 
   /// values = their part of the Jacobian; after second_derivatives() at the same x.
-  void set_jacobian(const StagePoints& at, const BlockPattern& layout, VectorRef& values);
-  /// Those of L and of the force at the Gauss points; false where those of L, a quadratic one, are known.
-  bool second_derivatives(const StagePoints& at, ConstVectorRef x);
-  /// Those of L at one Gauss point alone.
-  void second_derivatives(const StagePoints& at, ConstVectorRef x, int stage);
+  void set_jacobian(const NodePoints& at, const NodeWeights& weights, const BlockPattern& layout,
+                    VectorRef& values);
+  /// Those of L and of the force at the nodes; false where those of L, a quadratic one, are known.
+  bool second_derivatives(const NodePoints& at, ConstVectorRef x);
+  /// Those of L at one node alone.
+  void second_derivatives(const NodePoints& at, ConstVectorRef x, int stage);
   const Columns& curvatures() const { return lqq_; }                         ///< ∂²L/∂q², values
+  const Columns& mixed() const { return lqv_; }                              ///< ∂²L/∂q∂v, values
+  const Columns& force_gradients() const { return fq_; }                     ///< ∂f/∂q, values
   const SparsityPattern& pattern() const { return lagrangian_->pattern(); }  ///< of second derivatives
   auto mass(int stage) const { return lvv_.col(stage); }                     ///< ∂²L/∂v², values
 
   /// Where its derivatives stand.
   void place(StageArrays& arrays);
   /// Whether the part of L in the Jacobian is the one of the last Jacobian.
-  bool jacobian_known(const StagePoints& at);
+  bool jacobian_known(const NodePoints& at);
 
   /// ∂L/∂q + f and ∂²L/∂q² at the start of the step in place of the first node, to know their size.
-  void evaluate_start(const StagePoints& at, ConstVectorRef v0);
+  void evaluate_start(double t, ConstVectorRef q0, ConstVectorRef v0);
 
   /// The second derivatives at the first node, as they are needed for add_sizes().
-  void prepare_sizes(const StagePoints& at, ConstVectorRef x);
+  void prepare_sizes(const NodePoints& at, ConstVectorRef x);
   /// sizes += those of the terms that make up ∂L/∂v and h (∂L/∂q + f) and may cancel in them, coordinate by
   /// coordinate, for positions q and velocities v: second derivatives times these.
   void add_sizes(double h, const Vector& q, const Vector& v, Vector& sizes) const;
 
  private:
   bool all_finite() const;
-  void add_block(const StagePoints& at, const BlockPattern& layout, int i, int k, VectorRef& values);
-  void add_force_block(const StagePoints& at, const BlockPattern& layout, int i, int k, VectorRef& values);
+  void add_block(const NodeWeights& weights, const BlockPattern& layout, int i, int k, VectorRef& values);
+  void add_force_block(const NodeWeights& weights, const BlockPattern& layout, int i, int k,
+                       VectorRef& values);
 
   std::shared_ptr<const Lagrangian> lagrangian_;
   std::shared_ptr<const Force> force_;

@@ -143,7 +143,7 @@ class GaussLobattoStep final : public StepProblem {
       for (StageRows& rows : rows_) rows.second_derivatives(points_, x);
       fixed_->jacobian(momentum_.jacobian_known(points_), values.data());
     } else {
-      momentum_.set_jacobian(points_, layout_, values);
+      momentum_.set_jacobian(points_, points_.weights, layout_, values);
       for (StageRows& rows : rows_) rows.add_to_jacobian(points_, layout_, x, values);
     }
     sizes_.row_curvature = 0.0;
@@ -249,7 +249,7 @@ class GaussLobattoStep final : public StepProblem {
 
   /// Before the first solve: the derivatives at the start, for the round-off scales.
   void sample_start(ConstVectorRef v0) {
-    momentum_.evaluate_start(points_, v0);
+    momentum_.evaluate_start(points_.step.start, points_.lobatto.col(0), v0);
     const double before = blocks_[0].scale;  // of impulses nothing is known yet
     sizes_.force = largest_entry(momentum_.forces().data(), n_);
     sizes_.curvature = largest_entry(momentum_.curvatures().data(), momentum_.curvatures().rows());

@@ -32,11 +32,15 @@ class LawsOfTransforms : public DiracLaws {};
 class LawsOfTypesOneToThree : public DiracLaws {};  ///< no structure, principle or force is stated for type 4
 class LawsOfOrderOne : public DiracLaws {};
 
+/// All but the damping family, which has no generating function; its laws are in steps/radau_test.cpp.
 template <class Condition>
 std::vector<std::string> methods_where(Condition holds) {
   std::vector<std::string> names = testing::every_method();
   const Registry registry = Registry::with_built_ins();
-  std::erase_if(names, [&](const std::string& name) { return !holds(registry.method(name).info); });
+  std::erase_if(names, [&](const std::string& name) {
+    const MethodInfo info = registry.method(name).info;
+    return info.damped || !holds(info);
+  });
   return names;
 }
 
@@ -281,7 +285,8 @@ TEST_P(DiracLaws, HolonomicRowsDoNotDrift) {
 }
 
 const auto by_name = [](const auto& test) { return testing::test_name(test.param); };
-INSTANTIATE_TEST_SUITE_P(EveryMethod, DiracLaws, ::testing::ValuesIn(testing::every_method()), by_name);
+INSTANTIATE_TEST_SUITE_P(EveryMethod, DiracLaws,
+                         ::testing::ValuesIn(methods_where([](const auto&) { return true; })), by_name);
 INSTANTIATE_TEST_SUITE_P(EveryTransform, LawsOfTransforms,
                          ::testing::ValuesIn(methods_where([](const auto& m) {
                            return m.name.find("legendre") != std::string::npos;

@@ -1,0 +1,158 @@
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <diracstep/core/adaptive/damping_survey.hpp>
+#include <diracstep/core/adaptive/pointwise_motion.hpp>
+#include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/numerics/scales.hpp>
+
+namespace diracstep {
+
+namespace {
+
+constexpr const char* surveying_method = "damped/radau:3";
+constexpr double surveying_error = 1e-3;
+constexpr long damping_steps = 150;
+constexpr int most_coordinates = 60;
+constexpr double damping_probe = 1e-6;  // in units of the sizes
+constexpr double least_size = 1e-6;     // of the largest position or velocity
+constexpr double parts_of_the_motion = 50.0;
+constexpr double smallest_error = 1e-9;
+
+/// The motion linearised about its points.
+class LinearisedMotion {
+ public:
+  LinearisedMotion(const Scene& scene, const SolverFactory& solvers)
+      : scene_(scene), n_(scene.dimension()), motion_(scene, solvers), sizes_(Vector::Zero(2 * n_)) {}
+
+  /// The largest decay rate at a point; NaN where there is no acceleration.
+  double decay_rate(const Sample& at) {
+    const Vector here = state(at);
+    sizes_ = sizes_.cwiseMax(here.cwiseAbs());
+    take_units();
+    const Columns basis = tangent_space(at);
+    double largest = 0.0;
+    for (const double side : {damping_probe, -damping_probe}) {
+      Columns image(2 * n_, basis.cols());
+      for (Eigen::Index k = 0; k < basis.cols(); ++k) image.col(k) = change(at, here, basis.col(k), side);
+      if (!image.allFinite()) return std::nan("");
+      const Eigen::EigenSolver<Columns> solver(basis.transpose() * image, false);
+      if (solver.info() != Eigen::Success) return std::nan("");
+      for (const auto& value : solver.eigenvalues()) largest = std::max(largest, -value.real());
+    }
+    return largest;
+  }
+
+ private:
+  Vector state(const Sample& at) const {
+    Vector both(2 * n_);
+    both << at.q, at.v;
+    return both;
+  }
+
+  /// What counts as large in a coordinate and its velocity.
+  void take_units() {
+    units_ = sizes_;
+    const auto raise = [](auto part) {
+      const double largest = max_norm(part);
+      part = part.cwiseMax(largest > 0.0 ? least_size * largest : 1.0);
+    };
+    raise(units_.head(n_));
+    raise(units_.tail(n_));
+  }
+
+  /// A basis of the (δq, δv) that keep φ = 0 and A v + b = 0, in units and orthonormal.
+  Columns tangent_space(const Sample& at) const {
+    const int m = scene_.rows();
+    if (m == 0) return Columns::Identity(2 * n_, 2 * n_);
+    ConstraintsAtPoint rows(scene_.constraints, n_), positions(only_holonomic(scene_.constraints), n_);
+    rows.evaluate(at.time, at.q);
+    Vector by_position(rows.pattern().nonzeros());
+    rows.distribution().derivative(at.time, at.q, at.v, 1.0, by_position);
+    Columns all = Columns::Zero(m + positions.rows(), 2 * n_);
+    all.topLeftCorner(m, n_) = rows.pattern().full(by_position);
+    all.topRightCorner(m, n_) = rows.pattern().full(rows.coefficients());
+    if (positions.rows() > 0) {
+      positions.evaluate(at.time, at.q);
+      all.bottomLeftCorner(positions.rows(), n_) = positions.pattern().full(positions.coefficients());
+    }
+    all = all * units_.asDiagonal();
+    for (Eigen::Index r = 0; r < all.rows(); ++r) all.row(r) /= size_or_one(max_norm(all.row(r).transpose()));
+    const Columns kernel = Eigen::FullPivLU<Columns>(all).kernel();
+    return Eigen::HouseholderQR<Columns>(kernel).householderQ() *
+           Columns::Identity(kernel.rows(), kernel.cols());
+  }
+
+  /// (δv, δa)/side in units, for (δq, δv) = side · direction.
+  Vector change(const Sample& at, const Vector& here, const Vector& direction, double side) {
+    const Vector there = here + side * direction.cwiseProduct(units_);
+    Vector a0(n_), a1(n_), result(2 * n_);
+    const bool ok = motion_.acceleration(at.time, here.head(n_), here.tail(n_), a0).ok() &&
+                    motion_.acceleration(at.time, there.head(n_), there.tail(n_), a1).ok();
+    if (!ok) return Vector::Constant(2 * n_, std::nan(""));
+    result << there.tail(n_) - here.tail(n_), a1 - a0;
+    return result.cwiseQuotient(units_) / side;
+  }
+
+  const Scene& scene_;
+  Eigen::Index n_;
+  PointwiseMotion motion_;
+  Vector sizes_, units_;
+};
+
+}  // namespace
+
+DampingSurvey survey_damping(const std::shared_ptr<const Scene>& scene, const Registry& registry,
+                             const SolverFactory& solvers, double end, double step,
+                             const IntegratorOptions& given) {
+  DampingSurvey survey;
+  if (!scene->force) survey.failure = "the scene has no force";
+  if (scene->dimension() > most_coordinates)
+    survey.failure = "more than " + std::to_string(most_coordinates) + " coordinates";
+  if (scene->lagrangian && scene->lagrangian->structure().phase_space()) survey.failure = "L is linear in v";
+  if (!survey.failure.empty()) return survey;
+  const double start = scene->start.time, span = std::abs(end - start);
+  const double longest = step > 0.0 ? step : span / parts_of_the_motion;
+  IntegratorOptions options = given;
+  options.method = surveying_method;
+  options.order = 0;
+  options.step = std::copysign(longest, end - start);
+  AdaptiveIntegrator integrator(scene, registry, solvers, options, {.eps = surveying_error, .end = end});
+  LinearisedMotion motion(integrator.integrator().scene(), solvers);
+  Sample node;
+  for (long k = 0; k < damping_steps && std::abs(integrator.time() - start) < span; ++k) {
+    if (!integrator.sample(Momentum::projected, node).ok()) break;
+    const double rate = motion.decay_rate(node);
+    const double h = std::min(std::abs(integrator.next_size()), longest);
+    survey.covered = std::abs(node.time - start);
+    survey.rate = std::max(survey.rate, rate);
+    if (rate * h > survey.product) {
+      survey.product = rate * h;
+      survey.step = h;
+    }
+    const StepReport report = integrator.step();
+    if (report.ok()) continue;
+    survey.failure = report.failure;
+    break;
+  }
+  return survey;
+}
+
+DefaultMethod default_method_of_motion(const std::shared_ptr<const Scene>& given, const Registry& registry,
+                                       const SolverFactory& solvers, double end, double step,
+                                       const IntegratorOptions& options, const MethodRequest& request) {
+  const auto scene = completed(given);
+  const bool free = request.order == 0 && !request.rule && !options.compensated_sums;
+  if (free && !(request.error > 0.0 && request.error < smallest_error) && scene->force) {
+    const DampingSurvey survey = survey_damping(scene, registry, solvers, end, step, options);
+    if (survey.strong())
+      return {surveying_method, 0,
+              "strong damping: what is fastest dies out at a rate of " + to_text(survey.rate, 2) +
+                  ", which times a step of " + to_text(survey.step, 2) + " is " + to_text(survey.product, 2) +
+                  " at most, above " + to_text(DampingSurvey::strong_from, 2)};
+  }
+  return default_method(*scene, request);
+}
+
+}  // namespace diracstep

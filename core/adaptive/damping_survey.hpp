@@ -1,0 +1,46 @@
+#pragma once
+
+#include <diracstep/core/adaptive/adaptive_integrator.hpp>
+#include <diracstep/core/methods/default_method.hpp>
+#include <memory>
+#include <optional>
+#include <string>
+
+namespace diracstep {
+
+/// How fast a motion is damped, beside the steps that it is followed with.
+struct DampingSurvey {
+  double rate = 0.0;         ///< d, the largest decay rate met, 1/time
+  double step = 0.0;         ///< h, the step where d h is largest
+  double product = 0.0;      ///< the largest d h
+  double covered = 0.0;      ///< time surveyed
+  std::string failure = {};  ///< empty, or why nothing is known
+
+  /// Above it GL(s) leaves a third and more of what should have died out, with a sign that alternates from
+  /// step to step.
+  static constexpr double strong_from = 20.0;
+  bool strong() const { return failure.empty() && product > strong_from; }
+};
+
+/// Measures the damping along the motion to `end`: at the nodes of a coarse run of damped/radau:3, at most
+/// 150 steps by their local error, d is the largest −Re λ of the eigenvalues λ of the motion linearised about
+/// the node, on the tangent space of its rows and rates,
+///
+///   δq̇ = δv,   δv̇ = ∂a/∂q δq + ∂a/∂v δv,
+///
+/// by differences of the acceleration a to both sides: a diode conducts on one.  It is compared with the step
+/// of the coarse run there, at most `step`, without sign, or a fiftieth of the motion where that is 0.
+///
+/// Nothing is measured where the scene has no force, since nothing but a force damps; for a Lagrangian linear
+/// in v; and for more than 60 coordinates.  Throws Misuse as AdaptiveIntegrator does.
+DampingSurvey survey_damping(const std::shared_ptr<const Scene>& scene, const Registry& registry,
+                             const SolverFactory& solvers, double end, double step,
+                             const IntegratorOptions& options = {});
+
+/// The method for a motion to `end` where none is named: damped/radau:3 where no order, no rule and no error
+/// below 1e-9 is asked for and survey_damping() finds strong damping; else that of default_method().
+DefaultMethod default_method_of_motion(const std::shared_ptr<const Scene>& scene, const Registry& registry,
+                                       const SolverFactory& solvers, double end, double step,
+                                       const IntegratorOptions& options, const MethodRequest& request);
+
+}  // namespace diracstep

@@ -1,0 +1,114 @@
+#include <algorithm>
+#include <cmath>
+#include <diracstep/core/adaptive/local_error.hpp>
+#include <diracstep/core/adaptive/step_plan.hpp>
+#include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/numerics/scales.hpp>
+#include <limits>
+
+namespace diracstep {
+
+namespace {
+
+constexpr std::size_t most_pulses = 200;
+constexpr double below_eps = 0.9, most_growth = 10.0, most_shrinking = 0.1, after_failure = 0.25;
+constexpr double of_the_rate = 1e-6;  // of T ẏ, which counts as a size
+constexpr double of_the_largest = 1e-10, above_round_off = 1e-13;
+
+/// |e_i| / s_i, the largest.
+double largest_ratio(const Vector& fine, const Vector& whole, const Vector& sizes, double least) {
+  double largest = 0.0;
+  for (Eigen::Index i = 0; i < fine.size(); ++i) {
+    const double difference = std::abs(fine[i] - whole[i]);
+    if (difference > 0.0) largest = std::max(largest, difference / std::max(sizes[i], least));
+    if (!std::isfinite(difference)) return HUGE_VAL;
+  }
+  return largest;
+}
+
+}  // namespace
+
+std::vector<Landing> landings(const Scene& scene, double end) {
+  std::vector<Landing> all;
+  if (!scene.kinks) return all;
+  const std::vector<Stretch> stretches = known_stretches(scene, end);
+  for (std::size_t k = 1; k < stretches.size(); ++k)
+    all.push_back({stretches[k - 1].end, stretches[k].begin});
+  const double start = scene.start.time;
+  auto pulses = scene.kinks->instants(std::min(start, end), std::max(start, end));
+  std::erase_if(pulses, [](const Kinks::Instant& instant) { return !(instant.width > 0.0); });
+  if (pulses.size() <= most_pulses)
+    for (const Kinks::Instant& pulse : pulses) all.push_back({pulse.time, pulse.time});
+  std::ranges::sort(all, [forward = end > start](const Landing& a, const Landing& b) {
+    return forward ? a.time < b.time : a.time > b.time;
+  });
+  return all;
+}
+
+LocalErrorControl::LocalErrorControl(double eps, int order, double span, double smallest)
+    : eps_(eps), span_(span), smallest_(smallest), order_(order) {}
+
+void LocalErrorControl::start(const Integrator& at) {
+  seen_ = {at.position().cwiseAbs(), at.momentum().cwiseAbs()};
+  refused_ = 0;
+}
+
+/// The halves by one integrator, the whole step by the other; false where one fails.
+bool LocalErrorControl::take_both(Integrator& fine, Integrator& whole, double size, StepReport& report) {
+  const double start = fine.time();
+  whole.restart(start, q_, p_, v_);
+  report = whole.step(size);
+  if (!report.ok()) return false;
+  report = fine.step(0.5 * size);
+  if (report.ok()) report = fine.step(start + size - fine.time());
+  return report.ok();
+}
+
+/// In parts of eps.
+double LocalErrorControl::error(const Integrator& fine, const Integrator& whole, double size) {
+  double largest = 0.0;
+  const auto add = [&](const Vector& start, const Vector& end, const Vector& other, const Vector& seen) {
+    const double rate = of_the_rate * span_ / std::abs(size);
+    sizes_ = seen.cwiseMax(end.cwiseAbs()).cwiseMax(rate * (end - start).cwiseAbs());
+    const double least = std::max(of_the_largest, above_round_off / eps_) * max_norm(sizes_);
+    largest = std::max(largest, largest_ratio(end, other, sizes_, least) / eps_);
+  };
+  add(q_, fine.position(), whole.position(), seen_.q);
+  add(p_, fine.momentum(), whole.momentum(), seen_.p);
+  return largest;
+}
+
+StepReport LocalErrorControl::advance(Integrator& fine, Integrator& whole, double& size, double& next) {
+  const double start = fine.time();
+  q_ = fine.position();
+  p_ = fine.momentum();
+  v_ = fine.velocity_estimate();
+  const double stages = 0.5 * (order_ + 1);
+  StepReport report;
+  for (bool first = true;; first = false) {
+    const bool taken = take_both(fine, whole, size, report);
+    const double part = taken ? error(fine, whole, size) : HUGE_VAL;
+    if (taken && (part <= 1.0 || std::abs(size) <= smallest_)) {
+      const double growth = part > 0.0 ? below_eps * std::pow(part, -1.0 / (order_ + 1)) : most_growth;
+      next = size * std::clamp(growth, most_shrinking, first ? most_growth : 1.0);
+      seen_.q = seen_.q.cwiseMax(fine.position().cwiseAbs());
+      seen_.p = seen_.p.cwiseMax(fine.momentum().cwiseAbs());
+      return report;
+    }
+    ++refused_;
+    if (fine.time() != start) fine.restart(start, q_, p_, v_);
+    const double shrinking = taken ? below_eps * std::pow(part, -1.0 / (stages + 1.0)) : after_failure;
+    size *= std::clamp(shrinking, most_shrinking, 0.9);
+    if (std::abs(size) > 16.0 * std::numeric_limits<double>::epsilon() * std::abs(start) &&
+        std::abs(size) > 1e-15 * span_)
+      continue;
+    if (taken) {
+      report.solve.status = SolveStatus::no_convergence;
+      report.failure = "no size of a step from t = " + to_text(start) +
+                       " has a local error as small as asked for; is the motion smooth there?";
+    }
+    return report;
+  }
+}
+
+}  // namespace diracstep

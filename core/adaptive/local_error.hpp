@@ -1,0 +1,68 @@
+#pragma once
+
+#include <diracstep/core/integrator/integrator.hpp>
+#include <vector>
+
+namespace diracstep {
+
+/// A time that steps are to end at, since the scene's functions jump or have a pulse there, and where they go
+/// on: behind a jump, so that no step reads both of its sides.
+struct Landing {
+  double time, resume;
+};
+
+/// Those on the way to `end` that the scene's formulas show (Scene::kinks); none where they are more than
+/// 200.
+std::vector<Landing> landings(const Scene& scene, double end);
+
+/// The size of ordinary variable steps, by their local error: for methods of the damping family, which are
+/// not reversible at any size.
+///
+/// A step of size h is taken whole and in two halves; the halves count.  Their difference e, in q and p, is
+/// to stay below eps:
+///
+///   max_i |e_i| / s_i ≤ eps,   s_i = max(|y_i| so far, 1e-6 T |ẏ_i|, 1e-10 of the largest s, 1e-13/eps of
+///   it)
+///
+/// for positions and momenta apart, T being the time to the end; the difference is about 2^p − 1 times the
+/// error of the halves of a method of order p.  The next step is 0.9 eps/|e| to the power 1/(p + 1) times as
+/// long, at most ten times; a step that is refused shrinks by the power 1/(s + 1) of its s stages, which is
+/// how its error falls where it is stiff (Hairer, Wanner, Solving Ordinary Differential Equations II, IV.8),
+/// at most to a tenth.
+class LocalErrorControl {
+ public:
+  /// `span` is T; steps below `smallest` are accepted, with 0 none are.
+  LocalErrorControl(double eps, int order, double span, double smallest);
+
+  /// The motion begins at this point.
+  void start(const Integrator& at);
+
+  /// A first step, without sign, when nothing is known of the motion, or after a jump.
+  double first_size() const { return first_part * span_; }
+
+  /// Takes one step of `fine` beside one of `whole`, of the size given or, where that has too large an error
+  /// or fails, a smaller one; `size` becomes the one taken, `next` the one to try next.  Fails, with `fine`
+  /// where it was, where the size would fall below the round-off of the time.
+  StepReport advance(Integrator& fine, Integrator& whole, double& size, double& next);
+
+  /// Steps that had too large an error or failed.
+  long refused() const { return refused_; }
+
+ private:
+  static constexpr double first_part = 1e-6;
+  /// The sizes of q and p so far.
+  struct Sizes {
+    Vector q, p;
+  };
+
+  bool take_both(Integrator& fine, Integrator& whole, double size, StepReport& report);
+  double error(const Integrator& fine, const Integrator& whole, double size);
+
+  double eps_, span_, smallest_;
+  int order_;
+  long refused_ = 0;
+  Sizes seen_;
+  Vector q_, p_, v_, sizes_;  ///< where the step starts; workspace
+};
+
+}  // namespace diracstep
