@@ -165,6 +165,7 @@ int with_all_verbs(int count, char** arguments, bool run_verbs) {
   add_plan(app, session);
   add_run(app, session);
   add_stability(app, session);
+  add_start(app, session);
   add_study(app, session);
   take_plugins(app, session, run_verbs);
   return read_and_run(app, session, count, arguments);

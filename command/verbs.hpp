@@ -15,6 +15,7 @@ void add_orders(CLI::App& app, Session& session);
 void add_plan(CLI::App& app, Session& session);
 void add_run(CLI::App& app, Session& session);
 void add_stability(CLI::App& app, Session& session);
+void add_start(CLI::App& app, Session& session);
 void add_study(CLI::App& app, Session& session);
 
 }  // namespace diracstep::command

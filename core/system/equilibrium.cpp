@@ -1,5 +1,6 @@
 #include <Eigen/QR>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/system/equilibrium.hpp>
@@ -12,6 +13,7 @@ namespace {
 
 constexpr double equation_met = 1e-10;     // of the terms of an equation
 constexpr double round_off = 1e-14;        // of the largest term
+constexpr double near_the_end = 1e-8;      // of the largest coordinate; round-off may decide there
 constexpr double smallest_change = 1e-13;  // of the largest coordinate
 constexpr int max_path_steps = 400;
 constexpr double shortest_path_step = 1e-6;
@@ -63,11 +65,12 @@ class EquilibriumSearch {
   /// velocities of rows that the moving coordinates cannot meet.
   struct Point {
     Vector q, v, lambda, residual;
-    Columns jacobian, mass;  ///< mass: of what of it the rows leave
+    Columns allowed;         ///< an orthonormal basis of ker A
+    Columns jacobian, mass;  ///< of the residual with its forces along `allowed`; masses along it
   };
 
   Point evaluate(const Vector& q) {
-    Point point{q, wanted_v_, {}, {}, {}, {}};
+    Point point{q, wanted_v_, {}, {}, {}, {}, {}};
     balance_.evaluate(time_, q, wanted_v_);
     const Columns& a = balance_.one_forms;
     const auto n = q.size(), m = a.rows();
@@ -81,24 +84,33 @@ class EquilibriumSearch {
     }
     point.lambda = least_multipliers(a, balance_.forces);
     balance_.set_multipliers(point.lambda);
-    const Columns allowed = null_space(a), projector = allowed * allowed.transpose();
+    point.allowed = null_space(a);
+    const Columns along = point.allowed.transpose();
     const Columns unmet = Columns::Identity(m, m) + a * following;
     const Columns rates = following * balance_.row_derivative;  // ∂v/∂q
     const int h = balance_.on_positions;
-    point.jacobian.resize(n + h + m, n);
-    point.jacobian << projector * (balance_.stiffness + balance_.damping * rates), a.topRows(h),
+    point.jacobian.resize(along.rows() + h + m, n);
+    point.jacobian << along * (balance_.stiffness + balance_.damping * rates), a.topRows(h),
         unmet * balance_.row_derivative;
-    point.mass = projector * balance_.mass;
+    point.mass = along * balance_.mass;
     point.residual.resize(n + h + m);
     Vector left = balance_.forces;
     if (m > 0) left -= a.transpose() * point.lambda;
-    point.residual << projector * left, balance_.position, unmet * balance_.velocity;
+    point.residual << left, balance_.position, unmet * balance_.velocity;
     return point;
+  }
+
+  /// The residual at one point with its forces along what is allowed at another, whose Jacobian it is for.
+  static Vector residual_along(const Columns& allowed, const Vector& residual) {
+    const Eigen::Index n = allowed.rows(), k = allowed.cols();
+    Vector along(k + residual.size() - n);
+    along << allowed.transpose() * residual.head(n), residual.tail(residual.size() - n);
+    return along;
   }
 
   Vector newton_step(const Point& point) {
     factor(point.jacobian);
-    const Vector change = correction(point.residual);
+    const Vector change = correction(residual_along(point.allowed, point.residual));
     size_ = std::max(size_, change.lpNorm<Eigen::Infinity>());
     return change;
   }
@@ -113,18 +125,23 @@ class EquilibriumSearch {
     return -factors_.solve(Vector(scales_.asDiagonal() * residual));
   }
 
-  /// The longest of the steps 1, ½, ¼ … of the correction whose end and middle lie on Newton's path, where
-  /// the residual falls in proportion; measured as the correction that the difference asks for.
+  /// The longest of the steps 1, ½, ¼ … of the correction that lies on Newton's path, where the residual
+  /// falls in proportion; measured as the correction that the difference asks for, at its end and at parts of
+  /// it, since a long step of an angle may come to an equilibrium some turns away by chance.
   std::optional<Point> along_path(const Point& here, const Vector& change) {
     constexpr double off_path = 0.25;
     const auto on_path = [&](const Point& there, double part) {
-      const Vector off = there.residual - (1.0 - part) * here.residual;
+      const Vector off = residual_along(here.allowed, there.residual - (1.0 - part) * here.residual);
       return off.allFinite() && correction(off).norm() <= off_path * part * change.norm();
     };
+    if (change.norm() <= near_the_end * size_) return evaluate(here.q + change);
     for (double part = 1.0; part >= shortest_path_step; part /= 2.0) {
-      if (!on_path(evaluate(here.q + part / 2.0 * change), part / 2.0)) continue;
+      const bool begins_there = std::ranges::all_of(std::array{0.125, 0.25, 0.5}, [&](double fraction) {
+        return on_path(evaluate(here.q + fraction * part * change), fraction * part);
+      });
+      if (!begins_there) continue;
       Point there = evaluate(here.q + part * change);
-      if (on_path(there, part) || change.norm() <= 1e-9 * size_) return there;  // round-off decides there
+      if (on_path(there, part)) return there;
     }
     return std::nullopt;
   }
@@ -133,17 +150,17 @@ class EquilibriumSearch {
   /// as these fall (pseudo-transient continuation: Kelley and Keyes, SIAM J. Numer. Anal. 35, 1998), until
   /// Newton's method converges.
   Point relax(Point here) {
-    const Eigen::Index n = here.q.size();
+    const Eigen::Index n = here.q.size(), k = here.allowed.cols();
     const double masses = here.mass.norm();
     const double forces =
-        std::max(here.jacobian.topRows(n).norm(), size_ > 0.0 ? here.residual.head(n).norm() / size_ : 0.0);
+        std::max(here.jacobian.topRows(k).norm(), size_ > 0.0 ? here.residual.head(n).norm() / size_ : 0.0);
     if (!(masses > 0.0 && forces > 0.0)) return here;
     double time = 0.1 * masses / forces;
     for (; iterations_ < max_path_steps; ++iterations_) {
       Columns jacobian = here.jacobian;
-      jacobian.topRows(n) += here.mass / time;
+      jacobian.topRows(k) += here.mass / time;
       factor(jacobian);
-      Point next = evaluate(here.q + correction(here.residual));
+      Point next = evaluate(here.q + correction(residual_along(here.allowed, here.residual)));
       if (!next.residual.allFinite()) return here;
       time *= std::min(10.0, here.residual.norm() / next.residual.norm());
       here = std::move(next);

@@ -30,14 +30,16 @@ double relative_change(const Columns& from, const Columns& to) {
   return size > 0.0 ? (to - from).norm() / size : to.norm();
 }
 
-double variation_between(const BalanceAt& first, const BalanceAt& second) {
+/// `reach` is a size of coordinates that round-off may be of.
+double variation_between(const BalanceAt& first, const BalanceAt& second, double reach) {
   const ForceBalance &a = first.balance, &b = second.balance;
   double largest = 0.0;
   for (const auto& [from, to] :
        {std::pair{&a.mass, &b.mass}, std::pair{&a.damping, &b.damping}, std::pair{&a.stiffness, &b.stiffness},
         std::pair{&a.one_forms, &b.one_forms}})
     largest = std::max(largest, relative_change(*from, *to));
-  const double size = std::max(a.sizes.lpNorm<Eigen::Infinity>(), b.sizes.lpNorm<Eigen::Infinity>());
+  const double size = std::max(a.sizes.lpNorm<Eigen::Infinity>(), b.sizes.lpNorm<Eigen::Infinity>()) +
+                      reach * a.stiffness.lpNorm<Eigen::Infinity>();
   if (size > 0.0) largest = std::max(largest, second.left.lpNorm<Eigen::Infinity>() / size);
   if (b.on_positions == 0) return largest;
   const double position = (b.one_forms.topRows(b.on_positions).cwiseAbs() * second.q.cwiseAbs()).maxCoeff();
@@ -104,10 +106,11 @@ Linearisation linearise(const Scene& given, const Equilibrium& at, double later)
   if (s.cols() > 0)
     set_state(linear, s.transpose() * balance.mass * linear.drift,
               linear.stiffness + s.transpose() * balance.damping * linear.drift);
+  const double reach = given.start.q.lpNorm<Eigen::Infinity>();
   for (const double part : {0.382, 0.618}) {  // unequal, so that a period does not hide between them
     const double t = part * (later - at.time);
     const BalanceAt there(*scene, at.time + t, at.q + t * at.v, at.v);
-    linear.variation = std::max(linear.variation, variation_between(here, there));
+    linear.variation = std::max(linear.variation, variation_between(here, there, reach));
   }
   return linear;
 }

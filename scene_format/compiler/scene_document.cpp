@@ -34,11 +34,11 @@ class DocumentReader : TableReader {
 
   SceneDocument read(const toml::table& root) {
     check_keys(root, "the scene",
-               {"name",       "class",       "description",    "source",      "needs",
-                "lagrangian", "hamiltonian", "dissipation",    "coordinates", "sizes",
-                "parameters", "definitions", "rows",           "force",       "start",
-                "span",       "reference",   "invariants",     "recommended", "inductor",
-                "capacitor",  "resistor",    "source_voltage", "mutual",      "redundant"});
+               {"name",        "class",       "description", "source",   "needs",          "lagrangian",
+                "hamiltonian", "dissipation", "coordinates", "sizes",    "parameters",     "definitions",
+                "rows",        "force",       "start",       "span",     "reference",      "invariants",
+                "recommended", "inductor",    "capacitor",   "resistor", "source_voltage", "mutual",
+                "redundant",   "outputs"});
     read_head(root);
     read_parameters(root, "sizes", true);
     read_parameters(root, "parameters", false);
@@ -54,6 +54,7 @@ class DocumentReader : TableReader {
     read_span(root);
     read_references(root);
     read_invariants(root);
+    read_outputs(root);
     read_recommended(root);
     return std::move(document_);
   }
@@ -283,6 +284,22 @@ class DocumentReader : TableReader {
       document_.invariants.push_back({item.key,
                                       required_formula(entry, "formula", "invariant '" + item.key + "'"),
                                       number(entry, "value")});
+    }
+  }
+
+  /// Columns beside t, the coordinates, v_…, p_…, lambda_…, energy and invariant_…, whose names they cannot
+  /// have.
+  void read_outputs(const toml::table& root) {
+    for (const Item& item : items(root, "outputs")) {
+      require_new_name(item.key, item.place);
+      for (const char* taken : {"v_", "p_", "lambda_", "invariant_"})
+        if (item.key.starts_with(taken))
+          fail(item.place,
+               fmt::format("'{}': columns that begin with {} are those of the scene itself; choose "
+                           "another name",
+                           item.key, taken));
+      if (item.key == "energy") fail(item.place, "the column 'energy' is that of the scene itself");
+      document_.outputs.push_back({item.key, formula(*item.node, item.key), item.place});
     }
   }
 

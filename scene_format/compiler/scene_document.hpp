@@ -62,6 +62,11 @@ struct SceneDocument {
     FormulaText formula;
     std::optional<double> value;
   };
+  struct Output {
+    std::string name;
+    FormulaText formula;
+    Place place;
+  };
   /// A branch of a circuit between two nodes.
   struct Branch {
     std::string kind;  ///< "inductor", "capacitor", "resistor", "source"
@@ -99,6 +104,7 @@ struct SceneDocument {
   double t_end = 0.0, step = 0.0, study_end = 0.0;
   std::vector<Reference> references;
   std::vector<Invariant> invariants;
+  std::vector<Output> outputs;  ///< in the order of the file
   std::vector<Branch> branches;
   std::vector<Mutual> mutuals;
   Recommended recommended;

@@ -35,6 +35,9 @@ class SceneCompiler {
     compile_start();
     compile_references();
     compile_invariants();
+    for (const auto& output : document_.outputs)
+      program_.outputs.push_back(
+          {output.name, value_function(output.formula, "output '" + output.name + "'")});
     write_source();
     program_.kinks = KinkFinder(program_, builder_).find();
   }
@@ -337,16 +340,22 @@ class SceneCompiler {
   void compile_invariants() {
     for (const auto& invariant : document_.invariants) {
       const std::string what = "invariant '" + invariant.name + "'";
-      const Node node = parser_.formula(invariant.formula, mechanics(what, program_.lagrangian ? 'v' : 'p'));
-      SceneFunction function{FunctionKind::phase};
-      for (Term& term : terms_.of(node, {}, what, invariant.formula.start)) {
-        Piece piece;
-        piece.loops = std::move(term.loops);
-        piece.outputs = {term.node};
-        builder_.add_value(function, std::move(piece));
-      }
-      program_.invariants.push_back({invariant.name, std::move(function), invariant.value});
+      program_.invariants.push_back(
+          {invariant.name, value_function(invariant.formula, what), invariant.value});
     }
+  }
+
+  /// A formula in t, q and v, or p where there is no Lagrangian, that is computed and not differentiated.
+  SceneFunction value_function(const FormulaText& formula, const std::string& what) {
+    const Node node = parser_.formula(formula, mechanics(what, program_.lagrangian ? 'v' : 'p'));
+    SceneFunction function{FunctionKind::phase};
+    for (Term& term : terms_.of(node, {}, what, formula.start)) {
+      Piece piece;
+      piece.loops = std::move(term.loops);
+      piece.outputs = {term.node};
+      builder_.add_value(function, std::move(piece));
+    }
+    return function;
   }
 
   void write_source() {

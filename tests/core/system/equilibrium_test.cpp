@@ -34,9 +34,11 @@ Scene spherical_pendulum(Vector q, Vector v) {
                            return 0.5 * (w[0] * w[0] + w[1] * w[1] + w[2] * w[2]) - gravity * x[2];
                          }),
                          std::move(q), std::move(v));
-  scene.constraints = {holonomic<3>({"rod"}, []<class T>(const std::array<T, 3>& x) {
-    return std::array<T, 1>{x[0] * x[0] + x[1] * x[1] + x[2] * x[2] - 1.0};
-  })};
+  scene.constraints = {holonomic<3, 1>(
+      []<class T>(const std::array<T, 3>& x) {
+        return std::array<T, 1>{x[0] * x[0] + x[1] * x[1] + x[2] * x[2] - 1.0};
+      },
+      {"rod"})};
   return scene;
 }
 
@@ -122,8 +124,9 @@ TEST(Equilibrium, ConstantRowsOnVelocitiesKeepWhatTheyKeepInEveryMotion) {
                            return 0.5 * (v[0] * v[0] + v[1] * v[1] - q[0] * q[0] - q[1] * q[1]);
                          }),
                          Vector{{1.0, 0.0}}, Vector::Zero(2));
-  SparsityPattern pattern = SparsityPattern::dense(1, 2);
-  scene.constraints = {constant_rows({"sum"}, pattern, Vector::Ones(2))};
+  scene.constraints = {pfaffian<2, 1>([]<class T>(const std::array<T, 2>&) {
+    return std::array<std::array<T, 2>, 1>{{{T(1.0), T(1.0)}}};
+  })};
   const Equilibrium at = find_equilibrium(scene, scene.start);
   ASSERT_TRUE(at.ok()) << at.failure;
   EXPECT_NEAR(at.q[0], 0.5, 1e-14);
@@ -137,11 +140,10 @@ TEST(Equilibrium, NonholonomicRowsLeaveMorePositionsThanVelocities) {
         return 0.5 * (v[0] * v[0] + v[1] * v[1] + v[2] * v[2] - 4.0 * q[0] * q[0] - 9.0 * q[2] * q[2]);
       }),
       Vector{{0.3, 0.2, 0.1}}, Vector::Zero(3));
-  scene.constraints = {
-      pfaffian<3>({"blade"}, []<class T>(const std::array<T, 3>& q, const std::array<T, 3>& v) {
-        using std::cos, std::sin;
-        return std::array<T, 1>{v[0] * sin(q[2]) - v[1] * cos(q[2])};
-      })};
+  scene.constraints = {pfaffian<3, 1>([]<class T>(const std::array<T, 3>& q) {
+    using std::cos, std::sin;
+    return std::array<std::array<T, 3>, 1>{{{sin(q[2]), -cos(q[2]), T(0.0)}}};
+  })};
   const Equilibrium at = find_equilibrium(scene, scene.start);
   ASSERT_TRUE(at.ok()) << at.failure;
   EXPECT_NEAR(at.q[1], 0.2, 1e-9);  // nothing asks for a change of y
