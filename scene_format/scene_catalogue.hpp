@@ -59,7 +59,7 @@ struct Output {
 };
 
 /// Where a value of a start is from.
-enum class StartOrigin { left_out, given, guess };
+enum class StartOrigin { left_out, given, guess, rate };  ///< rate: that of a state
 
 /// A start as the file gives it, before guesses are moved onto the rows.
 struct StatedStart {

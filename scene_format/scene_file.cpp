@@ -118,6 +118,17 @@ StatedStart start_of(const LoadedScene& loaded) {
   return stated;
 }
 
+/// Velocities of states are their rates.
+void set_rates_of_states(const LoadedScenePtr& loaded, StatedStart& stated) {
+  for (const StateProgram& state : loaded->program->states) {
+    const int index = loaded->layout.position(state.family, {0, 0});
+    const Start& start = stated.start;
+    const double rate = file_value(loaded, state.rate)(start.time, start.q, start.v);
+    stated.start.v[index] = rate;
+    stated.v[static_cast<std::size_t>(index)] = StartOrigin::rate;
+  }
+}
+
 /// References for which the scene has the right parameters.
 class References {
  public:
@@ -263,6 +274,8 @@ Guesses guesses_of(const LoadedScene& loaded) {
     for_each_value(loaded, named, 0.0, [&](int index, double) {
       (named.role == Role::position ? guesses.q : guesses.v)[static_cast<std::size_t>(index)] = true;
     });
+  for (const StateProgram& state : loaded.program->states)
+    guesses.v[static_cast<std::size_t>(loaded.layout.position(state.family, {0, 0}))] = true;
   return guesses;
 }
 
@@ -325,6 +338,7 @@ CatalogueScene load(const std::string& file, const std::string& text, const Para
   const LoadedScenePtr loaded = std::make_shared<const LoadedScene>(std::move(program), std::move(values));
   const SceneDocument& document = loaded->program->document;
   StatedStart stated = start_of(*loaded);
+  set_rates_of_states(loaded, stated);
   Scene scene = scene_of(loaded, stated.start);
   require_defined_start(*loaded, scene);
 

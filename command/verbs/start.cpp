@@ -55,7 +55,16 @@ SolvedStart solved_start(const CatalogueScene& entry, const Session& session) {
 }
 
 const char* origin_text(StartOrigin origin) {
-  return origin == StartOrigin::given ? "given" : origin == StartOrigin::guess ? "guess" : "left out";
+  switch (origin) {
+    case StartOrigin::given:
+      return "given";
+    case StartOrigin::guess:
+      return "guess";
+    case StartOrigin::rate:
+      return "rate";
+    default:
+      return "left out";
+  }
 }
 
 /// "0.5, given", or "guess, from 0.4".

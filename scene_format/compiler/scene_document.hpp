@@ -62,6 +62,12 @@ struct SceneDocument {
     FormulaText formula;
     std::optional<double> value;
   };
+  /// A first-order state: a coordinate without mass with v_NAME = rate.
+  struct State {
+    std::string name;
+    FormulaText rate;
+    Place place;
+  };
   struct Output {
     std::string name;
     FormulaText formula;
@@ -96,6 +102,7 @@ struct SceneDocument {
   std::vector<Parameter> parameters;  ///< sizes first
   std::map<std::string, FormulaText, std::less<>> definitions;
   std::vector<Row> rows;
+  std::vector<State> states;  ///< the last of the coordinates, in this order
   std::vector<Entry> force, start;
   std::optional<FormulaText> start_time;
   bool project = false;
