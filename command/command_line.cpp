@@ -158,12 +158,14 @@ int with_all_verbs(int count, char** arguments, bool run_verbs) {
   Session session;
   add_help(app);
   add_check(app, session);
+  add_equilibrium(app, session);
   add_list(app, session);
   add_new(app, session);
   add_orders(app, session);
   add_plan(app, session);
   add_run(app, session);
   add_stability(app, session);
+  add_start(app, session);
   add_study(app, session);
   take_plugins(app, session, run_verbs);
   return read_and_run(app, session, count, arguments);

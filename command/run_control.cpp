@@ -6,6 +6,7 @@
 #include <diracstep/command/interrupt.hpp>
 #include <diracstep/command/progress.hpp>
 #include <diracstep/command/run_control.hpp>
+#include <diracstep/core/runs/run.hpp>
 #include <diracstep/core/runs/run_checks.hpp>
 #include <diracstep/core/runs/step_loop.hpp>
 
@@ -15,6 +16,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
+constexpr double same_time = 1e-9;  ///< in steps
 constexpr long steps_between_looks = 256;
 constexpr long points_looked_at = 400;  ///< for the energy
 constexpr auto between_checkpoints = std::chrono::seconds(10);
@@ -41,11 +43,14 @@ class Run {
         next_checkpoint_(Clock::now() + between_checkpoints),
         progress_(static_cast<double>(integrator.work().steps) / static_cast<double>(steps)) {
     if (integrator.work().steps > 0) doubt_.see(start_of(integrator.scene()));
+    const auto before_here = [&](double t) { return ahead_of_here(t) < -same_time; };
+    next_time_ = std::ranges::find_if_not(keeping.times, before_here);
   }
 
   void go() {
     const long first = integrator_.work().steps;
     if (first == 0 || wanted(first)) keep();
+    keep_chosen_times();
     CheckedSteps steps{integrator_, &doubt_};
     const StepReport last = step_while(
         steps, [&](long k) { return first + k < steps_ && result_.failure.empty(); },
@@ -69,11 +74,36 @@ class Run {
       keep();
     else if (k % every_look_ == 0)
       look();
+    keep_chosen_times();
     if (k % steps_between_looks == 0) show(k);
     return !stopped;
   }
 
-  bool wanted(long k) const { return k == steps_ || (keeping_.file != nullptr && k % keeping_.every == 0); }
+  bool wanted(long k) const {
+    return k == steps_ || (keeping_.file != nullptr && keeping_.times.empty() && k % keeping_.every == 0);
+  }
+
+  /// In steps of this run.
+  double ahead_of_here(double t) const { return (t - integrator_.time()) / integrator_.options().step; }
+
+  /// The chosen times from this node to the next one; those at the next one are read there.
+  void keep_chosen_times() {
+    if (keeping_.file == nullptr) return;
+    const bool last = integrator_.work().steps >= steps_;
+    for (; next_time_ != keeping_.times.end() && result_.failure.empty(); ++next_time_) {
+      if (ahead_of_here(*next_time_) >= 1.0 - same_time && !last) return;
+      const bool at_node = std::abs(ahead_of_here(*next_time_)) <= same_time;
+      Sample sample;
+      const StepReport report =
+          sample_at(integrator_, at_node ? integrator_.time() : *next_time_, keeping_.momentum, sample);
+      if (!report.ok()) {
+        result_.failure = report.failure;
+        return;
+      }
+      sample.time = *next_time_;
+      keeping_.file->write(sample);
+    }
+  }
 
   bool checkpoint_due(long k) const {
     if (keeping_.checkpoint.empty()) return false;
@@ -100,7 +130,7 @@ class Run {
     }
     kept_time_ = integrator_.time();
     doubt_.see(sample);
-    if (keeping_.file != nullptr) keeping_.file->write(sample);
+    if (keeping_.file != nullptr && keeping_.times.empty()) keeping_.file->write(sample);
     result_.end = std::move(sample);
   }
 
@@ -121,6 +151,7 @@ class Run {
   RunChecks doubt_;
   long every_look_;
   Sample looked_at_;
+  std::vector<double>::const_iterator next_time_;
   double kept_time_ = std::nan("");
   Clock::time_point next_checkpoint_;
   Progress progress_;

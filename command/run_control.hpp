@@ -13,7 +13,9 @@ namespace diracstep::command {
 /// What a run keeps on its way.
 struct Keeping {
   Momentum momentum = Momentum::projected;
-  long every = 1;                                                  ///< each so many points go to the file
+  long every = 1;  ///< each so many points go to the file
+  /// In place of each so many: times in the direction of the steps, which may lie between nodes.
+  std::vector<double> times = {};
   TrajectoryFile* file = nullptr;                                  ///< none: only the end is read
   std::string checkpoint = {};                                     ///< path, or empty
   long checkpoint_every = 0;                                       ///< steps; 0: every ten seconds

@@ -98,6 +98,11 @@ std::vector<std::pair<std::string, std::string>> run_identity(const CatalogueSce
   run.emplace_back("substeps", std::to_string(options.substeps));
   run.emplace_back("compensated sums", options.compensated_sums ? "yes" : "no");
   run.emplace_back("trajectory", to_file ? fmt::format("every {}", keeping.every) : "none");
+  if (!keeping.times.empty()) {
+    const Vector times =
+        Eigen::Map<const Vector>(keeping.times.data(), static_cast<Eigen::Index>(keeping.times.size()));
+    run.emplace_back("times of the trajectory, as bits", sha256(bits(times)).substr(0, 16));
+  }
   run.emplace_back("momentum", diracstep::name(keeping.momentum));
   run.emplace_back("rule", choice.rule.value_or("the method's own"));
   run.emplace_back("solver", session.solver);

@@ -86,6 +86,18 @@ Json invariants_json(const RunResult& result) {
   return json;
 }
 
+std::string outputs_text(const RunResult& result) {
+  std::string text;
+  for (const auto& [name, value] : result.outputs) text += fmt::format("output {}: {:.15g}\n", name, value);
+  return text;
+}
+
+Json outputs_json(const RunResult& result) {
+  Json json = Json::object();
+  for (const auto& [name, value] : result.outputs) add_member(json, name, Json(value));
+  return json;
+}
+
 /// "ok", "doubted" or why the run failed.
 std::string status(const RunResult& result) {
   if (!result.failure.empty()) return result.failure;
@@ -183,7 +195,7 @@ std::string run_text(const RunResult& result, const CatalogueScene& entry, const
   if (result.has_end()) {
     text += fmt::format("\nt = {:.10g}\n{}energy: {:.15g}, changed by {:.2e}\n", result.end.time,
                         end_table(result.end, *entry.scene), result.end.energy, energy_change(result, entry));
-    text += invariants_text(result);
+    text += invariants_text(result) + outputs_text(result);
     if (std::isfinite(result.check.error_q))
       text += fmt::format("error against the {} reference: q {:.2e}, p {:.2e}\n", entry.reference.kind,
                           result.check.error_q, result.check.error_p);
@@ -214,6 +226,7 @@ std::string run_json(const RunResult& result, const CatalogueScene& entry, const
   json["constraint"] = Json(check.constraint);
   json["energy_error"] = Json(check.energy_error);
   json["invariants"] = invariants_json(result);
+  json["outputs"] = outputs_json(result);
   json["steps"] = result.work.steps;
   json["newton_iterations"] = result.work.iterations;
   json["residual_evaluations"] = result.work.residual_evaluations;

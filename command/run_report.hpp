@@ -26,6 +26,7 @@ struct RunResult {
   StudyRow check;                            ///< errors against the reference at that time, rows and energy
   std::string doubt;                         ///< empty, or why the points are not to be believed
   std::vector<InvariantEnds> invariants;
+  std::vector<std::pair<std::string, double>> outputs;  ///< of the scene, at the end
   std::string out;  ///< the file written, if any
   long lines = 0;   ///< points in it
 

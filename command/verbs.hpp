@@ -8,12 +8,14 @@ namespace diracstep::command {
 /// Each adds one verb with its options; the verb runs while the command line is parsed and leaves its exit
 /// status in the session, which must outlive the parser.
 void add_check(CLI::App& app, Session& session);
+void add_equilibrium(CLI::App& app, Session& session);
 void add_list(CLI::App& app, Session& session);
 void add_new(CLI::App& app, Session& session);
 void add_orders(CLI::App& app, Session& session);
 void add_plan(CLI::App& app, Session& session);
 void add_run(CLI::App& app, Session& session);
 void add_stability(CLI::App& app, Session& session);
+void add_start(CLI::App& app, Session& session);
 void add_study(CLI::App& app, Session& session);
 
 }  // namespace diracstep::command

@@ -51,6 +51,22 @@ struct Invariant {
   std::optional<double> value;  ///< as stated
 };
 
+/// A number of the user's own along a motion, a column of its file.
+struct Output {
+  std::string name;
+  std::function<double(double t, ConstVectorRef q, ConstVectorRef v)>
+      at;  ///< p in place of v without a Lagrangian
+};
+
+/// Where a value of a start is from.
+enum class StartOrigin { left_out, given, guess, rate };  ///< rate: that of a state
+
+/// A start as the file gives it, before guesses are moved onto the rows.
+struct StatedStart {
+  Start start;
+  std::vector<StartOrigin> q, v;  ///< v: of momenta where the start is by these
+};
+
 /// A method that suits the scene, and what it reaches.
 struct Recommendation {
   std::string method = "auto";  ///< as IntegratorOptions::method
@@ -79,6 +95,8 @@ struct CatalogueScene {
   std::string needs = {};  ///< what the integrators lack to run it, empty where they run it: "degenerate"
   std::vector<KnownState> known = {};  ///< references that hold for the parameters, as the file lists them
   std::vector<Invariant> invariants = {};
+  std::vector<Output> outputs = {};
+  std::optional<StatedStart> stated_start = {};  ///< none for scenes that are not from files
   Recommendation recommended = {};
   std::vector<SymbolNote> notes = {};  ///< coordinates, sizes and parameters
   /// What a scene file says of the motion, entry by entry; none for scenes that are not from files.

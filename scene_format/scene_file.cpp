@@ -94,8 +94,10 @@ void for_each_value(const LoadedScene& loaded, const NamedValue& named, double t
   }
 }
 
-Start start_of(const LoadedScene& loaded) {
+StatedStart start_of(const LoadedScene& loaded) {
   const SceneProgram& program = *loaded.program;
+  const auto n = static_cast<std::size_t>(loaded.layout.dimension());
+  StatedStart stated{{}, std::vector(n, StartOrigin::left_out), std::vector(n, StartOrigin::left_out)};
   Evaluator time(program, loaded.parameters, {program.start_time});
   time.evaluate();
   Start start{static_cast<double>(time.value(0)), Vector::Zero(loaded.layout.dimension()), {}, {}};
@@ -106,11 +108,25 @@ Start start_of(const LoadedScene& loaded) {
         throw SceneError(program.document.file, named.place,
                          fmt::format("the start of '{}' is {}; expected a finite number",
                                      loaded.layout.names()[static_cast<std::size_t>(index)], value));
-      (named.role == Role::position ? start.q : second)[index] = value;
+      const bool position = named.role == Role::position;
+      (position ? start.q : second)[index] = value;
+      (position ? stated.q : stated.v)[static_cast<std::size_t>(index)] = StartOrigin::given;
     });
   const bool by_momentum = program.start_by_momentum || !program.lagrangian;
   (by_momentum ? start.p : start.v) = second;
-  return start;
+  stated.start = std::move(start);
+  return stated;
+}
+
+/// Velocities of states are their rates.
+void set_rates_of_states(const LoadedScenePtr& loaded, StatedStart& stated) {
+  for (const StateProgram& state : loaded->program->states) {
+    const int index = loaded->layout.position(state.family, {0, 0});
+    const Start& start = stated.start;
+    const double rate = file_value(loaded, state.rate)(start.time, start.q, start.v);
+    stated.start.v[index] = rate;
+    stated.v[static_cast<std::size_t>(index)] = StartOrigin::rate;
+  }
 }
 
 /// References for which the scene has the right parameters.
@@ -223,7 +239,7 @@ Vector tolerances_of(const LoadedScene& loaded) {
   return tolerances;
 }
 
-Scene scene_of(const LoadedScenePtr& loaded) {
+Scene scene_of(const LoadedScenePtr& loaded, const Start& start) {
   Scene scene;
   scene.name = loaded->program->document.name;
   scene.coordinates = loaded->layout.names();
@@ -231,7 +247,7 @@ Scene scene_of(const LoadedScenePtr& loaded) {
   scene.hamiltonian = file_hamiltonian(loaded);
   scene.constraints = file_constraints(loaded);
   scene.force = file_force(loaded);
-  scene.start = start_of(*loaded);
+  scene.start = start;
   scene.kinks = file_kinks(loaded);
   scene.tolerances = tolerances_of(*loaded);
   return scene;
@@ -258,14 +274,22 @@ Guesses guesses_of(const LoadedScene& loaded) {
     for_each_value(loaded, named, 0.0, [&](int index, double) {
       (named.role == Role::position ? guesses.q : guesses.v)[static_cast<std::size_t>(index)] = true;
     });
+  for (const StateProgram& state : loaded.program->states)
+    guesses.v[static_cast<std::size_t>(loaded.layout.position(state.family, {0, 0}))] = true;
   return guesses;
 }
 
 /// Moves the start onto the rows where the file asks for it, and notes by how much.
-void project(const LoadedScene& loaded, CatalogueScene& entry) {
+void project(const LoadedScene& loaded, CatalogueScene& entry, StatedStart& stated) {
   const Scene& scene = *entry.scene;
   const Guesses guesses = guesses_of(loaded);
   if ((!loaded.program->document.project && guesses.q.empty()) || scene.start.v.size() == 0) return;
+  const auto mark = [](std::vector<StartOrigin>& origins, const std::vector<bool>& guessed) {
+    for (std::size_t i = 0; i < origins.size(); ++i)
+      if (guessed.empty() || guessed[i]) origins[i] = StartOrigin::guess;
+  };
+  mark(stated.q, guesses.q);
+  mark(stated.v, guesses.v);
   auto moved = std::make_shared<Scene>(scene);
   moved->start = project_start(scene, scene.start, kinsol(), guesses).start;
   const std::string moves = describe_moves(scene, scene.start, moved->start);
@@ -294,18 +318,34 @@ void describe(CatalogueScene& entry, const LoadedScene& loaded) {
   }
 }
 
+/// Throws SceneError where an output has the name of an element of a repeated coordinate.
+void add_outputs(CatalogueScene& entry, const LoadedScenePtr& loaded) {
+  const SceneProgram& program = *loaded->program;
+  const std::vector<std::string>& names = loaded->layout.names();
+  for (std::size_t i = 0; i < program.outputs.size(); ++i) {
+    const auto& [name, function] = program.outputs[i];
+    if (std::ranges::find(names, name) != names.end())
+      throw SceneError(program.document.file, program.document.outputs[i].place,
+                       fmt::format("the output '{}' has the name of a coordinate", name));
+    entry.outputs.push_back({name, file_value(loaded, function)});
+  }
+}
+
 CatalogueScene load(const std::string& file, const std::string& text, const Parameters& changes,
                     bool as_written) {
   auto program = compile_scene(file, text, as_written);
   ParameterValues values = parameter_values(program->document, changes);
   const LoadedScenePtr loaded = std::make_shared<const LoadedScene>(std::move(program), std::move(values));
   const SceneDocument& document = loaded->program->document;
-  Scene scene = scene_of(loaded);
+  StatedStart stated = start_of(*loaded);
+  set_rates_of_states(loaded, stated);
+  Scene scene = scene_of(loaded, stated.start);
   require_defined_start(*loaded, scene);
 
   CatalogueScene entry;
   entry.scene = std::make_shared<const Scene>(std::move(scene));
-  project(*loaded, entry);
+  project(*loaded, entry, stated);
+  entry.stated_start = std::move(stated);
   if (document.drop_redundant_rows) drop_redundant_rows(entry);
   entry.kind = document.kind;
   entry.description = document.description;
@@ -322,8 +362,10 @@ CatalogueScene load(const std::string& file, const std::string& text, const Para
   entry.known = references.at_stated_times();
   if (const auto exact = references.closed_form(entry.recommended.end)) entry.known.push_back(*exact);
   for (std::size_t i = 0; i < loaded->program->invariants.size(); ++i)
-    entry.invariants.push_back({loaded->program->invariants[i].name, file_invariant(loaded, i),
+    entry.invariants.push_back({loaded->program->invariants[i].name,
+                                file_value(loaded, loaded->program->invariants[i].function),
                                 loaded->program->invariants[i].value});
+  add_outputs(entry, loaded);
   return entry;
 }
 

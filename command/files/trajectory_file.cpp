@@ -12,13 +12,13 @@ namespace {
 
 constexpr std::size_t max_waiting = 1 << 16;  // bytes gathered before they are written
 
-std::string header(const Scene& scene, const std::vector<Invariant>& invariants) {
+std::string header(const Scene& scene, const std::vector<Output>& further) {
   std::string line = "t";
   for (const char* prefix : {"", "v_", "p_"})
     for (const auto& name : scene.coordinates) line += ',' + csv_field(prefix + name);
   for (const auto& name : scene.row_names()) line += ',' + csv_field("lambda_" + name);
   line += ",energy";
-  for (const Invariant& invariant : invariants) line += ',' + csv_field("invariant_" + invariant.name);
+  for (const Output& column : further) line += ',' + csv_field(column.name);
   return line + '\n';
 }
 
@@ -33,22 +33,22 @@ OutputFile opened(const std::string& path, OutputFile::Mode mode) {
 
 }  // namespace
 
-TrajectoryFile::TrajectoryFile(const std::string& path, const Scene& scene, std::vector<Invariant> invariants)
+TrajectoryFile::TrajectoryFile(const std::string& path, const Scene& scene, std::vector<Output> further)
     : rows_(scene.rows()),
       by_momentum_(!scene.lagrangian),
-      invariants_(std::move(invariants)),
+      further_(std::move(further)),
       file_(opened(path, OutputFile::Mode::fresh)) {
-  put(header(scene, invariants_));
+  put(header(scene, further_));
 }
 
 TrajectoryFile::TrajectoryFile(const std::string& path, const Scene& scene, Mark mark,
-                               std::vector<Invariant> invariants)
+                               std::vector<Output> further)
     : rows_(scene.rows()),
       by_momentum_(!scene.lagrangian),
-      invariants_(std::move(invariants)),
+      further_(std::move(further)),
       file_(opened(path, OutputFile::Mode::existing)),
       mark_(mark) {
-  const std::string expected = header(scene, invariants_);
+  const std::string expected = header(scene, further_);
   if (file_.size() < mark.bytes || mark.bytes < static_cast<long>(expected.size()))
     throw Misuse(
         fmt::format("--out: '{}' has {} bytes; at the checkpoint it had {}", path, file_.size(), mark.bytes));
@@ -72,9 +72,9 @@ void TrajectoryFile::write(const Sample& sample) {
   for (const Vector* column : {&sample.q, &sample.v, &sample.p}) add(*column);
   add(sample.lambda.head(rows_));
   fmt::format_to(std::back_inserter(line), ",{:.17g}", sample.energy);
-  for (const Invariant& invariant : invariants_)
+  for (const Output& column : further_)
     fmt::format_to(std::back_inserter(line), ",{:.17g}",
-                   invariant.at(sample.time, sample.q, by_momentum_ ? sample.p : sample.v));
+                   column.at(sample.time, sample.q, by_momentum_ ? sample.p : sample.v));
   put(line += '\n');
   ++mark_.lines;
 }

@@ -11,8 +11,8 @@ namespace diracstep::command {
 /// The path that stands for standard output.
 inline constexpr const char* standard_output = "-";
 
-/// A trajectory as CSV: t, the coordinates, v_NAME, p_NAME, lambda_ROW, energy, and invariant_NAME where the
-/// scene declares some, with 17 significant digits.
+/// A trajectory as CSV: t, the coordinates, v_NAME, p_NAME, lambda_ROW, energy, and further columns,
+/// with 17 significant digits.
 /// Lines are gathered and written many at a time, always whole ones; only where the process is killed in the
 /// middle of a write, or the power fails, may half a line stand at the end.
 class TrajectoryFile {
@@ -24,11 +24,10 @@ class TrajectoryFile {
   };
 
   /// Begins a file.  Throws Misuse where it cannot be opened.
-  TrajectoryFile(const std::string& path, const Scene& scene, std::vector<Invariant> invariants = {});
+  TrajectoryFile(const std::string& path, const Scene& scene, std::vector<Output> further = {});
   /// Goes on with a file from a mark; what was written after it is dropped.  Throws Misuse where it cannot be
   /// opened, is shorter or has another header.
-  TrajectoryFile(const std::string& path, const Scene& scene, Mark mark,
-                 std::vector<Invariant> invariants = {});
+  TrajectoryFile(const std::string& path, const Scene& scene, Mark mark, std::vector<Output> further = {});
   TrajectoryFile(const TrajectoryFile&) = delete;
   TrajectoryFile& operator=(const TrajectoryFile&) = delete;
   /// Writes what is still gathered where an exception ends the run; close() tells whether that was possible.
@@ -47,8 +46,8 @@ class TrajectoryFile {
   void flush();
 
   Eigen::Index rows_;  ///< of the scene; an integrator may know more, which are left out
-  bool by_momentum_;   ///< without a Lagrangian invariants are functions of p
-  std::vector<Invariant> invariants_;
+  bool by_momentum_;   ///< without a Lagrangian the further columns are functions of p
+  std::vector<Output> further_;
   OutputFile file_;
   std::string waiting_;
   Mark mark_;

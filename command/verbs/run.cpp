@@ -26,6 +26,7 @@ namespace diracstep::command {
 namespace {
 
 constexpr long most_fixed_steps = 1'000'000'000'000;
+constexpr double most_chosen_times = 1e8;
 constexpr double most_seconds = 1e8;  // three years
 
 struct RunArguments {
@@ -44,6 +45,7 @@ struct RunArguments {
   std::optional<double> eps;
   std::optional<std::string> control;
   std::string at;
+  std::optional<double> every_time;
   std::optional<double> error;
   bool fixed = false;
   std::optional<long> max_solves;
@@ -101,7 +103,14 @@ void require_use(const RunArguments& options) {
 void require_sense(const RunArguments& options) {
   const bool checkpoints = !options.checkpoint.empty() || !options.resume.empty();
   if (options.every < 1) throw Misuse(fmt::format("--every = {}; 1 or more is needed", options.every));
-  if (!options.at.empty() && !options.adaptive) throw Misuse("--at needs --adaptive");
+  const bool chosen_times = !options.at.empty() || options.every_time;
+  if (!options.at.empty() && options.every_time) throw Misuse("--at and --every-time exclude each other");
+  if (options.every_time && !(*options.every_time > 0.0 && std::isfinite(*options.every_time)))
+    throw Misuse(fmt::format("--every-time = {}; a number above 0 is needed", *options.every_time));
+  if (chosen_times && options.every != 1)
+    throw Misuse("--every counts steps; it does not go with --at and --every-time");
+  if (chosen_times && options.error)
+    throw Misuse("--at and --every-time do not go with --error: name the method and the step that it finds");
   if (options.fixed && options.adaptive) throw Misuse("--fixed and --adaptive exclude each other");
   require_limits(options);
   require_use(options);
@@ -140,15 +149,24 @@ void require_files(const RunArguments& options, const Session& session) {
   require_outputs(outputs, inputs);
 }
 
+/// The columns of a trajectory that its scene does not have of itself.
+std::vector<Output> further_columns(const CatalogueScene& entry) {
+  std::vector<Output> columns;
+  for (const Invariant& invariant : entry.invariants)
+    columns.push_back({"invariant_" + invariant.name, invariant.at});
+  columns.insert(columns.end(), entry.outputs.begin(), entry.outputs.end());
+  return columns;
+}
+
 /// Where the file goes on: from the checkpoint, or from its beginning.
 void open_trajectory(std::optional<TrajectoryFile>& file, const RunArguments& options,
                      const CatalogueScene& entry, const std::optional<Checkpoint>& saved) {
   if (options.out.empty()) return;
   if (saved)
     file.emplace(options.out, *entry.scene, TrajectoryFile::Mark{saved->points, saved->bytes},
-                 entry.invariants);
+                 further_columns(entry));
   else
-    file.emplace(options.out, *entry.scene, entry.invariants);
+    file.emplace(options.out, *entry.scene, further_columns(entry));
 }
 
 void go_on(const Checkpoint& saved, const RunArguments& options, Integrator& integrator) {
@@ -160,10 +178,42 @@ void go_on(const Checkpoint& saved, const RunArguments& options, Integrator& int
   say(fmt::format("going on from step {}, t = {:g}", integrator.work().steps, integrator.time()));
 }
 
+/// The times of --at, or those of --every-time from the start to the end; none where there are neither.
+std::vector<double> chosen_times(const RunArguments& options, const CatalogueScene& entry, double end) {
+  if (!options.at.empty()) return numbers("--at", options.at);
+  if (!options.every_time) return {};
+  const double start = entry.scene->start.time,
+               count = std::floor(std::abs(end - start) / *options.every_time + 1e-9);
+  if (count > most_chosen_times)
+    throw Misuse(fmt::format("--every-time {:g} asks for {:g} points; {:g} are the most", *options.every_time,
+                             count, most_chosen_times));
+  std::vector<double> times;
+  for (double k = 0.0; k <= count; ++k)
+    times.push_back(start + std::copysign(k * *options.every_time, end - start));
+  return times;
+}
+
+/// Throws Misuse for times out of order or outside the run.
+void require_within(const std::vector<double>& times, const Integrator& integrator, long steps) {
+  const double step = integrator.options().step, start = integrator.scene().start.time;
+  const double end = start + static_cast<double>(steps) * step;
+  double last = start;
+  for (const double t : times) {
+    if (!((t - last) * step >= -1e-9 * step * step && (end - t) * step >= -1e-9 * step * step))
+      throw Misuse(
+          fmt::format("--at: t = {:g} does not lie between t = {:g}, the time before, and t = {:g}, the end",
+                      t, last, end));
+    last = t;
+  }
+}
+
 /// Steps of one size to the end, from the start or from a checkpoint.
 void run_fixed(const RunArguments& options, const CatalogueScene& entry, const Session& session,
                Integrator& integrator, long steps, std::optional<TrajectoryFile>& file, RunResult& result) {
   Keeping keeping{.momentum = result.momentum, .every = options.every};
+  keeping.times = chosen_times(
+      options, entry, entry.scene->start.time + static_cast<double>(steps) * integrator.options().step);
+  require_within(keeping.times, integrator, steps);
   keeping.checkpoint = checkpoint_path(options);
   keeping.checkpoint_every = options.checkpoint_every;
   if (!keeping.checkpoint.empty())  // else nothing is saved or compared, and no plugin has to be read for it
@@ -191,7 +241,7 @@ void run_variable(const RunArguments& options, const CatalogueScene& entry, Adap
     progress.show((sample.time - start) / (end - start), fmt::format("t = {:g}", sample.time));
     return !interrupted();
   };
-  const std::vector<double> times = options.at.empty() ? std::vector<double>{} : numbers("--at", options.at);
+  const std::vector<double> times = chosen_times(options, entry, end);
   const RunReport report = times.empty()
                                ? run_until(integrator, end, result.momentum, options.every, keep, &checks)
                                : run_at(integrator, times, result.momentum, keep, &checks);
@@ -317,6 +367,13 @@ void compare_invariants(const RunArguments& options, const CatalogueScene& entry
   }
 }
 
+void take_outputs(const CatalogueScene& entry, RunResult& result) {
+  if (!result.has_end()) return;
+  const Vector& second = entry.scene->lagrangian ? result.end.v : result.end.p;
+  for (const Output& output : entry.outputs)
+    result.outputs.emplace_back(output.name, output.at(result.end.time, result.end.q, second));
+}
+
 void report(const RunResult& result, const RunArguments& options, const CatalogueScene& entry,
             const IntegratorOptions& used, Session& session) {
   if (options.out == standard_output)  // which belongs to the points
@@ -359,8 +416,8 @@ void run(const RunArguments& given, Session& session) {
   if (options.max_time) limit_time(*options.max_time + (options.error ? grace_seconds : 0.0));
   RunResult result;
   result.momentum = momentum(options.momentum);
-  const double end =
-      options.at.empty() ? options.end.value_or(entry.t_end) : numbers("--at", options.at).back();
+  const bool ends_there = options.adaptive && !options.at.empty();
+  const double end = ends_there ? numbers("--at", options.at).back() : options.end.value_or(entry.t_end);
   if (!options.error && !options.adaptive) {
     take_recommendation(entry, options.method, options.step);
     if (!given.step && options.step)
@@ -378,6 +435,7 @@ void run(const RunArguments& given, Session& session) {
   }
   compare_with_reference(result, entry, *completed(entry.scene));
   compare_invariants(options, entry, result);
+  take_outputs(entry, result);
   report(result, options, entry, used, session);
 }
 
@@ -424,7 +482,12 @@ void add_run(CLI::App& app, Session& session) {
   verb->add_option("--control", options->control,
                    "How its size is found: integrating (without), in-step, or irreversible (for comparison);\n"
                    "for damped/radau:S always local-error");
-  verb->add_option("--at", options->at, "Times T1,T2,… to show instead of the steps; needs --adaptive");
+  verb->add_option("--at", options->at,
+                   "Times T1,T2,… to show instead of the steps, each by a step of the method from the last\n"
+                   "node; the motion keeps its bits.  With --adaptive the last of them ends the run")
+      ->type_name("T1,T2,…");
+  verb->add_option("--every-time", options->every_time, "The same at the start and after every so much time")
+      ->type_name("T");
   verb->add_option(
           "--error", options->error,
           "Relative error at the end; the library chooses method and step,\nand repeats the run until its "

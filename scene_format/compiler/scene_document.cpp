@@ -34,16 +34,17 @@ class DocumentReader : TableReader {
 
   SceneDocument read(const toml::table& root) {
     check_keys(root, "the scene",
-               {"name",       "class",       "description",    "source",      "needs",
-                "lagrangian", "hamiltonian", "dissipation",    "coordinates", "sizes",
-                "parameters", "definitions", "rows",           "force",       "start",
-                "span",       "reference",   "invariants",     "recommended", "inductor",
-                "capacitor",  "resistor",    "source_voltage", "mutual",      "redundant"});
+               {"name",        "class",       "description", "source",   "needs",          "lagrangian",
+                "hamiltonian", "dissipation", "coordinates", "sizes",    "parameters",     "definitions",
+                "rows",        "force",       "start",       "span",     "reference",      "invariants",
+                "recommended", "inductor",    "capacitor",   "resistor", "source_voltage", "mutual",
+                "redundant",   "outputs",     "states"});
     read_head(root);
     read_parameters(root, "sizes", true);
     read_parameters(root, "parameters", false);
     read_coordinates(root);
     read_circuit(root);
+    read_states(root);
     for (const Item& item : items(root, "definitions")) {
       require_new_name(item.key, item.place);
       document_.definitions.emplace(item.key, formula(*item.node, item.key));
@@ -54,6 +55,7 @@ class DocumentReader : TableReader {
     read_span(root);
     read_references(root);
     read_invariants(root);
+    read_outputs(root);
     read_recommended(root);
     return std::move(document_);
   }
@@ -200,6 +202,27 @@ class DocumentReader : TableReader {
     return {(*array)[0].as_string()->get(), (*array)[1].as_string()->get()};
   }
 
+  void read_states(const toml::table& root) {
+    for (const Item& item : items(root, "states")) {
+      const std::string what = "state '" + item.key + "'";
+      const toml::table& entry = table(item, "e = { rate = \"th_wanted - th\", start = 0 }");
+      check_keys(entry, what, {"rate", "start", "unit", "meaning"});
+      document_.states.push_back({item.key, required_formula(entry, "rate", what), item.place});
+      if (const auto start = optional_formula(entry, "start"))
+        document_.start.push_back({{item.key, item.place}, {*start}, false});
+      add_coordinate({item.key, string(entry, "unit"), string(entry, "meaning"), {}, false, item.place});
+    }
+  }
+
+  void require_no_state(const Item& item) const {
+    for (const auto& state : document_.states)
+      if (item.key == state.name || item.key == "v_" + state.name || item.key == "p_" + state.name)
+        fail(item.place,
+             fmt::format("'{0}' belongs to the state '{1}': its start stands in [states], {1} = {{ rate "
+                         "= …, start = … }}, and its velocity is its rate",
+                         item.key, state.name));
+  }
+
   void read_rows(const toml::table& root) {
     for (const toml::table* row : tables(root, "rows")) {
       check_keys(*row, "[[rows]]", {"name", "equation", "for"});
@@ -214,6 +237,7 @@ class DocumentReader : TableReader {
 
   void read_start(const toml::table& root) {
     for (const Item& item : items(root, "start")) {
+      require_no_state(item);
       if (item.key == "project")
         document_.project = flag(*root["start"].as_table(), "project");
       else if (item.key == "guess")
@@ -283,6 +307,22 @@ class DocumentReader : TableReader {
       document_.invariants.push_back({item.key,
                                       required_formula(entry, "formula", "invariant '" + item.key + "'"),
                                       number(entry, "value")});
+    }
+  }
+
+  /// Columns beside t, the coordinates, v_…, p_…, lambda_…, energy and invariant_…, whose names they cannot
+  /// have.
+  void read_outputs(const toml::table& root) {
+    for (const Item& item : items(root, "outputs")) {
+      require_new_name(item.key, item.place);
+      for (const char* taken : {"v_", "p_", "lambda_", "invariant_"})
+        if (item.key.starts_with(taken))
+          fail(item.place,
+               fmt::format("'{}': columns that begin with {} are those of the scene itself; choose "
+                           "another name",
+                           item.key, taken));
+      if (item.key == "energy") fail(item.place, "the column 'energy' is that of the scene itself");
+      document_.outputs.push_back({item.key, formula(*item.node, item.key), item.place});
     }
   }
 

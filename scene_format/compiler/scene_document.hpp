@@ -62,6 +62,17 @@ struct SceneDocument {
     FormulaText formula;
     std::optional<double> value;
   };
+  /// A first-order state: a coordinate without mass with v_NAME = rate.
+  struct State {
+    std::string name;
+    FormulaText rate;
+    Place place;
+  };
+  struct Output {
+    std::string name;
+    FormulaText formula;
+    Place place;
+  };
   /// A branch of a circuit between two nodes.
   struct Branch {
     std::string kind;  ///< "inductor", "capacitor", "resistor", "source"
@@ -91,6 +102,7 @@ struct SceneDocument {
   std::vector<Parameter> parameters;  ///< sizes first
   std::map<std::string, FormulaText, std::less<>> definitions;
   std::vector<Row> rows;
+  std::vector<State> states;  ///< the last of the coordinates, in this order
   std::vector<Entry> force, start;
   std::optional<FormulaText> start_time;
   bool project = false;
@@ -99,6 +111,7 @@ struct SceneDocument {
   double t_end = 0.0, step = 0.0, study_end = 0.0;
   std::vector<Reference> references;
   std::vector<Invariant> invariants;
+  std::vector<Output> outputs;  ///< in the order of the file
   std::vector<Branch> branches;
   std::vector<Mutual> mutuals;
   Recommended recommended;

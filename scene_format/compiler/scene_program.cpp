@@ -35,6 +35,9 @@ class SceneCompiler {
     compile_start();
     compile_references();
     compile_invariants();
+    for (const auto& output : document_.outputs)
+      program_.outputs.push_back(
+          {output.name, value_function(output.formula, "output '" + output.name + "'")});
     write_source();
     program_.kinks = KinkFinder(program_, builder_).find();
   }
@@ -84,7 +87,8 @@ class SceneCompiler {
   }
 
   void compile_energies() {
-    const bool massless = !document_.rows.empty() || !document_.branches.empty();  // rows may say what moves
+    const bool massless = !document_.rows.empty() || !document_.branches.empty() ||
+                          !document_.states.empty();  // rows may say what moves
     if (document_.lagrangian || (massless && !document_.hamiltonian)) compile_lagrangian();
     if (document_.hamiltonian) {
       const Node whole = parser_.formula(*document_.hamiltonian, mechanics("the Hamiltonian", 'p'));
@@ -108,8 +112,8 @@ class SceneCompiler {
     whole = graph_.add(whole, circuit_.lagrangian());
     const std::vector<Node> nodes = graph_.reachable(std::span(&whole, 1));
     const bool driven = std::ranges::any_of(nodes, [&](Node node) { return graph_[node].op == Op::time; });
-    const bool others = !document_.rows.empty() || !document_.force.empty() || document_.dissipation ||
-                        !document_.branches.empty();
+    const bool others = !document_.rows.empty() || !document_.states.empty() || !document_.force.empty() ||
+                        document_.dissipation || !document_.branches.empty();
     if (!has_velocity(std::span(&whole, 1)) && !driven && !others)
       fail(place, "the Lagrangian contains no velocity v_…: nothing would move");
     program_.lagrangian = phase_function(whole, "the Lagrangian", place);
@@ -133,6 +137,7 @@ class SceneCompiler {
     }
     for (const auto& [name, node] : circuit_.current_laws())
       rows.push_back({{"node_" + name, {}, {}, "Kirchhoff's current law at node '" + name + "'"}, node});
+    for (const auto& state : document_.states) rows.push_back(state_row(state));
     std::vector<bool> order;  // which kinds there are, by first appearance
     for (const Row& row : rows) {
       const bool holonomic = is_holonomic(row);
@@ -149,6 +154,64 @@ class SceneCompiler {
       }
       program_.rows.push_back(std::move(function));
     }
+  }
+
+  /// v − rate = 0.  Its one-form is that of the state, along which nothing has mass: its force is what the
+  /// Lagrangian and other rows make of the state, and acts on nothing else.
+  Row state_row(const SceneDocument::State& state) {
+    const std::string what = "the rate of '" + state.name + "'";
+    const int family = symbols_.family(state.name);
+    const Node rate = parser_.formula(state.rate, mechanics(what, 'v'));
+    require_state_rate(state, family, rate, what);
+    program_.states.push_back({family, value_function(state.rate, what)});
+    const Node velocity = graph_.coordinate(family, none, Role::second);
+    return {{"state_" + state.name, {}, state.rate.start}, graph_.subtract(velocity, rate)};
+  }
+
+  void require_state_rate(const SceneDocument::State& state, int family, Node rate, const std::string& what) {
+    if (!program_.lagrangian)
+      fail(state.place, "states need a 'lagrangian': beside a Hamiltonian alone they have no velocity");
+    const int first = static_cast<int>(symbols_.families.size() - document_.states.size());
+    bool moved = false;
+    for (const Node leaf : graph_.reachable(std::span(&rate, 1))) {
+      if (!is_velocity(graph_[leaf])) continue;
+      moved = true;
+      const std::string& name = symbols_.families[static_cast<std::size_t>(graph_[leaf].a)].name;
+      if (graph_[leaf].a >= first)
+        fail(state.rate.start, fmt::format("{} holds v_{}, the rate of a state: states that feed on rates of "
+                                           "states are not supported; write that rate out",
+                                           what, name));
+      const Node slope = graph_.derivative(rate, leaf);
+      if (has_velocity(std::span(&slope, 1)))
+        fail(state.rate.start,
+             fmt::format("{} is not linear in v_{}; take a filtered velocity in its place, a state f with "
+                         "rate = \"({} - f)/tau\", in which ({} - f)/tau is the velocity",
+                         what, name, name, name));
+    }
+    if (moved && acts_back(family))
+      fail(state.rate.start,
+           fmt::format("{} holds velocities, and the Lagrangian or a row holds the state: its "
+                       "force would act on these velocities; take a filtered velocity instead",
+                       what));
+  }
+
+  /// Whether the Lagrangian or a row of the file holds the coordinate.
+  bool acts_back(int family) {
+    const auto holds = [&](std::span<const Node> roots) {
+      return std::ranges::any_of(graph_.reachable(roots), [&](Node node) {
+        return graph_[node].op == Op::coordinate && graph_[node].a == family;
+      });
+    };
+    const auto row_holds = [&](const SceneDocument::Row& row) {
+      const std::string what = "row '" + row.name + "'";
+      std::vector<int> loops;
+      if (row.loops) loops = parser_.loops(*row.loops, {.what = what});
+      const Node node = parser_.equation(row.equation, mechanics(what, 'v', loops));
+      return holds(std::span(&node, 1));
+    };
+    return std::ranges::any_of(program_.lagrangian->pieces,
+                               [&](const Piece& piece) { return holds(piece.outputs); }) ||
+           std::ranges::any_of(document_.rows, row_holds);
   }
 
   bool is_holonomic(const Row& row) const { return !has_velocity(std::span(&row.node, 1)); }
@@ -337,16 +400,22 @@ class SceneCompiler {
   void compile_invariants() {
     for (const auto& invariant : document_.invariants) {
       const std::string what = "invariant '" + invariant.name + "'";
-      const Node node = parser_.formula(invariant.formula, mechanics(what, program_.lagrangian ? 'v' : 'p'));
-      SceneFunction function{FunctionKind::phase};
-      for (Term& term : terms_.of(node, {}, what, invariant.formula.start)) {
-        Piece piece;
-        piece.loops = std::move(term.loops);
-        piece.outputs = {term.node};
-        builder_.add_value(function, std::move(piece));
-      }
-      program_.invariants.push_back({invariant.name, std::move(function), invariant.value});
+      program_.invariants.push_back(
+          {invariant.name, value_function(invariant.formula, what), invariant.value});
     }
+  }
+
+  /// A formula in t, q and v, or p where there is no Lagrangian, that is computed and not differentiated.
+  SceneFunction value_function(const FormulaText& formula, const std::string& what) {
+    const Node node = parser_.formula(formula, mechanics(what, program_.lagrangian ? 'v' : 'p'));
+    SceneFunction function{FunctionKind::phase};
+    for (Term& term : terms_.of(node, {}, what, formula.start)) {
+      Piece piece;
+      piece.loops = std::move(term.loops);
+      piece.outputs = {term.node};
+      builder_.add_value(function, std::move(piece));
+    }
+    return function;
   }
 
   void write_source() {

@@ -83,6 +83,17 @@ struct InvariantProgram {
   std::optional<double> value;
 };
 
+struct OutputProgram {
+  std::string name;
+  SceneFunction function;
+};
+
+/// The rate of a state, whose row is v − rate = 0.
+struct StateProgram {
+  int family;
+  SceneFunction rate;
+};
+
 /// Where the formulas are not smooth or change fast (core/system/kinks.hpp), each with one output for each
 /// row of its groups.
 struct KinkProgram {
@@ -108,6 +119,8 @@ struct SceneProgram {
   Node start_time = none;
   std::vector<ReferenceProgram> references;  ///< as in the document
   std::vector<InvariantProgram> invariants;
+  std::vector<OutputProgram> outputs;
+  std::vector<StateProgram> states;
   KinkProgram kinks;
   std::string source;  ///< C for all kernels
   std::string name;    ///< of the source, by its content; the table in it is diracstep_kernels_NAME

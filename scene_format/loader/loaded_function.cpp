@@ -23,7 +23,7 @@ const CompiledKernel* table_of(const LoadedScene& scene, const SceneFunction& fu
     if (other == &function) return table;
     for (const Piece& piece : other->pieces) table += piece.kernels.size();
   }
-  return nullptr;  // an invariant: it is not worth compiling
+  return nullptr;  // an invariant or an output: it is not worth compiling
 }
 
 }  // namespace

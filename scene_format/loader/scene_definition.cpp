@@ -58,6 +58,7 @@ std::vector<std::pair<std::string, std::string>> scene_definition(const SceneDoc
   for (const auto& [name, text] : document.definitions) all.add("definition " + name, formula(text));
   for (const auto& row : document.rows)
     all.add("row " + row.name, formula(row.equation) + (row.loops ? " for " + formula(*row.loops) : ""));
+  for (const auto& state : document.states) all.add("rate of " + state.name, formula(state.rate));
   for (const auto& entry : document.force) all.add("force on", entry);
   for (const auto& branch : document.branches)
     all.add(branch.kind + ' ' + branch.name,

@@ -316,8 +316,8 @@ ConstraintBlocks file_constraints(const LoadedScenePtr& scene) {
   return blocks;
 }
 
-InvariantFunction file_invariant(const LoadedScenePtr& scene, std::size_t number) {
-  auto function = std::make_shared<const LoadedFunction>(scene, scene->program->invariants[number].function);
+ValueFunction file_value(const LoadedScenePtr& scene, const SceneFunction& of) {
+  auto function = std::make_shared<const LoadedFunction>(scene, of);
   return [function](double t, ConstVectorRef q, ConstVectorRef y) {
     double sum = 0.0;
     KernelCall call = call_at(t, q.data(), y.data());

@@ -13,8 +13,9 @@ std::shared_ptr<const Hamiltonian> file_hamiltonian(const LoadedScenePtr& scene)
 std::shared_ptr<const Force> file_force(const LoadedScenePtr& scene);
 ConstraintBlocks file_constraints(const LoadedScenePtr& scene);
 
-/// The value of an invariant f(t, q, v or p).
-using InvariantFunction = std::function<double(double t, ConstVectorRef q, ConstVectorRef y)>;
-InvariantFunction file_invariant(const LoadedScenePtr& scene, std::size_t number);
+/// The value f(t, q, v or p) of a function of the scene's program without derivatives: an invariant or an
+/// output.
+using ValueFunction = std::function<double(double t, ConstVectorRef q, ConstVectorRef y)>;
+ValueFunction file_value(const LoadedScenePtr& scene, const scene_compiler::SceneFunction& of);
 
 }  // namespace diracstep

@@ -1,0 +1,223 @@
+#include <fmt/format.h>
+
+#include <CLI/App.hpp>
+#include <algorithm>
+#include <cmath>
+#include <diracstep/command/arguments.hpp>
+#include <diracstep/command/verbs.hpp>
+#include <diracstep/core/system/eigenmodes.hpp>
+#include <diracstep/reports/json.hpp>
+#include <diracstep/reports/report.hpp>
+#include <memory>
+#include <numbers>
+#include <numeric>
+#include <optional>
+
+namespace diracstep::command {
+
+namespace {
+
+struct EquilibriumArguments {
+  std::string scene;
+  bool along = false;
+  std::vector<std::string> set;
+  bool json = false;
+};
+
+/// What was found, and what it means for small motions where something was.
+struct Found {
+  Equilibrium at;
+  std::optional<Linearisation> linear;
+  std::optional<Eigenmodes> modes;
+  std::string doubt;
+};
+
+constexpr double steady = 1e-7;              // relative change of the linear equations along a motion
+constexpr std::size_t shown_components = 6;  // of a mode
+constexpr double shown_from = 1e-3;          // of its largest
+constexpr int shown_coordinates = 40;
+
+Found find(const EquilibriumArguments& options, const CatalogueScene& entry) {
+  Found found{find_equilibrium(*entry.scene, entry.scene->start, options.along), {}, {}, {}};
+  if (!found.at.ok()) return found;
+  found.linear = linearise(*entry.scene, found.at, entry.t_end);
+  found.modes = eigenmodes(*found.linear);
+  if (!(found.linear->variation <= steady))
+    found.doubt = fmt::format(
+        "the linear equations change by {:.2g} of their size {} until t = {:g}: the eigenvalues hold at "
+        "t = {:g} only",
+        found.linear->variation, options.along ? "along the motion" : "with the time", entry.t_end,
+        found.at.time);
+  return found;
+}
+
+std::string component_text(const std::string& name, std::complex<double> value) {
+  const double angle = std::arg(value) * 180.0 / std::numbers::pi;
+  if (std::abs(angle) < 0.05) return fmt::format("{} {:.3g}", name, std::abs(value));
+  if (std::abs(angle) > 179.95) return fmt::format("{} -{:.3g}", name, std::abs(value));
+  return fmt::format("{} {:.3g} at {:.1f}°", name, std::abs(value), angle);
+}
+
+/// The largest components, as "th 1, x 0.25 at 90°".
+std::string mode_text(const Scene& scene, const Mode& mode) {
+  std::vector<Eigen::Index> order(static_cast<std::size_t>(mode.shape.size()));
+  std::iota(order.begin(), order.end(), 0);
+  std::ranges::stable_sort(order, std::greater<>(), [&](Eigen::Index i) { return std::abs(mode.shape[i]); });
+  std::string text;
+  for (std::size_t k = 0; k < std::min(order.size(), shown_components); ++k) {
+    const std::complex<double> value = mode.shape[order[k]];
+    if (std::abs(value) < shown_from) break;
+    text +=
+        (k == 0 ? "" : ", ") + component_text(scene.coordinates[static_cast<std::size_t>(order[k])], value);
+  }
+  return text + (order.size() > shown_components ? ", …" : "");
+}
+
+std::string eigenvalue_text(std::complex<double> value) {
+  if (value.imag() == 0.0) return fmt::format("{:.12g}", value.real());
+  if (value.real() == 0.0) return fmt::format("± {:.12g} i", value.imag());
+  return fmt::format("{:.12g} ± {:.12g} i", value.real(), value.imag());
+}
+
+std::string modes_text(const Scene& scene, const Eigenmodes& modes) {
+  std::vector<std::vector<std::string>> rows{{"eigenvalue", "frequency", "damping", "mode"}};
+  for (const Mode& mode : modes.modes) {
+    const double size = std::abs(mode.eigenvalue), imaginary = mode.eigenvalue.imag();
+    rows.push_back({eigenvalue_text(mode.eigenvalue),
+                    imaginary > 0.0 ? fmt::format("{:.6g}", imaginary / (2.0 * std::numbers::pi)) : "-",
+                    imaginary > 0.0 ? fmt::format("{:.3g}", -mode.eigenvalue.real() / size + 0.0) : "-",
+                    mode_text(scene, mode)});
+  }
+  std::string text = modes.modes.empty() ? "" : aligned(rows);
+  if (modes.zeros > 0)
+    text += fmt::format("{} eigenvalues 0: motions that nothing draws back\n", modes.zeros);
+  return text + fmt::format("{}\n", describe(modes.stability));
+}
+
+std::string point_text(const CatalogueScene& entry, const Equilibrium& at) {
+  const Scene& scene = *entry.scene;
+  const bool moves = at.v.size() > 0 && at.v.cwiseAbs().maxCoeff() > 0.0;
+  std::vector<std::vector<std::string>> rows{{"coordinate", "q", "from"}};
+  if (moves) rows[0].emplace_back("v");
+  const int shown = std::min(scene.dimension(), shown_coordinates);
+  for (int i = 0; i < shown; ++i) {
+    rows.push_back({scene.coordinates[static_cast<std::size_t>(i)], fmt::format("{:.15g}", at.q[i]),
+                    fmt::format("{:.6g}", scene.start.q[i])});
+    if (moves) rows.back().push_back(fmt::format("{:.15g}", at.v[i]));
+  }
+  std::string text = aligned(rows);
+  if (shown < scene.dimension())
+    text += fmt::format("… {} of {} coordinates left out\n", scene.dimension() - shown, scene.dimension());
+  const auto names = scene.row_names();
+  for (int r = 0; r < std::min(scene.rows(), shown_coordinates); ++r)
+    text += fmt::format("force of row {}: {:.15g}\n", names[static_cast<std::size_t>(r)], at.lambda[r]);
+  if (scene.rows() > shown_coordinates)
+    text += fmt::format("… {} of {} rows left out\n", scene.rows() - shown_coordinates, scene.rows());
+  return text;
+}
+
+std::string as_text(const CatalogueScene& entry, const Found& found) {
+  const bool moves = found.at.v.cwiseAbs().maxCoeff() > 0.0;
+  std::string text = fmt::format("{}: {}, {} iterations from the start\n\n{}", entry.scene->name,
+                                 !found.at.ok() ? "no equilibrium"
+                                 : moves        ? "a steady motion"
+                                                : "at rest",
+                                 found.at.iterations, point_text(entry, found.at));
+  if (!found.linear) return text;
+  const Linearisation& linear = *found.linear;
+  text += fmt::format("degrees of freedom: {} of position, {} of velocity\n", linear.positions.cols(),
+                      linear.velocities.cols());
+  if (linear.redundant_rows > 0)
+    text += fmt::format("redundant constraints there: {}; the forces of rows are the least that hold it\n",
+                        linear.redundant_rows);
+  return text + '\n' + modes_text(*entry.scene, *found.modes);
+}
+
+Json numbers_by_name(const std::vector<std::string>& names, const Vector& values,
+                     const std::string& prefix = "") {
+  Json json = Json::object();
+  for (std::size_t i = 0; i < names.size(); ++i)
+    add_member(json, prefix + names[i], Json(values[static_cast<Eigen::Index>(i)]));
+  return json;
+}
+
+Json matrix_json(const Columns& matrix) {
+  Json rows = Json::array();
+  for (Eigen::Index r = 0; r < matrix.rows(); ++r) {
+    Json row = Json::array();
+    for (Eigen::Index c = 0; c < matrix.cols(); ++c) row.push_back(matrix(r, c));
+    rows.push_back(std::move(row));
+  }
+  return rows;
+}
+
+Json mode_json(const Scene& scene, const Mode& mode) {
+  Json shape = Json::object();
+  for (int i = 0; i < scene.dimension(); ++i)
+    add_member(shape, scene.coordinates[static_cast<std::size_t>(i)],
+               Json{mode.shape[i].real(), mode.shape[i].imag()});
+  return {{"eigenvalue", {mode.eigenvalue.real(), mode.eigenvalue.imag()}}, {"mode", shape}};
+}
+
+std::string as_json(const CatalogueScene& entry, const Found& found) {
+  const Scene& scene = *entry.scene;
+  Json json{{"scene", scene.name}, {"parameters", Json::object()}};
+  for (const auto& [key, value] : entry.parameters) json["parameters"][key] = Json(value);
+  json["status"] = !found.at.ok() ? found.at.failure : found.doubt.empty() ? "ok" : "doubted";
+  json["doubt"] = found.doubt.empty() ? Json(nullptr) : Json(found.doubt);
+  json["t"] = found.at.time;
+  json["iterations"] = found.at.iterations;
+  json["q"] = numbers_by_name(scene.coordinates, found.at.q);
+  json["v"] = numbers_by_name(scene.coordinates, found.at.v);
+  json["lambda"] = numbers_by_name(scene.row_names(), found.at.lambda);
+  if (found.linear) {
+    const Linearisation& linear = *found.linear;
+    json["redundant_rows"] = linear.redundant_rows;
+    json["variation"] = linear.variation;
+    json["positions"] = matrix_json(linear.positions);
+    json["velocities"] = matrix_json(linear.velocities);
+    json["drift"] = matrix_json(linear.drift);
+    json["mass"] = matrix_json(linear.mass);
+    json["damping"] = matrix_json(linear.damping);
+    json["stiffness"] = matrix_json(linear.stiffness);
+    json["zero_eigenvalues"] = found.modes->zeros;
+    json["stability"] = describe(found.modes->stability);
+    json["modes"] = Json::array();
+    for (const Mode& mode : found.modes->modes) json["modes"].push_back(mode_json(scene, mode));
+  }
+  return to_text(json, 2) + '\n';
+}
+
+void equilibrium(const EquilibriumArguments& options, Session& session) {
+  const CatalogueScene entry = make_scene(session, options.scene, parameters(options.set));
+  const Found found = find(options, entry);
+  print(options.json ? as_json(entry, found) : as_text(entry, found));
+  if (!found.at.ok()) {
+    say(fmt::format("no equilibrium found: {}", found.at.failure));
+    session.exit_status = failed;
+  } else if (!found.doubt.empty()) {
+    say("doubted: " + found.doubt);
+    session.exit_status = doubted;
+  }
+}
+
+}  // namespace
+
+void add_equilibrium(CLI::App& app, Session& session) {
+  CLI::App* verb = app.add_subcommand(
+      "equilibrium", "Where a scene rests or moves steadily, and how it vibrates there: eigenvalues, modes");
+  const auto options = std::make_shared<EquilibriumArguments>();
+  verb->add_option("SCENE", options->scene, "A scene; see diracstep list scenes")->required();
+  verb->add_flag("--along", options->along,
+                 "A steady motion: coordinates with a velocity at the start keep moving");
+  add_redundancy_option(*verb, session);
+  add_set_option(*verb, options->set);
+  verb->add_flag("--json", options->json, "One JSON document on standard output, reduced matrices included");
+  verb->footer(
+      "Examples:\n"
+      "  diracstep equilibrium hanging_chain\n"
+      "  diracstep equilibrium flyball_governor --along");
+  verb->callback([options, &session] { equilibrium(*options, session); });
+}
+
+}  // namespace diracstep::command

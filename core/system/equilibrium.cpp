@@ -1,0 +1,246 @@
+#include <Eigen/QR>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/system/equilibrium.hpp>
+#include <diracstep/core/system/force_balance.hpp>
+#include <optional>
+
+namespace diracstep {
+
+namespace {
+
+constexpr double equation_met = 1e-10;     // of the terms of an equation
+constexpr double round_off = 1e-14;        // of the largest term
+constexpr double near_the_end = 1e-8;      // of the largest coordinate; round-off may decide there
+constexpr double smallest_change = 1e-13;  // of the largest coordinate
+constexpr int max_path_steps = 400;
+constexpr double shortest_path_step = 1e-6;
+
+/// In the order of the scene's rows, of values in that of a balance.
+Vector in_order_of_rows(const Scene& scene, const ForceBalance& balance, const Vector& sorted) {
+  Vector values(scene.rows());
+  Eigen::Index on_positions = 0, other = balance.on_positions, at = 0;
+  for (const auto& block : scene.constraints) {
+    Eigen::Index& from = is_on_positions(*block) ? on_positions : other;
+    values.segment(at, block->rows()) = sorted.segment(from, block->rows());
+    at += block->rows();
+    from += block->rows();
+  }
+  return values;
+}
+
+/// Newton's method for q, with v and λ as functions of it.
+class EquilibriumSearch {
+ public:
+  EquilibriumSearch(const Scene& scene, const Start& start, bool along_start)
+      : scene_(scene), balance_(scene), time_(start.time), wanted_v_(Vector::Zero(start.v.size())) {
+    if (along_start) wanted_v_ = start.v;
+    for (Eigen::Index i = 0; i < wanted_v_.size(); ++i)
+      if (wanted_v_[i] != 0.0) moving_.push_back(static_cast<int>(i));
+    size_ = start.q.lpNorm<Eigen::Infinity>();
+    at_ = start.q;
+  }
+
+  Equilibrium find() {
+    Point here = evaluate(at_);
+    bool relaxed = false;
+    for (; iterations_ < max_path_steps; ++iterations_) {
+      if (!here.residual.allFinite()) return failed("the forces are not finite", here);
+      const Vector change = newton_step(here);
+      const bool at_end = change.lpNorm<Eigen::Infinity>() <= smallest_change * size_;
+      if (at_end && (relaxed || finish(here).ok())) return finish(here);
+      std::optional<Point> next;
+      if (!at_end) next = along_path(here, change);
+      if (!next && relaxed) return failed("Newton's path ends", here);
+      if (!next) relaxed = true;
+      here = next ? std::move(*next) : relax(std::move(here));
+    }
+    return failed("none is reached in " + std::to_string(max_path_steps) + " steps", here);
+  }
+
+ private:
+  /// q, what belongs to it, and what is to vanish there: forces that rows do not take up, φ, and the
+  /// velocities of rows that the moving coordinates cannot meet.
+  struct Point {
+    Vector q, v, lambda, residual;
+    Columns allowed;         ///< an orthonormal basis of ker A
+    Columns jacobian, mass;  ///< of the residual with its forces along `allowed`; masses along it
+  };
+
+  Point evaluate(const Vector& q) {
+    Point point{q, wanted_v_, {}, {}, {}, {}, {}};
+    balance_.evaluate(time_, q, wanted_v_);
+    const Columns& a = balance_.one_forms;
+    const auto n = q.size(), m = a.rows();
+    const Columns of_moving = a(Eigen::all, moving_);
+    Columns following = Columns::Zero(n, m);  // v of the moving coordinates that meets rows: −A_F⁺
+    if (!moving_.empty() && m > 0)
+      following(moving_, Eigen::all) = -of_moving.completeOrthogonalDecomposition().pseudoInverse();
+    if (m > 0 && !moving_.empty()) {
+      point.v += following * balance_.velocity;
+      balance_.evaluate(time_, q, point.v);
+    }
+    point.lambda = least_multipliers(a, balance_.forces);
+    balance_.set_multipliers(point.lambda);
+    point.allowed = null_space(a);
+    const Columns along = point.allowed.transpose();
+    const Columns unmet = Columns::Identity(m, m) + a * following;
+    const Columns rates = following * balance_.row_derivative;  // ∂v/∂q
+    const int h = balance_.on_positions;
+    point.jacobian.resize(along.rows() + h + m, n);
+    point.jacobian << along * (balance_.stiffness + balance_.damping * rates), a.topRows(h),
+        unmet * balance_.row_derivative;
+    point.mass = along * balance_.mass;
+    point.residual.resize(n + h + m);
+    Vector left = balance_.forces;
+    if (m > 0) left -= a.transpose() * point.lambda;
+    point.residual << left, balance_.position, unmet * balance_.velocity;
+    return point;
+  }
+
+  /// The residual at one point with its forces along what is allowed at another, whose Jacobian it is for.
+  static Vector residual_along(const Columns& allowed, const Vector& residual) {
+    const Eigen::Index n = allowed.rows(), k = allowed.cols();
+    Vector along(k + residual.size() - n);
+    along << allowed.transpose() * residual.head(n), residual.tail(residual.size() - n);
+    return along;
+  }
+
+  Vector newton_step(const Point& point) {
+    factor(point.jacobian);
+    const Vector change = correction(residual_along(point.allowed, point.residual));
+    size_ = std::max(size_, change.lpNorm<Eigen::Infinity>());
+    return change;
+  }
+
+  void factor(const Columns& jacobian) {
+    scales_ = jacobian.rowwise().norm();
+    for (double& scale : scales_) scale = scale > 0.0 ? 1.0 / scale : 0.0;
+    factors_.setThreshold(equation_met);
+    factors_.compute(scales_.asDiagonal() * jacobian);
+  }
+  Vector correction(const Vector& residual) const {
+    return -factors_.solve(Vector(scales_.asDiagonal() * residual));
+  }
+
+  /// The longest of the steps 1, ½, ¼ … of the correction that lies on Newton's path, where the residual
+  /// falls in proportion; measured as the correction that the difference asks for, at its end and at parts of
+  /// it, since a long step of an angle may come to an equilibrium some turns away by chance.
+  std::optional<Point> along_path(const Point& here, const Vector& change) {
+    constexpr double off_path = 0.25;
+    const auto on_path = [&](const Point& there, double part) {
+      const Vector off = residual_along(here.allowed, there.residual - (1.0 - part) * here.residual);
+      return off.allFinite() && correction(off).norm() <= off_path * part * change.norm();
+    };
+    if (change.norm() <= near_the_end * size_) return evaluate(here.q + change);
+    for (double part = 1.0; part >= shortest_path_step; part /= 2.0) {
+      const bool begins_there = std::ranges::all_of(std::array{0.125, 0.25, 0.5}, [&](double fraction) {
+        return on_path(evaluate(here.q + fraction * part * change), fraction * part);
+      });
+      if (!begins_there) continue;
+      Point there = evaluate(here.q + part * change);
+      if (on_path(there, part)) return there;
+    }
+    return std::nullopt;
+  }
+
+  /// Where Newton's path ends, implicit Euler steps of the overdamped motion  M q̇ = forces  whose size grows
+  /// as these fall (pseudo-transient continuation: Kelley and Keyes, SIAM J. Numer. Anal. 35, 1998), until
+  /// Newton's method converges.
+  Point relax(Point here) {
+    const Eigen::Index n = here.q.size(), k = here.allowed.cols();
+    const double masses = here.mass.norm();
+    const double forces =
+        std::max(here.jacobian.topRows(k).norm(), size_ > 0.0 ? here.residual.head(n).norm() / size_ : 0.0);
+    if (!(masses > 0.0 && forces > 0.0)) return here;
+    double time = 0.1 * masses / forces;
+    for (; iterations_ < max_path_steps; ++iterations_) {
+      Columns jacobian = here.jacobian;
+      jacobian.topRows(k) += here.mass / time;
+      factor(jacobian);
+      Point next = evaluate(here.q + correction(residual_along(here.allowed, here.residual)));
+      if (!next.residual.allFinite()) return here;
+      time *= std::min(10.0, here.residual.norm() / next.residual.norm());
+      here = std::move(next);
+      if (newton_step(here).lpNorm<Eigen::Infinity>() <= 1e-4 * size_) return here;
+    }
+    return here;
+  }
+
+  /// What each equation may be off by: parts of its terms.
+  Vector allowed(const Point& point) const {
+    const Vector q = point.q.cwiseAbs();
+    const Vector change = Vector::Constant(q.size(), size_);
+    Vector sizes(point.residual.size());
+    sizes << balance_.sizes + balance_.stiffness.cwiseAbs() * change,
+        balance_.one_forms.topRows(balance_.on_positions).cwiseAbs() * (q + change),
+        balance_.one_forms.cwiseAbs() * point.v.cwiseAbs() +
+            balance_.row_derivative.cwiseAbs() * (q + change) +
+            (balance_.velocity - balance_.one_forms * point.v).cwiseAbs();
+    return equation_met * sizes + Vector::Constant(sizes.size(), round_off * sizes.maxCoeff());
+  }
+
+  Equilibrium finish(const Point& point) {
+    evaluate(point.q);
+    Equilibrium found = result(point);
+    const Vector excess = point.residual.cwiseAbs() - allowed(point);
+    Eigen::Index worst = 0;
+    if (excess.size() > 0 && excess.maxCoeff(&worst) > 0.0) found.failure = left_at(point, worst);
+    return found;
+  }
+
+  Equilibrium failed(const std::string& why, const Point& point) {
+    Equilibrium found = result(point);
+    Eigen::Index worst = 0;
+    (point.residual.cwiseAbs() - allowed(point)).maxCoeff(&worst);
+    found.failure = why + "; " + left_at(point, worst);
+    return found;
+  }
+
+  Equilibrium result(const Point& point) const {
+    return {time_, point.q, point.v, in_order_of_rows(scene_, balance_, point.lambda), iterations_, {}};
+  }
+
+  std::string left_at(const Point& point, Eigen::Index equation) const {
+    const Eigen::Index n = point.q.size(), row = equation - n;
+    const std::string amount = to_text(point.residual[equation]);
+    if (row < 0)
+      return "a force of " + to_text(-point.residual[equation]) + " is left on '" +
+             scene_.coordinates[static_cast<std::size_t>(equation)] + "'";
+    const auto names = in_sorted_order();
+    if (row < balance_.on_positions)
+      return "the residual of row '" + names[static_cast<std::size_t>(row)] + "' is " + amount;
+    return "row '" + names[static_cast<std::size_t>(row - balance_.on_positions)] +
+           "' asks for a velocity: at rest " + "its residual is " + amount;
+  }
+
+  std::vector<std::string> in_sorted_order() const {
+    std::vector<std::string> names;
+    for (const auto& block : balance_.blocks())
+      names.insert(names.end(), block->names().begin(), block->names().end());
+    return names;
+  }
+
+  const Scene& scene_;
+  ForceBalance balance_;
+  double time_;
+  Vector wanted_v_, at_;
+  std::vector<int> moving_;
+  double size_ = 0.0;
+  int iterations_ = 0;
+  Vector scales_;
+  Eigen::CompleteOrthogonalDecomposition<Columns> factors_;
+};
+
+}  // namespace
+
+Equilibrium find_equilibrium(const Scene& scene, const Start& start, bool along_start) {
+  const auto extended = with_start_and_hidden_rows(scene, start);
+  Equilibrium found = EquilibriumSearch(*extended, extended->start, along_start).find();
+  found.lambda.conservativeResize(scene.rows());  // hidden rows stand behind and carry no force
+  return found;
+}
+
+}  // namespace diracstep

@@ -1,0 +1,60 @@
+#pragma once
+
+#include <diracstep/core/system/constraint_distribution.hpp>
+#include <diracstep/core/system/scene.hpp>
+
+namespace diracstep {
+
+/// The equations of motion without acceleration, and their derivatives, as full matrices: what equilibria and
+/// linear equations about them are made of.  Third derivatives of L are left out; they vanish at rest and
+/// along motions that nothing depends on.
+class ForceBalance {
+ public:
+  /// The scene has a Lagrangian and outlives this.
+  explicit ForceBalance(const Scene& scene);
+
+  /// Takes all that does not depend on λ.
+  void evaluate(double t, const Vector& q, const Vector& v);
+  /// Takes `stiffness` and `sizes`, which do.
+  void set_multipliers(const Vector& lambda);
+
+  Vector forces;  ///< (∂²L/∂v∂q) v + ∂²L/∂v∂t − ∂L/∂q − f, which is to be Aᵀλ
+  Vector sizes;   ///< of its terms, and of what round-off in q makes of them
+  Vector position, velocity;         ///< φ of the holonomic rows; A v + b of all
+  Columns mass, damping, stiffness;  ///< M, C, K of linearise()
+  Columns one_forms;                 ///< A, holonomic rows first
+  Columns row_derivative;            ///< ∂(A v + b)/∂q
+  /// How many rows are on positions: holonomic ones, and nonholonomic ones with constant A, which keep A q as
+  /// it is at the scene's start.
+  int on_positions = 0;
+
+  /// The blocks in the order of the rows here.
+  const ConstraintBlocks& blocks() const { return blocks_; }
+
+ private:
+  void evaluate_rows();
+
+  const Scene& scene_;
+  ConstraintBlocks blocks_;
+  ConstraintsAtPoint rows_;
+  double t_ = 0.0;
+  Vector q_, v_;
+  Columns free_stiffness_;  ///< without the rows
+  Vector free_sizes_;
+};
+
+/// The scene with another start, completed, and with its hidden rows below its own (hidden_rows.hpp).  Throws
+/// Misuse where it is too large for full matrices.
+std::shared_ptr<const Scene> with_start_and_hidden_rows(const Scene& scene, const Start& start);
+
+/// The multiplier of least norm with Aᵀλ ≈ forces in least squares.
+Vector least_multipliers(const Columns& one_forms, const Vector& forces);
+
+/// Whether a block of rows fixes positions: see ForceBalance::on_positions.
+inline bool is_on_positions(const ConstraintRows& block) { return block.holonomic() || block.constant(); }
+
+/// An orthonormal basis of the kernel, the identity where the matrix has no rows.  A row of it counts as
+/// dependent below 1e-10 of its size.
+Columns null_space(const Columns& matrix);
+
+}  // namespace diracstep

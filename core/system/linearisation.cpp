@@ -1,0 +1,118 @@
+#include <Eigen/LU>
+#include <Eigen/QR>
+#include <algorithm>
+#include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/system/force_balance.hpp>
+#include <diracstep/core/system/linearisation.hpp>
+#include <utility>
+
+namespace diracstep {
+
+namespace {
+
+/// M, C, K, A and what should vanish, at one time.
+struct BalanceAt {
+  BalanceAt(const Scene& scene, double t, const Vector& position, const Vector& v)
+      : q(position), balance(scene) {
+    balance.evaluate(t, q, v);
+    const Vector lambda = least_multipliers(balance.one_forms, balance.forces);
+    balance.set_multipliers(lambda);
+    left = balance.forces;
+    if (lambda.size() > 0) left -= balance.one_forms.transpose() * lambda;
+  }
+  Vector q;
+  ForceBalance balance;
+  Vector left;  ///< of the forces
+};
+
+double relative_change(const Columns& from, const Columns& to) {
+  const double size = from.norm();
+  return size > 0.0 ? (to - from).norm() / size : to.norm();
+}
+
+/// `reach` is a size of coordinates that round-off may be of.
+double variation_between(const BalanceAt& first, const BalanceAt& second, double reach) {
+  const ForceBalance &a = first.balance, &b = second.balance;
+  double largest = 0.0;
+  for (const auto& [from, to] :
+       {std::pair{&a.mass, &b.mass}, std::pair{&a.damping, &b.damping}, std::pair{&a.stiffness, &b.stiffness},
+        std::pair{&a.one_forms, &b.one_forms}})
+    largest = std::max(largest, relative_change(*from, *to));
+  const double size = std::max(a.sizes.lpNorm<Eigen::Infinity>(), b.sizes.lpNorm<Eigen::Infinity>()) +
+                      reach * a.stiffness.lpNorm<Eigen::Infinity>();
+  if (size > 0.0) largest = std::max(largest, second.left.lpNorm<Eigen::Infinity>() / size);
+  if (b.on_positions == 0) return largest;
+  const double position = (b.one_forms.topRows(b.on_positions).cwiseAbs() * second.q.cwiseAbs()).maxCoeff();
+  return position > 0.0 ? std::max(largest, b.position.lpNorm<Eigen::Infinity>() / position) : largest;
+}
+
+bool symmetric(const Columns& matrix) {
+  return (matrix - matrix.transpose()).cwiseAbs().maxCoeff() <= 1e-13 * matrix.cwiseAbs().maxCoeff();
+}
+
+void set_state(Linearisation& linear, const Columns& mass_of_drift, const Columns& stiffness) {
+  const Columns &n = linear.positions, &s = linear.velocities;
+  const auto y = n.cols(), u = s.cols();
+  const Columns moving = n.transpose() * linear.drift;  // of y with y
+  if (linear.mass.size() == 0 || linear.mass.cwiseAbs().maxCoeff() == 0.0) {
+    const Eigen::FullPivLU<Columns> lu(linear.damping);
+    if (y != u || !lu.isInvertible())
+      throw Misuse(
+          "no motion is determined there: neither masses nor gyroscopic "
+          "or damping terms set it");
+    linear.state = -lu.solve(stiffness);
+    return;
+  }
+  Eigen::FullPivLU<Columns> lu(linear.mass);
+  if (!lu.isInvertible())
+    throw Misuse(
+        "the masses are singular on the rows there: a direction without mass is not described by a "
+        "row");
+  linear.state.resize(y + u, y + u);
+  linear.state << moving, n.transpose() * s, -lu.solve(stiffness + mass_of_drift * moving),
+      -lu.solve(linear.damping + mass_of_drift * n.transpose() * s);
+}
+
+/// P N: the least velocities that keep the nonholonomic rows when positions N y change.
+Columns drift_of(const ForceBalance& balance, const Columns& positions) {
+  Columns asked = balance.row_derivative;
+  asked.topRows(balance.on_positions).setZero();
+  if (asked.size() == 0 || asked.cwiseAbs().maxCoeff() == 0.0)
+    return Columns::Zero(positions.rows(), positions.cols());
+  return -balance.one_forms.completeOrthogonalDecomposition().solve(asked * positions);
+}
+
+}  // namespace
+
+Linearisation linearise(const Scene& given, const Equilibrium& at, double later) {
+  const auto scene = with_start_and_hidden_rows(given, {at.time, at.q, at.v});
+  const BalanceAt here(*scene, at.time, at.q, at.v);
+  const ForceBalance& balance = here.balance;
+  Linearisation linear;
+  linear.positions = null_space(balance.one_forms.topRows(balance.on_positions));
+  const bool mixed = balance.on_positions < balance.one_forms.rows();
+  linear.velocities = mixed ? null_space(balance.one_forms) : linear.positions;
+  linear.drift = drift_of(balance, linear.positions);
+  const Columns &n = linear.positions, &s = linear.velocities;
+  linear.mass = s.transpose() * balance.mass * s;
+  linear.damping = s.transpose() * balance.damping * s;
+  linear.stiffness = s.transpose() * balance.stiffness * n;
+  linear.rows = scene->rows();
+  linear.redundant_rows = linear.rows - static_cast<int>(scene->dimension() - s.cols());
+  const bool no_drift = linear.drift.size() == 0 || linear.drift.cwiseAbs().maxCoeff() == 0.0;
+  linear.conservative = !mixed && no_drift && s.cols() > 0 && symmetric(linear.stiffness) &&
+                        linear.damping.cwiseAbs().maxCoeff() == 0.0 &&
+                        linear.mass.cwiseAbs().maxCoeff() > 0.0;
+  if (s.cols() > 0)
+    set_state(linear, s.transpose() * balance.mass * linear.drift,
+              linear.stiffness + s.transpose() * balance.damping * linear.drift);
+  const double reach = given.start.q.lpNorm<Eigen::Infinity>();
+  for (const double part : {0.382, 0.618}) {  // unequal, so that a period does not hide between them
+    const double t = part * (later - at.time);
+    const BalanceAt there(*scene, at.time + t, at.q + t * at.v, at.v);
+    linear.variation = std::max(linear.variation, variation_between(here, there, reach));
+  }
+  return linear;
+}
+
+}  // namespace diracstep

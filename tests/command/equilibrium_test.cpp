@@ -1,0 +1,96 @@
+#include <complex>
+#include <nlohmann/json.hpp>
+
+#include "run_command.hpp"
+
+/// The verb equilibrium.
+namespace diracstep::testing {
+namespace {
+
+using Json = nlohmann::json;
+
+const std::string examples = DIRACSTEP_SOURCE "/examples/scenes/";
+
+/// Eigenvalues with imaginary parts 0 or above, as the verb orders them.
+std::vector<std::complex<double>> eigenvalues_in(const Json& json) {
+  std::vector<std::complex<double>> all;
+  for (const Json& mode : json["modes"])
+    all.emplace_back(mode["eigenvalue"][0].get<double>(), mode["eigenvalue"][1].get<double>());
+  return all;
+}
+
+class EquilibriumVerb : public Command {
+ protected:
+  Json found(const std::string& arguments) const {
+    const Outcome outcome = run("equilibrium " + arguments + " --json");
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+    return Json::parse(outcome.out);
+  }
+  void expect_eigenvalues(const Json& json, const std::vector<std::complex<double>>& published) const {
+    const auto all = eigenvalues_in(json);
+    ASSERT_EQ(all.size(), published.size()) << json["modes"];
+    for (std::size_t k = 0; k < all.size(); ++k)
+      EXPECT_LT(std::abs(all[k] - published[k]), 1e-10 * std::abs(published[k])) << all[k] << published[k];
+  }
+};
+
+/// Meijaard, Papadopoulos, Ruina, Schwab 2007, table 2: castering, capsize and weave at 5 m/s; at rest two
+/// pairs of real ones.
+const std::vector<std::complex<double>> at_5 = {
+    -14.07838969279822, -0.32286642900409, {-0.77534188219585, 4.46486771378823}};
+const std::vector<std::complex<double>> at_0 = {-5.53094371765393, -3.13164324790656, 3.13164324790656,
+                                                5.53094371765393};
+const std::vector<std::complex<double>> at_10 = {
+    -24.62459635017404, 0.16105338653172, {-3.72016840437287, 10.90681139476287}};
+
+TEST_F(EquilibriumVerb, LinearBicycleHasThePublishedEigenvalues) {
+  const Json json = found(examples + "bicycle_linear.toml");
+  expect_eigenvalues(json, at_5);
+  EXPECT_EQ(json["stability"].get<std::string>().substr(0, 21), "asymptotically stable");
+  expect_eigenvalues(found(examples + "bicycle_linear.toml --set speed=0"), at_0);
+  expect_eigenvalues(found(examples + "bicycle_linear.toml --set speed=10"), at_10);
+}
+
+TEST_F(EquilibriumVerb, RollingBicycleWithItsRowsHasThePublishedEigenvalues) {
+  const Json json = found(examples + "bicycle.toml --along");
+  expect_eigenvalues(json, at_5);
+  EXPECT_EQ(json["zero_eigenvalues"], 6);  // x, y, yaw, both wheels, and the speed
+  EXPECT_EQ(json["mass"].size(), 3U);
+  EXPECT_EQ(json["stiffness"][0].size(), 7U);
+  EXPECT_LT(json["variation"].get<double>(), 1e-10);
+  expect_eigenvalues(found(examples + "bicycle.toml --along --set speed=10"), at_10);
+  expect_eigenvalues(found(examples + "bicycle.toml"), at_0);
+}
+
+TEST_F(EquilibriumVerb, NamesCoordinatesRowsAndModes) {
+  const Outcome outcome = run("equilibrium pendulum_cartesian");
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  for (const char* part :
+       {"at rest", "force of row rod", "1 of position, 1 of velocity", "eigenvalue", "x 1"})
+    EXPECT_NE(outcome.out.find(part), std::string::npos) << part << '\n' << outcome.out;
+}
+
+TEST_F(EquilibriumVerb, AHangingChainVibratesAsAChainOfLinksDoes) {
+  // Small swings of a hanging chain of N equal links of length l/N with masses at their ends: the squares of
+  // the rates are g N/l times the zeros of Laguerre's polynomial of degree N.  Degree 2: 2 ± sqrt 2.
+  const Json json = found("hanging_chain --set N=2");
+  const auto all = eigenvalues_in(json);
+  ASSERT_EQ(all.size(), 2U);
+  const double g = json["parameters"]["g"];
+  EXPECT_NEAR(all[0].imag(), std::sqrt(2.0 * g * (2.0 - std::sqrt(2.0))), 1e-10);
+  EXPECT_NEAR(all[1].imag(), std::sqrt(2.0 * g * (2.0 + std::sqrt(2.0))), 1e-10);
+}
+
+TEST_F(EquilibriumVerb, FailuresDoubtsAndMisuseHaveTheirStatus) {
+  const Outcome none = run("equilibrium knife_edge --json");
+  EXPECT_EQ(none.status, 1);
+  EXPECT_NE(none.err.find("0.717356 is left on 'x'"), std::string::npos) << none.err;
+  EXPECT_NE(Json::parse(none.out)["status"].get<std::string>(), "ok");
+  const Outcome moved = run("equilibrium car_axis --json");  // the road moves
+  EXPECT_EQ(moved.status, 3) << moved.err;
+  EXPECT_NEAR(Json::parse(moved.out)["q"]["yl"].get<double>(), 0.4995, 1e-12);  // L0 − eps² M/2 · 1
+  expect_misuse("equilibrium no_such_scene", {"no_such_scene"});
+}
+
+}  // namespace
+}  // namespace diracstep::testing

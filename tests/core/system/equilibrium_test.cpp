@@ -1,0 +1,184 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <diracstep/constraints/holonomic.hpp>
+#include <diracstep/constraints/pfaffian.hpp>
+#include <diracstep/core/system/eigenmodes.hpp>
+
+namespace diracstep {
+namespace {
+
+constexpr double gravity = 9.81;
+
+Scene scene_of(std::vector<std::string> names, std::shared_ptr<const Lagrangian> lagrangian, Vector q,
+               Vector v) {
+  Scene scene;
+  scene.name = "test";
+  scene.coordinates = std::move(names);
+  scene.lagrangian = std::move(lagrangian);
+  scene.start = {0.0, std::move(q), std::move(v)};
+  return scene;
+}
+
+Scene pendulum(double angle) {
+  return scene_of({"th"}, lagrangian<1>([](const auto& q, const auto& v) {
+                    using std::cos;
+                    return 0.5 * v[0] * v[0] + gravity * cos(q[0]);
+                  }),
+                  Vector::Constant(1, angle), Vector::Zero(1));
+}
+
+/// Unit mass on a rod of length 1 in Cartesian coordinates, z upwards.
+Scene spherical_pendulum(Vector q, Vector v) {
+  Scene scene = scene_of({"x", "y", "z"}, lagrangian<3>([](const auto& x, const auto& w) {
+                           return 0.5 * (w[0] * w[0] + w[1] * w[1] + w[2] * w[2]) - gravity * x[2];
+                         }),
+                         std::move(q), std::move(v));
+  scene.constraints = {holonomic<3, 1>(
+      []<class T>(const std::array<T, 3>& x) {
+        return std::array<T, 1>{x[0] * x[0] + x[1] * x[1] + x[2] * x[2] - 1.0};
+      },
+      {"rod"})};
+  return scene;
+}
+
+std::vector<std::complex<double>> eigenvalues(const Scene& scene, const Equilibrium& at) {
+  std::vector<std::complex<double>> all;
+  for (const Mode& mode : eigenmodes(linearise(scene, at, 1.0)).modes) all.push_back(mode.eigenvalue);
+  return all;
+}
+
+TEST(Equilibrium, NewtonsPathLeadsToTheNextOneNotAnyone) {
+  // From 1.5 Newton's method jumps by 14 rad; the path goes down to 0, and from 1.6 up to pi.
+  EXPECT_NEAR(find_equilibrium(pendulum(1.5), pendulum(1.5).start).q[0], 0.0, 1e-13);
+  EXPECT_NEAR(find_equilibrium(pendulum(1.6), pendulum(1.6).start).q[0], M_PI, 1e-13);
+}
+
+TEST(Equilibrium, WhereNewtonsPathEndsItRelaxes) {
+  const Scene scene = spherical_pendulum(Vector{{1.0, 0.0, 0.0}}, Vector::Zero(3));
+  const Equilibrium found = find_equilibrium(scene, scene.start);
+  ASSERT_TRUE(found.ok()) << found.failure;
+  EXPECT_NEAR(found.q[2], -1.0, 1e-13);
+  EXPECT_NEAR(found.lambda[0], -gravity / 2.0, 1e-12);  // 2 z λ holds the weight
+}
+
+TEST(Equilibrium, VibrationsOfThePendulumAboutBothEquilibria) {
+  const double rate = std::sqrt(gravity);
+  for (const double angle : {0.1, 3.0}) {
+    const Scene scene = pendulum(angle);
+    const Equilibrium at = find_equilibrium(scene, scene.start);
+    const auto found = eigenvalues(scene, at);
+    ASSERT_EQ(found.size(), angle < 1.0 ? 1U : 2U);
+    if (angle < 1.0)
+      EXPECT_LT(std::abs(found[0] - std::complex<double>(0.0, rate)), 1e-13);
+    else
+      EXPECT_NEAR(found[1].real(), rate, 1e-13);
+  }
+}
+
+TEST(Equilibrium, RowsAreReducedToTheDegreesOfFreedom) {
+  const Scene scene = spherical_pendulum(Vector{{0.0, 0.6, -0.8}}, Vector::Zero(3));
+  const Equilibrium at = find_equilibrium(scene, scene.start);
+  const Linearisation linear = linearise(scene, at, 1.0);
+  EXPECT_EQ(linear.mass.rows(), 2);
+  EXPECT_TRUE(linear.conservative);
+  for (const auto& eigenvalue : eigenvalues(scene, at))
+    EXPECT_LT(std::abs(eigenvalue - std::complex<double>(0.0, std::sqrt(gravity))), 1e-12);
+}
+
+/// Spherical coordinates: th from below, ph about the vertical, which is cyclic.
+Scene conical_pendulum(double angle, double rate) {
+  return scene_of({"th", "ph"}, lagrangian<2>([](const auto& q, const auto& v) {
+                    using std::cos, std::sin;
+                    return 0.5 * (v[0] * v[0] + sin(q[0]) * sin(q[0]) * v[1] * v[1]) + gravity * cos(q[0]);
+                  }),
+                  Vector{{angle, 0.0}}, Vector{{0.0, rate}});
+}
+
+TEST(Equilibrium, SteadyMotionOfTheConicalPendulum) {
+  constexpr double rate = 5.0;
+  const Scene scene = conical_pendulum(1.0, rate);
+  const Equilibrium at = find_equilibrium(scene, scene.start, true);
+  ASSERT_TRUE(at.ok()) << at.failure;
+  const double c = gravity / (rate * rate);  // cos th
+  EXPECT_NEAR(std::cos(at.q[0]), c, 1e-13);
+  EXPECT_EQ(at.v[1], rate);
+  const Eigenmodes modes = eigenmodes(linearise(scene, at, 10.0));
+  ASSERT_EQ(modes.modes.size(), 1U);
+  EXPECT_EQ(modes.zeros, 2);  // ph and its rate
+  EXPECT_NEAR(modes.modes[0].eigenvalue.imag(), rate * std::sqrt(1.0 + 3.0 * c * c), 1e-12);
+  EXPECT_EQ(modes.stability, Stability::neutral);
+  EXPECT_LT(linearise(scene, at, 10.0).variation, 1e-12);
+}
+
+TEST(Equilibrium, AMotionThatIsNotSteadyIsTold) {
+  // The same in Cartesian coordinates goes round: what is linear about one point does not hold at the next.
+  const double c = gravity / 25.0, s = std::sqrt(1.0 - c * c);
+  const Scene scene = spherical_pendulum(Vector{{s, 0.0, -c}}, Vector{{0.0, 5.0 * s, 0.0}});
+  EXPECT_GT(linearise(scene, {0.0, scene.start.q, scene.start.v, Vector::Zero(1)}, 1.0).variation, 0.1);
+}
+
+TEST(Equilibrium, ConstantRowsOnVelocitiesKeepWhatTheyKeepInEveryMotion) {
+  // Two unit springs in a line of charge: x + y keeps its value 1, so both rest at 1/2.
+  Scene scene = scene_of({"x", "y"}, lagrangian<2>([](const auto& q, const auto& v) {
+                           return 0.5 * (v[0] * v[0] + v[1] * v[1] - q[0] * q[0] - q[1] * q[1]);
+                         }),
+                         Vector{{1.0, 0.0}}, Vector::Zero(2));
+  scene.constraints = {pfaffian<2, 1>([]<class T>(const std::array<T, 2>&) {
+    return std::array<std::array<T, 2>, 1>{{{T(1.0), T(1.0)}}};
+  })};
+  const Equilibrium at = find_equilibrium(scene, scene.start);
+  ASSERT_TRUE(at.ok()) << at.failure;
+  EXPECT_NEAR(at.q[0], 0.5, 1e-14);
+  EXPECT_NEAR(at.q[1], 0.5, 1e-14);
+}
+
+TEST(Equilibrium, NonholonomicRowsLeaveMorePositionsThanVelocities) {
+  // A skate with a spring in x and one about its heading, at rest: sideways it does not move at all.
+  Scene scene = scene_of(
+      {"x", "y", "ph"}, lagrangian<3>([](const auto& q, const auto& v) {
+        return 0.5 * (v[0] * v[0] + v[1] * v[1] + v[2] * v[2] - 4.0 * q[0] * q[0] - 9.0 * q[2] * q[2]);
+      }),
+      Vector{{0.3, 0.2, 0.1}}, Vector::Zero(3));
+  scene.constraints = {pfaffian<3, 1>([]<class T>(const std::array<T, 3>& q) {
+    using std::cos, std::sin;
+    return std::array<std::array<T, 3>, 1>{{{sin(q[2]), -cos(q[2]), T(0.0)}}};
+  })};
+  const Equilibrium at = find_equilibrium(scene, scene.start);
+  ASSERT_TRUE(at.ok()) << at.failure;
+  EXPECT_NEAR(at.q[1], 0.2, 1e-9);  // nothing asks for a change of y
+  const Linearisation linear = linearise(scene, at, 1.0);
+  EXPECT_EQ(linear.positions.cols(), 3);
+  EXPECT_EQ(linear.velocities.cols(), 2);
+  const Eigenmodes modes = eigenmodes(linear);
+  EXPECT_EQ(modes.zeros, 1);
+  ASSERT_EQ(modes.modes.size(), 2U);
+  EXPECT_NEAR(modes.modes[0].eigenvalue.imag(), 2.0, 1e-12);
+  EXPECT_NEAR(modes.modes[1].eigenvalue.imag(), 3.0, 1e-12);
+}
+
+TEST(Equilibrium, WhereThereIsNoneTheForceThatIsLeftIsNamed) {
+  const Scene scene =
+      scene_of({"height"},
+               lagrangian<1>([](const auto& q, const auto& v) { return 0.5 * v[0] * v[0] - gravity * q[0]; }),
+               Vector::Ones(1), Vector::Zero(1));
+  const Equilibrium found = find_equilibrium(scene, scene.start);
+  EXPECT_FALSE(found.ok());
+  EXPECT_NE(found.failure.find("-9.81 is left on 'height'"), std::string::npos) << found.failure;
+}
+
+TEST(Equilibrium, AFrictionThatFeedsEnergyIsUnstableAndOneThatTakesItStable) {
+  for (const double damping : {-0.2, 0.2}) {
+    Scene scene = pendulum(0.3);
+    scene.force = force<1>([damping]<class T>(const std::array<T, 1>&, const std::array<T, 1>& v) {
+      return std::array<T, 1>{-damping * v[0]};
+    });
+    const Eigenmodes modes = eigenmodes(linearise(scene, find_equilibrium(scene, scene.start), 1.0));
+    EXPECT_EQ(modes.stability, damping > 0.0 ? Stability::asymptotic : Stability::unstable);
+    EXPECT_NEAR(modes.modes[0].eigenvalue.real(), -damping / 2.0, 1e-13);
+    EXPECT_NEAR(modes.modes[0].eigenvalue.imag(), std::sqrt(gravity - damping * damping / 4.0), 1e-13);
+  }
+}
+
+}  // namespace
+}  // namespace diracstep
