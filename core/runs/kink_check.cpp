@@ -20,7 +20,8 @@ KinkCheck::KinkCheck(const Integrator& integrator, double end)
     : scene_(integrator.scene()), kinks_(scene_.kinks), crossings_(kinks_, integrator.time(), end) {
   if (crossings_.none()) kinks_ = nullptr;
   if (!kinks_) return;
-  for (Vector* column : {&force_, &between_, &momentum_, &own_}) column->setZero(scene_.dimension());
+  for (Vector* column : {&force_, &between_, &beside_, &change_, &momentum_, &own_})
+    column->setZero(scene_.dimension());
   read(integrator, to_);
   force_at(to_.time, to_.q, to_.v, force_);
 }
@@ -43,15 +44,16 @@ double KinkCheck::missed(const std::vector<KinkCrossing>& cuts, const PathCubic&
   double sum = 0.0, begin = path.begin();
   for (std::size_t k = 0; k <= cuts.size(); ++k) {
     const double end = k < cuts.size() ? cuts[k].time : path.end();
-    double beside = 0.0;
+    beside_.setZero(force_.size());
     for (const auto& [place, weight] : gauss_points) {
       const double t = begin + place * (end - begin), s = (t - path.begin()) / h;
       path.at(t, q_, v_);
       force_at(t, q_, v_, between_);
       between_ -= (1.0 - s) * force_before_ + s * force_;
-      beside += weight * max_norm(between_);
+      beside_ += weight * between_.cwiseAbs();
     }
-    sum += std::max(0.0, beside - 2.0 * change_) * std::abs(end - begin);
+    beside_ -= 2.0 * change_;
+    sum += std::max(0.0, beside_.maxCoeff()) * std::abs(end - begin);
     begin = end;
   }
   return sum;
@@ -68,9 +70,8 @@ void KinkCheck::look(const Integrator& integrator) {
   const std::vector<KinkCrossing> cuts = crossings_.along(
       path, path.begin(), path.end(), looks_in_a_step,
       std::max(finest_cut * std::abs(h), std::numeric_limits<double>::epsilon() * std::abs(path.end())));
-  const double change = max_norm(force_ - force_before_);
   if (cuts.empty()) {
-    change_ = change;
+    change_ = (force_ - force_before_).cwiseAbs();
     return;
   }
   const double impulse = missed(cuts, path);
