@@ -24,6 +24,25 @@ KinkCheck::KinkCheck(const Integrator& integrator, double end)
     column->setZero(scene_.dimension());
   read(integrator, to_);
   force_at(to_.time, to_.q, to_.v, force_);
+  switches_.setZero(kinks_->count());
+  kinks_->evaluate(to_.time, to_.q, to_.v, switches_);
+  changes_.setConstant(kinks_->count(), HUGE_VAL);
+}
+
+/// Whether a switching function changes its sign in the last step, or may do so twice as far as its changes
+/// in this and the step before tell, or an instant lies there: most steps are done with by this.
+bool KinkCheck::may_cross() {
+  switches_before_.swap(switches_);
+  switches_.resize(kinks_->count());
+  kinks_->evaluate(to_.time, to_.q, to_.v, switches_);
+  bool may = crossings_.instant_between(from_.time, to_.time);
+  for (Eigen::Index k = 0; k < switches_.size(); ++k) {
+    const double before = switches_before_[k], now = switches_[k], change = std::abs(now - before);
+    const double nearest = std::min(std::abs(before), std::abs(now));
+    may = may || before * now <= 0.0 || !(nearest > 2.0 * std::max(change, changes_[k]));
+    changes_[k] = change;
+  }
+  return may;
 }
 
 void KinkCheck::read(const Integrator& integrator, PathPoint& point) const {
@@ -67,9 +86,11 @@ void KinkCheck::look(const Integrator& integrator) {
   largest_momentum_ = std::max(largest_momentum_, max_norm(integrator.momentum()));
   const PathCubic path{from_, to_};
   const double h = path.end() - path.begin();
-  const std::vector<KinkCrossing> cuts = crossings_.along(
-      path, path.begin(), path.end(), looks_in_a_step,
-      std::max(finest_cut * std::abs(h), std::numeric_limits<double>::epsilon() * std::abs(path.end())));
+  std::vector<KinkCrossing> cuts;
+  if (may_cross())
+    cuts = crossings_.along(
+        path, path.begin(), path.end(), looks_in_a_step,
+        std::max(finest_cut * std::abs(h), std::numeric_limits<double>::epsilon() * std::abs(path.end())));
   if (cuts.empty()) {
     change_ = (force_ - force_before_).cwiseAbs();
     return;
