@@ -20,9 +20,29 @@ KinkCheck::KinkCheck(const Integrator& integrator, double end)
     : scene_(integrator.scene()), kinks_(scene_.kinks), crossings_(kinks_, integrator.time(), end) {
   if (crossings_.none()) kinks_ = nullptr;
   if (!kinks_) return;
-  for (Vector* column : {&force_, &between_, &momentum_, &own_}) column->setZero(scene_.dimension());
+  for (Vector* column : {&force_, &between_, &beside_, &change_, &momentum_, &own_})
+    column->setZero(scene_.dimension());
   read(integrator, to_);
   force_at(to_.time, to_.q, to_.v, force_);
+  switches_.setZero(kinks_->count());
+  kinks_->evaluate(to_.time, to_.q, to_.v, switches_);
+  changes_.setConstant(kinks_->count(), HUGE_VAL);
+}
+
+/// Whether a switching function changes its sign in the last step, or may do so twice as far as its changes
+/// in this and the step before tell, or an instant lies there: most steps are done with by this.
+bool KinkCheck::may_cross() {
+  switches_before_.swap(switches_);
+  switches_.resize(kinks_->count());
+  kinks_->evaluate(to_.time, to_.q, to_.v, switches_);
+  bool may = crossings_.instant_between(from_.time, to_.time);
+  for (Eigen::Index k = 0; k < switches_.size(); ++k) {
+    const double before = switches_before_[k], now = switches_[k], change = std::abs(now - before);
+    const double nearest = std::min(std::abs(before), std::abs(now));
+    may = may || before * now <= 0.0 || !(nearest > 2.0 * std::max(change, changes_[k]));
+    changes_[k] = change;
+  }
+  return may;
 }
 
 void KinkCheck::read(const Integrator& integrator, PathPoint& point) const {
@@ -43,15 +63,16 @@ double KinkCheck::missed(const std::vector<KinkCrossing>& cuts, const PathCubic&
   double sum = 0.0, begin = path.begin();
   for (std::size_t k = 0; k <= cuts.size(); ++k) {
     const double end = k < cuts.size() ? cuts[k].time : path.end();
-    double beside = 0.0;
+    beside_.setZero(force_.size());
     for (const auto& [place, weight] : gauss_points) {
       const double t = begin + place * (end - begin), s = (t - path.begin()) / h;
       path.at(t, q_, v_);
       force_at(t, q_, v_, between_);
       between_ -= (1.0 - s) * force_before_ + s * force_;
-      beside += weight * max_norm(between_);
+      beside_ += weight * between_.cwiseAbs();
     }
-    sum += std::max(0.0, beside - 2.0 * change_) * std::abs(end - begin);
+    beside_ -= 2.0 * change_;
+    sum += std::max(0.0, beside_.maxCoeff()) * std::abs(end - begin);
     begin = end;
   }
   return sum;
@@ -65,12 +86,13 @@ void KinkCheck::look(const Integrator& integrator) {
   largest_momentum_ = std::max(largest_momentum_, max_norm(integrator.momentum()));
   const PathCubic path{from_, to_};
   const double h = path.end() - path.begin();
-  const std::vector<KinkCrossing> cuts = crossings_.along(
-      path, path.begin(), path.end(), looks_in_a_step,
-      std::max(finest_cut * std::abs(h), std::numeric_limits<double>::epsilon() * std::abs(path.end())));
-  const double change = max_norm(force_ - force_before_);
+  std::vector<KinkCrossing> cuts;
+  if (may_cross())
+    cuts = crossings_.along(
+        path, path.begin(), path.end(), looks_in_a_step,
+        std::max(finest_cut * std::abs(h), std::numeric_limits<double>::epsilon() * std::abs(path.end())));
   if (cuts.empty()) {
-    change_ = change;
+    change_ = (force_ - force_before_).cwiseAbs();
     return;
   }
   const double impulse = missed(cuts, path);

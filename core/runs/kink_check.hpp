@@ -11,12 +11,13 @@ namespace diracstep {
 /// that change there spoil it.  A step from t0 to t1 that crosses some is cut there, along a cubic between
 /// its ends, and
 ///
-///   Σ over its parts of  (mean of |F − F between those of t0 and t1| − 2 |ΔF of the step before|) · length,
-///   F = ∂L/∂q + f,
+///   Σ over its parts of the largest component of  (mean of |F − F between those of t0 and t1| − 2 |ΔF of the
+///   step before|) · length, F = ∂L/∂q + f,
 ///
 /// is what a step cannot know of its impulse: h J/4 to h J/2 of a jump by J, all of a pulse between two
 /// nodes. A quarter of it, about what a step over a jump ends beside the motion whatever its order, is added
-/// up, and doubted above a hundredth of the largest momentum.
+/// up, and doubted above 1/200 of the largest momentum; above 1/2000 where the time alone brings the change,
+/// since nodes can be put there.
 ///
 /// Steps that resolve what changes, and kinks at which forces stay continuous, as of a contact, count for
 /// little or nothing.  Not seen is what Kinks do not show.
@@ -37,6 +38,7 @@ class KinkCheck {
  private:
   void look(const Integrator& integrator);
   void read(const Integrator& integrator, PathPoint& point) const;
+  bool may_cross();
   void force_at(double t, const Vector& q, const Vector& v, Vector& force);
   double missed(const std::vector<KinkCrossing>& cuts, const PathCubic& path);
 
@@ -44,8 +46,9 @@ class KinkCheck {
   std::shared_ptr<const Kinks> kinks_;
   KinkCrossings crossings_;
   PathPoint from_, to_;
-  Vector force_, force_before_, between_, momentum_, own_, q_, v_;
-  double change_ = 0.0, sum_ = 0.0, sum_of_instants_ = 0.0, largest_momentum_ = 0.0, first_time_ = 0.0;
+  Vector switches_, switches_before_, changes_;  ///< of each switching function, and in the step before
+  Vector force_, force_before_, change_, between_, beside_, momentum_, own_, q_, v_;
+  double sum_ = 0.0, sum_of_instants_ = 0.0, largest_momentum_ = 0.0, first_time_ = 0.0;
   long jumps_ = 0;
   int first_ = -1;
 };

@@ -9,7 +9,15 @@ KinkCrossings::KinkCrossings(std::shared_ptr<const Kinks> kinks, double first, d
     : kinks_(std::move(kinks)) {
   if (!kinks_) return;
   values_.setZero(kinks_->count());
-  instants_ = kinks_->instants(std::min(first, last), std::max(first, last));
+  for (const auto& [time, width] : kinks_->instants(std::min(first, last), std::max(first, last)))
+    for (const double off : {0.0, -6.0, 6.0, -1.0, 1.0})
+      if (off == 0.0 || width > 0.0) instants_.push_back({time + off * width, off == 0.0 ? 0.0 : width});
+  std::ranges::sort(instants_, {}, &Cut::time);
+}
+
+bool KinkCrossings::instant_between(double a, double b) const {
+  const auto next = std::ranges::upper_bound(instants_, std::min(a, b), {}, &Cut::time);
+  return next != instants_.end() && next->time < std::max(a, b);
 }
 
 void KinkCrossings::add_switches(const PathCubic& path, double a, double b, int looks, double precision,
@@ -38,9 +46,9 @@ std::vector<KinkCrossing> KinkCrossings::along(const PathCubic& path, double a, 
   if (!kinks_) return found;
   if (kinks_->count() > 0) add_switches(path, a, b, looks, precision, found);
   const double low = std::min(a, b), high = std::max(a, b);
-  for (const auto& [time, width] : instants_)
-    for (const double off : {0.0, -6.0, 6.0, -1.0, 1.0})
-      if (off == 0.0 || width < high - low) found.push_back({time + off * width, -1, true});
+  for (auto cut = std::ranges::upper_bound(instants_, low, {}, &Cut::time);
+       cut != instants_.end() && cut->time < high; ++cut)
+    if (cut->width == 0.0 || cut->width < high - low) found.push_back({cut->time, -1, true});
   std::erase_if(found, [&](const KinkCrossing& it) { return !(it.time > low && it.time < high); });
   const double sign = b < a ? -1.0 : 1.0;
   std::ranges::stable_sort(found, {}, [sign](const KinkCrossing& it) { return sign * it.time; });

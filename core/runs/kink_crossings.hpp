@@ -23,6 +23,8 @@ class KinkCrossings {
 
   /// Whether there is nothing to cross.
   bool none() const { return !kinks_ || (kinks_->count() == 0 && instants_.empty()); }
+  /// Whether an instant lies between two times.
+  bool instant_between(double a, double b) const;
   /// Those in (a, b) along the path, from values at `looks` places and between, each to `precision`, in the
   /// order of the motion.  Of a pulse or a ramp of the time its centre, and one and six of its widths beside
   /// it.
@@ -33,7 +35,10 @@ class KinkCrossings {
                     std::vector<KinkCrossing>& found);
 
   std::shared_ptr<const Kinks> kinks_;
-  std::vector<Kinks::Instant> instants_;
+  struct Cut {
+    double time, width;  ///< it counts in steps longer than `width`
+  };
+  std::vector<Cut> instants_;  ///< ascending by time
   Vector q_, v_, values_;
 };
 

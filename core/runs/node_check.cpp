@@ -64,9 +64,10 @@ void NodeCheck::look_for_alternation(const char* what, Vector Sample::*column,
   }
 }
 
-/// F = ∂L/∂q + f + AᵀΛ and the sum of the sizes of its terms; what cancels within ∂L/∂q shows in the products
-/// of velocities with ∂²L/∂q∂v.
-void NodeCheck::add_force(const Sample& node, Vector& force, Vector& terms) {
+/// F = ∂L/∂q + f + AᵀΛ and the sum of the sizes of its terms.  What cancels within ∂L/∂q, as of springs in
+/// balance, shows in the products of its derivatives with q and v, of which `cancelling` is the sum: F may be
+/// round-off of these.
+void NodeCheck::add_force(const Sample& node, Vector& force, Vector& terms, Vector& cancelling) {
   const Eigen::Index n = scene_.dimension();
   Vector momentum(n);
   force.resize(n);
@@ -76,7 +77,10 @@ void NodeCheck::add_force(const Sample& node, Vector& force, Vector& terms) {
   Vector qq(pattern.nonzeros()), qv(pattern.nonzeros()), vv(pattern.nonzeros());
   scene_.lagrangian->hessian(node.time, node.q, node.v, qq, qv, vv);
   qv = qv.cwiseAbs();
-  pattern.multiply_add(qv.data(), node.v.cwiseAbs().eval().data(), terms.data());
+  qq = qq.cwiseAbs();
+  cancelling.setZero(n);
+  pattern.multiply_add(qv.data(), node.v.cwiseAbs().eval().data(), cancelling.data());
+  pattern.multiply_add(qq.data(), node.q.cwiseAbs().eval().data(), cancelling.data());
   if (scene_.force) {
     scene_.force->value(node.time, node.q, node.v, momentum);
     force += momentum;
@@ -92,18 +96,19 @@ void NodeCheck::add_force(const Sample& node, Vector& force, Vector& terms) {
 void NodeCheck::look_for_rest() {
   if (!text_.empty()) return;
   const Eigen::Index n = scene_.dimension();
-  Vector changes = Vector::Zero(n), impulses = changes, all = changes, force, terms;
+  Vector changes = Vector::Zero(n), impulses = changes, all = changes, noise = changes;
+  Vector force, terms, cancelling;
   for (std::size_t k = 0; k + 1 < window; ++k) {
     const double h = std::abs(nodes_[k + 1].time - nodes_[k].time);
-    add_force(nodes_[k], force, terms);
+    add_force(nodes_[k], force, terms, cancelling);
     if (!force.allFinite()) return;
     changes += (nodes_[k + 1].p - nodes_[k].p).cwiseAbs();
     impulses += h * force.cwiseAbs();
     all += h * terms;
+    noise += at_rest * (h * cancelling + nodes_[k].p.cwiseAbs());
   }
   for (Eigen::Index i = 0; i < n && text_.empty(); ++i) {
-    const double noise = at_rest * std::abs(nodes_.back().p[i]);
-    if (!(impulses[i] > smallest * all[i]) || !(impulses[i] > noise)) continue;
+    if (!(impulses[i] > smallest * all[i]) || !(impulses[i] > noise[i])) continue;
     if (!(changes[i] < frozen * impulses[i])) continue;
     std::ostringstream text;
     text << "near t = " << nodes_.back().time << " the momentum of "

@@ -36,7 +36,7 @@ class NodeCheck {
   void judge();
   void look_for_alternation(const char* what, Vector Sample::*column, const std::vector<std::string>& names);
   void look_for_rest();
-  void add_force(const Sample& node, Vector& force, Vector& terms);
+  void add_force(const Sample& node, Vector& force, Vector& terms, Vector& cancelling);
 
   const Scene& scene_;
   ConstraintsAtPoint rows_;

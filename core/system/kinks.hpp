@@ -45,8 +45,8 @@ class Kinks {
   virtual void evaluate(double t, ConstVectorRef q, ConstVectorRef v, VectorRef g) const = 0;
 
   /// The instants between two times, ascending by time, each kind of change once.  Exact where the argument
-  /// is affine in t; others are looked for at 4000 times and between them as far as their phases demand, so
-  /// that a pair of zeros closer than that can be missed.
+  /// is affine in t; others are looked for at 4000 times and more as far as their phases demand, and pairs of
+  /// zeros between these as SignChanges does: a pair can be missed where the argument is flat beside it.
   virtual std::vector<Instant> instants(double first, double last) const = 0;
 
  protected:

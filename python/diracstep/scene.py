@@ -152,6 +152,14 @@ class Scene:
         made._open(**self._again, parameters={**self._changes, **parameters})
         return made
 
+    def with_tolerances(self, tolerances: Mapping[str, float]) -> Scene:
+        """The same scene with absolute tolerances, in their units, of coordinates that are far smaller than others."""
+        if self._callbacks is not None:
+            raise Misuse("the tolerances of a scene of callbacks are stated where it is made")
+        made = Scene.__new__(Scene)
+        made._open(**{**self._again, "tolerances": {**self._tolerances, **tolerances}}, parameters=self._changes)
+        return made
+
     def __del__(self) -> None:
         if getattr(self, "_handle", 0):
             self._close(self._handle)
@@ -162,7 +170,7 @@ class Scene:
     # ---- runs ----
     def run(self, *, until: float | None = None, steps: int | None = None, at: Any = None, error: float | None = None,
             every: int = 1, momentum: str = "projected", progress: bool | None = None, max_solves: int = 0, max_time: float = 0.0,
-            **options: Any) -> Run:
+            tolerances: Mapping[str, float] | None = None, **options: Any) -> Run:
         """One motion from the scene's start, as a Run.
 
         until: time of the end, the scene's own without it; a fixed ``step`` is made so much smaller that whole steps lead there.
@@ -171,6 +179,7 @@ class Scene:
         (``max_solves`` and ``max_time`` in seconds limit that; ``adaptive=True`` or ``False`` decides whether steps vary).
         every: keeps each so-many-th point.  momentum: the representative kept as p: projected, plus or minus.
         progress: shows a bar (tqdm where installed); without it on long runs only.
+        tolerances: {coordinate: absolute tolerance in its unit}, see with_tolerances.
         Further options: method, order, step, rule, solver ("newton", "fixed-point", "automatic", "direct"), jacobian, project_start,
         substeps, compensated_sums; adaptive, eps (radians of a step), control, smallest_step, max_steps for steps that vary.
 
@@ -179,6 +188,10 @@ class Scene:
         """
         if sum(choice is not None for choice in (steps, at, error)) > 1 or (steps is not None or at is not None) and until is not None:
             raise Misuse("until, steps and at exclude each other, and steps and at go with no error")
+        if tolerances:
+            return self.with_tolerances(tolerances).run(
+                until=until, steps=steps, at=at, error=error, every=every, momentum=momentum, progress=progress,
+                max_solves=max_solves, max_time=max_time, **options)
         course, kept = _course(every, momentum, steps, at)
         if error is not None:
             return self._search(course, error, until, options, max_solves, max_time, progress)

@@ -2,6 +2,7 @@
 #include <diracstep/version.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <chrono>
 #include <cmath>
@@ -275,6 +276,36 @@ TEST_F(CInterface, ReadsASceneFromTextAndNamesWhereItIsWrong) {
   source.name = "mine.toml";
   EXPECT_EQ(open(source), DIRACSTEP_MISUSE);
   expect_message({"mine.toml:2", "y"});
+}
+
+/// A motion of 1e-9 beside one of 1e10, which sets what round-off is where L is not quadratic.
+TEST_F(CInterface, ToleranceOfASmallCoordinateIsKept) {
+  diracstep_source source{};
+  const std::string text =
+      "name = \"small\"\nlagrangian = \"v_x^2/2 + a^2*cos(x/a) + v_y^2/2\"\n[coordinates]\nx = {}\ny = {}\n"
+      "[parameters]\na = 1e-9\nu = 0\n[start]\nx = \"a\"\nv_y = \"u\"\n[span]\nend = 10\nstep = 0.1\n";
+  source.text = text.c_str();
+  const auto end_of_x = [&] {
+    EXPECT_EQ(open(source), DIRACSTEP_OK) << diracstep_message();
+    EXPECT_EQ(create(), DIRACSTEP_OK) << diracstep_message();
+    EXPECT_EQ(diracstep_step(made_, 100), DIRACSTEP_OK) << diracstep_message();
+    std::array<double, 2> q{}, v{}, p{};
+    diracstep_state state{0.0, 0.0, q.data(), v.data(), p.data(), nullptr};
+    EXPECT_EQ(diracstep_read(made_, DIRACSTEP_PROJECTED, &state), DIRACSTEP_OK);
+    return q[0];
+  };
+  const double alone = end_of_x();
+  const diracstep_parameter speed{"u", 1e9};
+  source.parameters = 1;
+  source.parameter = &speed;
+  EXPECT_GT(std::abs(end_of_x() - alone), 1e-10);
+  diracstep_parameter tolerance{"x", 1e-24};
+  source.tolerances = 1;
+  source.tolerance = &tolerance;
+  EXPECT_NEAR(end_of_x(), alone, 1e-18);
+  tolerance.name = "z";
+  EXPECT_EQ(open(source), DIRACSTEP_MISUSE);
+  expect_message({"no coordinate 'z'"});
 }
 
 TEST_F(CInterface, RunsIntoArraysThatGrowAndEndsWhereAsked) {

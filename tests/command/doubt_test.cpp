@@ -162,6 +162,31 @@ TEST_F(Doubt, AnErrorIsDeniedByTheEnergy) {
             std::string::npos);
 }
 
+/// The energy of x alone, beside a coordinate that is driven, for which no energy is kept.
+TEST_F(Doubt, AnErrorIsDeniedByAnInvariant) {
+  const Outcome outcome = run("run " + scene("spike", R"toml(
+lagrangian = "v_x^2/2 + v_y^2/2 - V"
+[definitions]
+V = "0.8*max(0, 1 - abs(x - 1.58954)/1e-5)"
+[coordinates]
+x = {}
+y = {}
+[force]
+y = "0.1*sin(t)"
+[invariants]
+along_x = "v_x^2/2 + V"
+[start]
+v_x = 1
+[span]
+end = 2
+step = 0.1
+)toml") + " --error 1e-2 --json");
+  const Json json = Json::parse(outcome.out);
+  const double x = json["end"]["q"]["x"], exact = 1.179085;  // reflected
+  EXPECT_TRUE(outcome.status != 0 || std::abs(x - exact) < 1e-2) << outcome.out;
+  EXPECT_NE(outcome.err.find("the invariant along_x changed by"), std::string::npos) << outcome.err;
+}
+
 /// Passes within a hundredth of a step; the force has no mean over it.
 TEST_F(Doubt, ABumpOfThePotentialIsFound) {
   const Outcome outcome = run("run " + scene("bump", R"toml(

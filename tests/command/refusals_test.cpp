@@ -22,7 +22,7 @@ class Refusals : public Command {
                  "lagrangian = \"(v_x^2 + v_y^2 + v_z^2)/2 - y - z\"\n"
                  "[coordinates]\nx = {}\ny = {}\nz = {}\n[[rows]]\nname = \"one\"\nequation = \"" +
                      first + "\"\n[[rows]]\nname = \"other\"\nequation = \"" + second +
-                     "\"\n[start]\nv_y = 1\n[span]\nend = 1\nstep = 0.1\n");
+                     "\"\n[span]\nend = 1\nstep = 0.1\n");
   }
 
   void expect_told(const Outcome& outcome, const std::vector<std::string>& parts) const {

@@ -2,6 +2,7 @@
 
 import copy
 import pickle
+import warnings
 
 import numpy as np
 import pytest
@@ -122,3 +123,25 @@ def test_an_ensemble_that_is_refused_says_why():
         ds.load("knife_edge").ensemble(np.zeros((2, 3)), adaptive=True, until=1.0)
     with pytest.raises(ds.Misuse, match="at most 2147483647"):
         ds.load("knife_edge").run(order=2**32 + 4)
+
+
+def test_a_tolerance_of_a_small_coordinate_is_kept():
+    def scene(**more):
+        return ds.Scene(["x", "y"], lambda q, v, a: v @ v / 2 + a**2 * ds.cos(q.x / a), parameters={"a": 1e-9}, q=[1e-9, 0.0],
+                        until=10.0, step=0.1, **more)
+
+    def end_of_x(made, **more):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", ds.Doubt)
+            return made.run(**more)["x"][-1]
+
+    alone, beside = end_of_x(scene()), {"v": [0.0, 1e9]}
+    assert abs(end_of_x(scene(**beside)) - alone) > 1e-10
+    small = {"x": 1e-24}
+    for end in (end_of_x(scene(**beside, tolerances=small)), end_of_x(scene(**beside), tolerances=small),
+                end_of_x(scene(**beside, tolerances=small).with_parameters(a=1e-9))):
+        assert end == pytest.approx(alone, abs=1e-18)
+    with pytest.raises(ds.Misuse, match="no coordinate 'z'"):
+        scene(tolerances={"z": 1.0})
+    with pytest.raises(ds.Misuse, match="above 0"):
+        scene().with_tolerances({"x": 0.0})

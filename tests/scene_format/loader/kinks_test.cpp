@@ -78,8 +78,8 @@ TEST(Kinks, ZerosOfOtherFunctionsOfTheTimeAreFound) {
 TEST(Kinks, PairsOfZerosThatLieCloseToEachOtherAreFound) {
   const auto at =
       kinks_of("max(0, 1 - abs(t - 2.0001)/5e-6) + max(0, 1 - ((t - 7.00007)/1e-6)^2)")->instants(0.0, 10.0);
-  ASSERT_EQ(at.size(), 5u);
-  const double expected[] = {2.0001 - 5e-6, 2.0001, 2.0001 + 5e-6, 7.00007 - 1e-6, 7.00007 + 1e-6};
+  ASSERT_EQ(at.size(), 6u);
+  const double expected[] = {2.0001 - 5e-6, 2.0001, 2.0001 + 5e-6, 7.00007 - 1e-6, 7.00007, 7.00007 + 1e-6};
   for (std::size_t k = 0; k < at.size(); ++k) EXPECT_NEAR(at[k].time, expected[k], 1e-13) << k;
 }
 
@@ -163,6 +163,36 @@ TEST(SwitchedForcesOfAFile, ArePassedByNoSearchWithoutAWord) {
     const double v = -std::sin(10.0) + of_width * std::cos(10.0 - center);
     EXPECT_LT(std::abs(report.end.q[0] - x), error * std::abs(x)) << center << ' ' << width;
     EXPECT_LT(std::abs(report.end.p[0] - v), error * std::abs(v)) << center << ' ' << width;
+  }
+}
+
+/// Walls of the potential that x = t climbs or is reflected from, of widths from 1e-8 to 0.1 of the way.
+TEST(SwitchedForcesOfAFile, WallsArePassedByNoSearchWithoutAWord) {
+  std::mt19937 random(11);
+  std::uniform_real_distribution<double> uniform(0.0, 1.0);
+  for (int k = 0; k < 60; ++k) {
+    const double steep = std::pow(10.0, 1.0 + 7.0 * uniform(random)), place = 0.3 + 1.4 * uniform(random);
+    const double height = uniform(random) < 0.5 ? 0.3 : 0.8,
+                 error = std::pow(10.0, -2.0 - 4.0 * uniform(random));
+    const CatalogueScene entry = scene_from_text(
+        "wall.toml",
+        fmt::format(
+            "name = \"wall\"\nlagrangian = \"v_x^2/2 - {:.17g}*min(1, max(0, {:.17g}*(x - {:.17g})))\"\n"
+            "[coordinates]\nx = {{}}\n[start]\nv_x = 1\n[span]\nend = 2\nstep = 0.1\n",
+            height, steep, place));
+    const ErrorControlReport report =
+        solve_to_error(entry.scene, Registry::with_built_ins(), kinsol(), 2.0, {.error = error});
+    if (!report.ok() || !report.warning.empty()) continue;
+    const double slowing = height * steep, left = 2.0 - place;  // of the time, at the wall
+    const bool reflected = height > 0.5;
+    const double v = reflected ? -1.0 : std::sqrt(1.0 - 2.0 * height);
+    const double within = reflected ? 2.0 / slowing : (1.0 - v) / slowing;
+    const double x = place + (reflected ? 0.0 : 1.0 / steep) + v * (left - within);
+    if (left < within || std::abs(x) < 0.1) continue;  // it ends on the slope, or where it began
+    EXPECT_LT(std::abs(report.end.q[0] - x), 1.5 * error * std::abs(x))
+        << steep << ' ' << place << ' ' << error;
+    EXPECT_LT(std::abs(report.end.p[0] - v), 1.5 * error * std::abs(v))
+        << steep << ' ' << place << ' ' << error;
   }
 }
 
