@@ -23,7 +23,7 @@ struct PlanArguments {
   std::string scene;
   MethodChoice method;
   bool adaptive = false;
-  double eps = 0.0;
+  double eps = AdaptiveOptions{}.eps;
   std::vector<std::string> set;
   bool json = false;
 };

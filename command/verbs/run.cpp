@@ -41,7 +41,7 @@ struct RunArguments {
   long checkpoint_every = 0;
   std::string resume;
   bool adaptive = false;
-  double eps = 0.0;
+  std::optional<double> eps;
   std::string control = "integrating";
   std::string at;
   std::optional<double> error;
@@ -87,6 +87,7 @@ void require_limits(const RunArguments& options) {
 void require_sense(const RunArguments& options) {
   const bool checkpoints = !options.checkpoint.empty() || !options.resume.empty();
   if (options.every < 1) throw Misuse(fmt::format("--every = {}; 1 or more is needed", options.every));
+  if (options.eps && std::isnan(*options.eps)) throw Misuse("--eps is not a number");
   if (!options.at.empty() && !options.adaptive) throw Misuse("--at needs --adaptive");
   if (options.fixed && options.adaptive) throw Misuse("--fixed and --adaptive exclude each other");
   require_limits(options);
@@ -206,7 +207,7 @@ IntegratorOptions run_once(const RunArguments& options, const CatalogueScene& en
   if (options.adaptive) {
     chosen.step = std::copysign(chosen.step, end - entry.scene->start.time);
     AdaptiveIntegrator integrator(entry.scene, session.registry, session.solvers, chosen,
-                                  {.eps = options.eps,
+                                  {.eps = options.eps.value_or(AdaptiveOptions{}.eps),
                                    .control = step_control(options.control),
                                    .end = end,
                                    .smallest_step = options.smallest_step,

@@ -63,10 +63,14 @@ TEST(RadauStep, JacobianAgreesWithDifferences) {
       }
 }
 
-/// Error in q, v and the multipliers at t = 3.6 with N steps.
+/// Error in q, v and the multipliers at t = 3.6 with N steps; infinite where they are too coarse to be
+/// solved.
 double error_with(const std::shared_ptr<const Scene>& scene, int s, long steps, const Sample& reference) {
-  const auto end =
-      samples_of(scene, {.method = radau(s), .step = 3.6 / static_cast<double>(steps)}, steps).back();
+  Integrator integrator(scene, Registry::with_built_ins(), kinsol(),
+                        {.method = radau(s), .step = 3.6 / static_cast<double>(steps)});
+  Sample end;
+  if (!take_steps(integrator, steps).ok() || !integrator.sample(Momentum::projected, end).ok())
+    return HUGE_VAL;
   return join(join(end.q - reference.q, end.v - reference.v), end.lambda - reference.lambda)
       .lpNorm<Eigen::Infinity>();
 }
@@ -79,11 +83,11 @@ TEST(RadauStep, OrderIsTwiceTheStagesLessOneInConfigurationVelocityAndMultiplier
     scenes.push_back(testing::forced(plain));
   }
   constexpr std::array<double, 6> to_show{0.0,  3e-3, 1e-5,
-                                          1e-7, 3e-8, 3e-9};  // errors small enough for the order
+                                          1e-6, 1e-7, 1e-7};  // errors small enough for the order
   for (const auto& scene : scenes) {
     const Sample reference = samples_of(scene, {.method = testing::gl(6), .step = 3.6 / 144}, 144).back();
     for (int s = 1; s <= most_radau_stages; ++s) {
-      long steps = 24;
+      long steps = 4;
       double first = error_with(scene, s, steps, reference);
       while (first > to_show.at(static_cast<std::size_t>(s)))
         first = error_with(scene, s, steps *= 2, reference);
