@@ -1,5 +1,6 @@
 #include <diracstep/c_interface/handles.hpp>
 #include <diracstep/c_interface/pushed_force.hpp>
+#include <diracstep/core/adaptive/damping_survey.hpp>
 #include <diracstep/core/adaptive/rate_survey.hpp>
 #include <diracstep/core/runs/step_loop.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
@@ -44,6 +45,18 @@ std::vector<PlanLine> notes_of(const diracstep_model& model, const diracstep_opt
   return notes;
 }
 
+/// The method where none is named, for steps of fixed size; a force that its owner changes is not known yet.
+void choose_method(const diracstep_model& model, const diracstep_options& options,
+                   IntegratorOptions& stepping) {
+  if (stepping.method != automatic_method || options.eps > 0.0 || options.pushed != 0) return;
+  const double end = end_from(model, options);
+  if (end == model.scene->start.time) return;
+  const DefaultMethod choice = default_method_of_motion(
+      entry_of(model).scene, model.registry, solvers_from(options), end, std::abs(stepping.step), stepping,
+      {stepping.order, 0.0, stepping.constraint_rule, large_from(stepping.dense_limit)});
+  if (model.registry.method(choice.method).info.damped) stepping.method = choice.method;
+}
+
 std::unique_ptr<diracstep_integrator> make(const diracstep_model& model, const diracstep_options& options) {
   const CatalogueScene& entry = entry_of(model);
   std::shared_ptr<const Scene> scene = entry.scene;
@@ -54,6 +67,7 @@ std::unique_ptr<diracstep_integrator> make(const diracstep_model& model, const d
   }
   IntegratorOptions stepping = stepping_from(model, options);
   stepping.step = step_from(model, options);
+  choose_method(model, options, stepping);
   using Stepper = std::variant<Integrator, AdaptiveIntegrator>;
   Stepper stepper = options.eps > 0.0
                         ? Stepper(varying(model, scene, stepping, options))

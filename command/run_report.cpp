@@ -143,6 +143,7 @@ Json variable_json(const VariableSteps& steps) {
           {"largest_step", report.largest_step},
           {"rate_ratio", Json(report.fastest / report.slowest)},
           {"resets", report.resets},
+          {"refused", report.refused},
           {"side_steps", report.side_steps},
           {"accelerations", report.accelerations}};
 }

@@ -33,7 +33,8 @@ struct Wanted {
 };
 
 bool is_method(const std::string& name) {
-  return name.size() > 6 && name.starts_with("type") && name[5] == '/' && !name.ends_with(".toml");
+  const bool typed = name.size() > 6 && name.starts_with("type") && name[5] == '/';
+  return (typed || name.starts_with("damped/")) && !name.ends_with(".toml");
 }
 
 /// The names given; without any all that the plugins bring, and without plugins every method.

@@ -100,7 +100,7 @@ void plan(const PlanArguments& options, Session& session) {
   std::vector<PlanLine> lines = integrator.plan();
   if (options.adaptive)
     lines = AdaptiveIntegrator(entry.scene, session.registry, session.solvers, used,
-                               {.eps = options.eps.value_or(0.0), .end = entry.t_end})
+                               {.eps = options.eps.value_or(AdaptiveOptions{}.eps), .end = entry.t_end})
                 .plan();
   else
     add_direct_line(entry, session, used, lines);

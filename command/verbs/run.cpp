@@ -111,6 +111,7 @@ void require_sense(const RunArguments& options) {
     throw Misuse("--every counts steps; it does not go with --at and --every-time");
   if (chosen_times && options.error)
     throw Misuse("--at and --every-time do not go with --error: name the method and the step that it finds");
+  if (options.eps && std::isnan(*options.eps)) throw Misuse("--eps is not a number");
   if (options.fixed && options.adaptive) throw Misuse("--fixed and --adaptive exclude each other");
   require_limits(options);
   require_use(options);
@@ -271,7 +272,7 @@ IntegratorOptions run_once(const RunArguments& options, const CatalogueScene& en
   if (options.adaptive) {
     chosen.step = std::copysign(chosen.step, end - entry.scene->start.time);
     AdaptiveIntegrator integrator(entry.scene, session.registry, session.solvers, chosen,
-                                  {.eps = options.eps.value_or(0.0),
+                                  {.eps = options.eps.value_or(AdaptiveOptions{}.eps),
                                    .control = step_control(options.control.value_or(usual_control)),
                                    .end = end,
                                    .smallest_step = options.smallest_step,

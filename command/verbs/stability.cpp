@@ -34,19 +34,14 @@ constexpr const char* table_begin = "<!-- tables of diracstep stability -->\n";
 constexpr const char* table_end = "<!-- end of the tables -->\n";
 
 /// One of each construction: transforms of the same discrete Lagrangian take the same steps.
-const std::vector<StabilityMethod> usual_methods{{"type1/midpoint", 2},
-                                                 {"type1/midpoint", 4},
-                                                 {"type1/midpoint", 8},
-                                                 {"type1/gl:2", 4},
-                                                 {"type1/gl:3", 6},
-                                                 {"type1/gl:4", 8},
-                                                 {"type1/left", 1},
-                                                 {"type1/right", 1},
-                                                 {"type1/trapezoidal", 2},
-                                                 {"type1/trapezoidal", 4},
-                                                 {"type2/euler", 1},
-                                                 {"type3/euler", 1},
-                                                 {"type4/legendre(type1/midpoint)", 2}};
+const std::vector<StabilityMethod> usual_methods{
+    {"type1/midpoint", 2},    {"type1/midpoint", 4},
+    {"type1/midpoint", 8},    {"type1/gl:2", 4},
+    {"type1/gl:3", 6},        {"type1/gl:4", 8},
+    {"damped/radau:3", 5},    {"type1/left", 1},
+    {"type1/right", 1},       {"type1/trapezoidal", 2},
+    {"type1/trapezoidal", 4}, {"type2/euler", 1},
+    {"type3/euler", 1},       {"type4/legendre(type1/midpoint)", 2}};
 
 /// Every other method of the registry at its own order.
 void add_the_others(const Registry& registry, std::vector<StabilityMethod>& methods) {

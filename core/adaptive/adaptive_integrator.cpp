@@ -60,12 +60,12 @@ std::vector<double> eps_fractions(const IntegratorOptions& given, int inner_orde
 
 /// With what the defaults stand for.
 AdaptiveOptions checked(AdaptiveOptions adaptive, const MethodInfo& method) {
-  if (!(adaptive.eps >= 0.0) || !std::isfinite(adaptive.eps))
+  if (!std::isnan(adaptive.eps) && !(adaptive.eps > 0.0 && std::isfinite(adaptive.eps)))
     throw Misuse("eps = " + to_text(adaptive.eps) +
-                 "; radians of a step or its local error, above 0, are needed");
+                 "; radians of a step, or its local error, above 0 are needed");
   if (method.damped && adaptive.control == StepControl::integrating)
     adaptive.control = StepControl::local_error;
-  if (adaptive.eps == 0.0)
+  if (std::isnan(adaptive.eps))
     adaptive.eps = method.damped ? AdaptiveOptions::usual_local_error : AdaptiveOptions::usual_radians;
   return adaptive;
 }

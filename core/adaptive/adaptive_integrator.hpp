@@ -3,6 +3,7 @@
 #include <diracstep/core/adaptive/local_error.hpp>
 #include <diracstep/core/adaptive/rate_monitor.hpp>
 #include <diracstep/core/integrator/integrator.hpp>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -37,7 +38,8 @@ StepControl step_control(const std::string& name);
 struct AdaptiveOptions {
   static constexpr double usual_radians = 0.2, usual_local_error = 1e-6;
 
-  double eps = 0.0;  ///< radians of a step, or its local error; 0: the usual ones
+  /// Radians of a step, or its local error; NaN: the usual ones.
+  double eps = std::numeric_limits<double>::quiet_NaN();
   /// For a method of the damping family `integrating`, the default, stands for `local_error`.
   StepControl control = StepControl::integrating;
   Monitor monitor = {};            ///< empty: the generic one

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <diracstep/core/adaptive/damping_survey.hpp>
 #include <diracstep/core/adaptive/pointwise_motion.hpp>
+#include <diracstep/core/adaptive/rate_monitor.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/numerics/scales.hpp>
 
@@ -110,7 +111,7 @@ DampingSurvey survey_damping(const std::shared_ptr<const Scene>& scene, const Re
   if (!scene->force) survey.failure = "the scene has no force";
   if (scene->dimension() > most_coordinates)
     survey.failure = "more than " + std::to_string(most_coordinates) + " coordinates";
-  if (scene->lagrangian && scene->lagrangian->structure().phase_space()) survey.failure = "L is linear in v";
+  if (scene->lagrangian && !has_accelerations(*scene)) survey.failure = "L is linear in v";
   if (!survey.failure.empty()) return survey;
   const double start = scene->start.time, span = std::abs(end - start);
   const double longest = step > 0.0 ? step : span / parts_of_the_motion;

@@ -13,7 +13,7 @@ namespace {
 constexpr std::size_t most_pulses = 200;
 constexpr double below_eps = 0.9, most_growth = 10.0, most_shrinking = 0.1, after_failure = 0.25;
 constexpr double of_the_rate = 1e-6;  // of T ẏ, which counts as a size
-constexpr double of_the_largest = 1e-10, above_round_off = 1e-13;
+constexpr double of_the_largest = 1e-10, above_round_off = 4e-16;
 
 /// |e_i| / s_i, the largest.
 double largest_ratio(const Vector& fine, const Vector& whole, const Vector& sizes, double least) {

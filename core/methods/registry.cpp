@@ -6,7 +6,6 @@
 #include <diracstep/core/methods/registry.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/numerics/near_names.hpp>
-#include <diracstep/core/steps/radau/tableau.hpp>
 #include <optional>
 #include <utility>
 
@@ -188,7 +187,7 @@ std::vector<std::string> Registry::names() const {
         names.push_back(std::string(type) + "/legendre(" + name + ")");
   for (const char* type : {"type1", "type2", "type3"})
     for (const char* stages : {"1", "2", "3", "4"}) names.push_back(std::string(type) + "/gl:" + stages);
-  for (int s = 1; s <= most_radau_stages; ++s) names.push_back(std::string(radau_prefix) + std::to_string(s));
+  for (const char* stages : {"1", "2", "3", "4"}) names.push_back(std::string(radau_prefix) + stages);
   return names;
 }
 

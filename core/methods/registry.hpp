@@ -44,7 +44,8 @@ class Registry {
   StepRule rule(std::string_view name) const;
   const std::vector<StepRule>& rules() const { return rules_; }
 
-  /// Registered names, the Legendre transforms of those of type 1, GL(1) to GL(4), and the damping family.
+  /// Registered names, the Legendre transforms of those of type 1, GL(1) to GL(4), and
+  /// damped/radau:1 to damped/radau:4.
   std::vector<std::string> names() const;
 
  private:

@@ -41,7 +41,6 @@ void EnergyCheck::see(const Sample& point) {
   if (std::isfinite(point.energy) && way <= at_rest * max_norm(start_position_)) return;
   add_at_play(point);
   double change = std::abs(point.energy - start_energy_);
-  if (damped_ && point.energy < start_energy_) change = 0.0;
   if (!std::isfinite(change)) change = HUGE_VAL;
   if (change > worst_change_) {
     worst_change_ = change;
@@ -86,8 +85,13 @@ std::string EnergyCheck::denied(const Sample& point, double error, double positi
 std::string EnergyCheck::text() const {
   if (!lost_ && !(points_ < points_for_a_mean && too_large(at_play_))) return {};
   std::ostringstream text;
-  text << "the energy, which this scene keeps, went from " << start_energy_ << " to " << worst_energy_
-       << " at t = " << worst_time_ << ": the step is too large for the result to be trusted";
+  text
+      << "the energy, which this scene keeps, went from " << start_energy_ << " to " << worst_energy_
+      << " at t = " << worst_time_
+      << (damped_ && worst_energy_ < start_energy_
+              ? ": the method damps what its steps do not resolve; a smaller step or a method that keeps the "
+                "energy if that matters here"
+              : ": the step is too large for the result to be trusted");
   return text.str();
 }
 

@@ -28,7 +28,7 @@ bool keeps_energy(const Scene& scene);
 class EnergyCheck {
  public:
   /// The scene, one with a Lagrangian, must outlive this.  Where the method damps what is too fast for its
-  /// steps, energy that is lost is no doubt.
+  /// steps, the line says of lost energy that it is the method's doing and not the scene's.
   explicit EnergyCheck(const Scene& scene, bool damped = false);
 
   void see(const Sample& point);

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <diracstep/core/adaptive/adaptive_integrator.hpp>
+#include <diracstep/core/adaptive/damping_survey.hpp>
 #include <diracstep/core/adaptive/error_control.hpp>
 #include <diracstep/core/methods/default_method.hpp>
 #include <diracstep/scene_format/scene_catalogue.hpp>
@@ -47,6 +48,15 @@ TEST_P(DefaultMethodOf, IsThatOfASearchForAnError) {
   EXPECT_EQ(report.method, choice.method);
   EXPECT_EQ(report.order, choice.order);
   EXPECT_EQ(report.method_reason, choice.reason);
+}
+
+/// Nothing here is damped strongly, and what keeps its energy is not even looked at.
+TEST_P(DefaultMethodOf, IsNoDampingMethod) {
+  const IntegratorOptions options{.drop_redundant_rows = true};
+  const DefaultMethod choice = default_method_of_motion(scene, registry, kinsol(), entry.t_end,
+                                                        std::abs(entry.natural_step), options, {});
+  EXPECT_FALSE(registry.method(choice.method).info.damped) << choice.reason;
+  EXPECT_EQ(choice.method, default_method(*scene, {}).method);
 }
 
 INSTANTIATE_TEST_SUITE_P(EveryScene, DefaultMethodOf, ::testing::ValuesIn(scene_names()),

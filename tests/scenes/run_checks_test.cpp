@@ -180,6 +180,25 @@ TEST(EnergyCheck, ReadsWhatIsKeptFromTheFormulas) {
   EXPECT_TRUE(keeps_energy(scene));
 }
 
+/// The implicit Euler method takes the energy out of an oscillator, which is told as what it is.
+TEST(EnergyCheck, TellsWhatAMethodDampsAway) {
+  Scene scene;
+  scene.name = "oscillator";
+  scene.coordinates = {"x"};
+  scene.start = {0.0, Vector{{1.0}}, Vector{{0.0}}};
+  scene.lagrangian =
+      lagrangian<1>([](const auto& q, const auto& v) { return 0.5 * v[0] * v[0] - 0.5 * q[0] * q[0]; });
+  const auto shared = std::make_shared<const Scene>(scene);
+  for (const auto& [method, cause] :
+       {std::pair("damped/radau:1", "the method damps"), std::pair("type1/right", "the step is too large")}) {
+    Integrator integrator(shared, Registry::with_built_ins(), kinsol(),
+                          {.method = method, .step = method[0] == 'd' ? 0.1 : 2.5});
+    RunChecks checks(integrator, 100);
+    ASSERT_TRUE(run_steps(integrator, 100, Momentum::projected, 1, nullptr, &checks).ok());
+    EXPECT_NE(checks.text().find(cause), std::string::npos) << checks.text();
+  }
+}
+
 TEST(EnergyCheck, DoesNotDependOnTheOrigin) {
   for (const double origin : {0.0, 1e6}) {
     Scene scene;

@@ -28,7 +28,7 @@ std::vector<TableMethod> table_methods(const Registry& registry) {
   for (const std::string& name : registry.names()) {
     const MethodInfo info = registry.method(name).info;
     methods.push_back({name, info.order});
-    if (info.order == 1 && !info.self_adjoint) methods.push_back({name, 2});
+    if (info.order == 1 && !info.self_adjoint && !info.damped) methods.push_back({name, 2});
     if (name == "type1/midpoint")
       for (const int order : composition_orders)
         if (order > info.order && order <= highest_visible_order) methods.push_back({name, order});

@@ -333,6 +333,7 @@ std::vector<WorkPoint> telling_points(const Study& study, const std::string& met
 }  // namespace
 
 std::vector<int> possible_orders(const MethodInfo& method) {
+  if (method.damped) return {method.order};
   std::vector<int> orders{composition_orders.begin(), composition_orders.end()};
   if (method.order == 1) orders.insert(orders.begin(), 1);
   if (method.order == 1 || (method.order == 2 && method.self_adjoint)) return orders;

@@ -19,6 +19,7 @@ RadauRows::RadauRows(const Scene& scene, const RadauTableau& table)
       n_(scene.dimension()),
       m_(scene.rows()),
       table_(table.a),
+      start_(scene.constraints, n_),
       projection_(only_holonomic(scene.constraints), n_) {
   int row = 0, position = 0;
   for (const auto& rows : scene.constraints) {
@@ -80,6 +81,7 @@ void RadauRows::plan(Block& block, BlockPattern& layout) {
 }
 
 void RadauRows::begin(double t, ConstVectorRef q0) {
+  if (m_ > 0) start_.evaluate(t, q0);
   if (holonomic_rows() > 0) projection_.evaluate(t, q0);
 }
 
@@ -174,6 +176,10 @@ void RadauRows::add_product(const PatternProduct& product, const double* left, d
                             const BlockPattern& layout, int number, VectorRef& values) {
   product.multiply(left, projection_.coefficients().data(), product_.data());
   layout.add_to(values.data(), number, factor, product_.data());
+}
+
+double RadauRows::form_size_at_start() const {
+  return largest_entry(start_.coefficients().data(), start_.coefficients().size());
 }
 
 double RadauRows::form_size() const {

@@ -25,7 +25,7 @@ class RadauRows {
   /// Adds the blocks of the Jacobian; `momentum` has those of L and the force.
   void plan(BlockPattern& layout, const StageMomentum& momentum, const Force* force);
 
-  /// A_h at the start.
+  /// A and A_h at the start.
   void begin(double t, ConstVectorRef q0);
   /// Q_i += h A_h(q0)ᵀ w_i.
   void project(const double* x, NodePoints& at) const;
@@ -35,6 +35,8 @@ class RadauRows {
   void add_to_jacobian(const NodePoints& at, const double* x, const StageMomentum& momentum,
                        const BlockPattern& layout, VectorRef& values);
 
+  /// The largest entry of A at the start.
+  double form_size_at_start() const;
   /// The largest entries of A at the nodes; of A λ; of ∂(Aᵀλ)/∂q after add_to_jacobian().
   double form_size() const;
   double impulse_size(const double* multipliers) const;
@@ -73,7 +75,7 @@ class RadauRows {
   int s_, n_, m_;
   Columns table_;
   std::vector<Block> blocks_;
-  ConstraintsAtPoint projection_;  ///< A_h(q0)
+  ConstraintsAtPoint start_, projection_;  ///< A(q0) and A_h(q0)
   PatternProduct stiffness_along_, mixed_along_, force_along_;
   int lagrangian_layout_ = -1, force_layout_ = -1;
   Vector product_, sum_;  ///< workspaces

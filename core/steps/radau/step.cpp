@@ -78,6 +78,7 @@ class RadauStep final : public StepProblem {
     sizes_of_terms_.begin(memory, max_norm(q0_));
     evaluated_ = false;
     set_scales();
+    if (m_ > 0) scale_rows(rows_.form_size_at_start(), max_norm(start.v), max_norm(q0_));
   }
 
   void guess(ConstVectorRef v0, VectorRef x) override {
@@ -161,11 +162,16 @@ class RadauStep final : public StepProblem {
     if (m_ > 0) terms = std::max(terms, rows_.impulse_size(x.data() + n_ * s_));
     if (std::isfinite(terms)) blocks_[0].scale = std::max(known_momentum_, terms);
     if (m_ == 0) return;
-    const double form = rows_.form_size(), velocity = largest_entry(x.data(), n_ * s_);
-    const double position = std::max(largest_entry(points_.gauss.data(), n_ * s_), part_of_length * length_);
-    max_norm_of_rows_ = form;
-    blocks_[1].scale = scale_of(form * std::max(velocity, position / h));
-    if (m_h_ > 0) blocks_[2].scale = scale_of(form * std::max(position / h, velocity));
+    scale_rows(rows_.form_size(), largest_entry(x.data(), n_ * s_),
+               largest_entry(points_.gauss.data(), n_ * s_));
+  }
+
+  /// For such sizes of A, of velocities and of positions.
+  void scale_rows(double form, double velocity, double position) {
+    const double way = std::max(position, part_of_length * length_) / std::abs(points_.step.size);
+    form_ = form;
+    for (std::size_t b = 1; b < blocks_.size(); ++b)
+      blocks_[b].scale = scale_of(form * std::max(velocity, way));
   }
 
   /// Before the first solve: the derivatives at the start, for the round-off scales.
@@ -195,7 +201,7 @@ class RadauStep final : public StepProblem {
   Columns impulses_;  ///< A(Q_j)ᵀ λ_j
   Vector q0_, p0_, last_x_;
   StageSizes sizes_of_terms_;
-  double scaled_to_ = std::nan(""), known_momentum_ = 0.0, max_norm_of_rows_ = 0.0;
+  double scaled_to_ = std::nan(""), known_momentum_ = 0.0, form_ = 0.0;
   bool evaluated_ = false;                                                      ///< at last_x_
   Vector q_, v_, largest_q_, largest_v_, sizes_, largest_, rows_sizes_, none_;  ///< workspaces
 };
@@ -229,7 +235,7 @@ const double* RadauStep::scales_of_unsolved_rows(ConstVectorRef f, double level)
   }
   if (m_h_ > 0) {
     rows_.size_position_terms(v_, rows_sizes_);
-    none_.setConstant(m_h_, max_norm_of_rows_ * part_of_length * length_ / h);
+    none_.setConstant(m_h_, form_ * part_of_length * length_ / h);
     for (int i = 0; i < s_; ++i)
       row_scales_.set((n_ + m_) * s_ + m_h_ * i, rows_sizes_, none_, blocks_[2].scale);
   }

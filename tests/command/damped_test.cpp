@@ -1,0 +1,195 @@
+/// Scenes that are damped strongly, run as a user does who names no method.
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "run_command.hpp"
+
+namespace diracstep::testing {
+namespace {
+
+using Json = nlohmann::json;
+
+class DampedCommand : public Command {
+ protected:
+  std::string scene(const std::string& name, const std::string& text) const {
+    const std::string file = path(name + ".toml");
+    std::ofstream(file) << "name = \"" << name << "\"\n" << text;
+    return file;
+  }
+
+  Json json(const std::string& arguments) const {
+    const Outcome outcome = run(arguments + " --json");
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+    return Json::parse(outcome.out);
+  }
+};
+
+double of(const Json& end, const char* what, const char* name) { return end[what][name].get<double>(); }
+
+/// A load of 1 mH and 1 kΩ, whose current follows its voltage within 1 µs, behind a source of 50 Hz.
+constexpr const char* decoupling = R"(
+[parameters]
+c = 1e-5
+r = 1000
+[definitions]
+volt = "5 + sin(2*pi*50*t)"
+[[source_voltage]]
+name = "V"
+nodes = ["ground", "p"]
+value = "volt"
+[[capacitor]]
+name = "C"
+nodes = ["p", "ground"]
+value = "c"
+[[inductor]]
+name = "L"
+nodes = ["p", "m"]
+value = "1e-3"
+[[resistor]]
+name = "R"
+nodes = ["m", "ground"]
+value = "r"
+[start]
+qC = "5*c"
+[span]
+end = 0.013
+step = 0.0005
+)";
+
+/// L di/dt + R i = 5 + sin(ωt), after the transient.
+double current_of_the_load(double t) {
+  constexpr double l = 1e-3, r = 1000.0;
+  const double w = 2.0 * M_PI * 50.0;
+  return 5.0 / r + (r * std::sin(w * t) - w * l * std::cos(w * t)) / (r * r + w * w * l * l);
+}
+
+TEST_F(DampedCommand, ALoadOfAMicrosecondIsDampedByDefault) {
+  const std::string file = scene("decoupling", decoupling);
+  const Json by_default = json("run " + file);
+  EXPECT_EQ(by_default["method"], "damped/radau:3");
+  EXPECT_EQ(by_default["adaptive"]["control"], "local-error");
+  EXPECT_NEAR(of(by_default["end"], "v", "qL"), current_of_the_load(0.013), 1e-9);
+  const Json fixed = json("run " + file + " --step 5e-4");
+  EXPECT_EQ(fixed["method"], "damped/radau:3");
+  EXPECT_TRUE(fixed["adaptive"].is_null());
+  EXPECT_NEAR(of(fixed["end"], "v", "qL"), current_of_the_load(0.013), 1e-9);
+  const Outcome gauss = run("run " + file + " --method type1/gl:3 --doubt ignore --json");
+  EXPECT_GT(std::abs(of(Json::parse(gauss.out)["end"], "v", "qL") - current_of_the_load(0.013)), 1e-3);
+}
+
+TEST_F(DampedCommand, APlanSaysWhy) {
+  const Outcome outcome = run("plan " + scene("decoupling", decoupling));
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  for (const char* words : {"damped/radau:3", "strong damping", "by their local error"})
+    EXPECT_NE(outcome.out.find(words), std::string::npos) << words << '\n' << outcome.out;
+  const Outcome kept = run("plan pendulum_cartesian");
+  EXPECT_EQ(kept.out.find("damped"), std::string::npos) << kept.out;
+}
+
+/// A source of 10 V and 50 Hz, 1 mH, a diode of 0.01 Ω forward and 1 MΩ backward, 100 µF beside 500 Ω. Values
+/// of Radau at 1e-10 on the two equations of the current and the voltage.
+TEST_F(DampedCommand, ARectifierHasItsCurrentAndItsVoltage) {
+  const std::string file = scene(
+      "rectifier", R"(
+[parameters]
+ron = 0.01
+roff = 1e6
+c = 1e-4
+[definitions]
+volt = "10*sin(2*pi*50*t)" [[source_voltage]] name = "V" nodes = [ "ground", "a" ] value = "volt"
+                   [[inductor]] name = "L" nodes = [ "a", "b" ] value = "1e-3" [[resistor]] name = "D" nodes =
+                       [ "b", "k" ] value = "ron" [[capacitor]] name = "C" nodes = [ "k", "ground" ] value =
+                           "c" [[resistor]] name = "R" nodes = [ "k", "ground" ] value = "500"[force] qD =
+                               "-(roff - ron)*min(0, v_qD)"[span] end = 0.1 step = 1e-4) ");
+      const Json by_default = json("run " + file);
+  EXPECT_EQ(by_default["method"], "damped/radau:3");
+  EXPECT_NEAR(of(by_default["end"], "v", "qL"), -7.57998081e-6, 2e-6 * 7.58e-6);
+  EXPECT_NEAR(of(by_default["end"], "q", "qC") / 1e-4, 7.57997751, 1e-5);
+  const Json to_error = json("run " + file + " --error 1e-6");
+  EXPECT_EQ(to_error["method"], "damped/radau:3");
+  EXPECT_NEAR(of(to_error["end"], "v", "qL"), -7.57998081e-6, 1e-7 * 7.58e-6);
+  EXPECT_NEAR(of(to_error["end"], "q", "qC") / 1e-4, 7.57997751, 1e-6);
+}
+
+/// A low pass of 1 ms without an inductor; the closed form of the driven first-order equation.
+TEST_F(DampedCommand, ALowPassWithoutInductorHasItsClosedForm) {
+  const std::string file =
+      scene("rc_lowpass", R"(
+[parameters]
+c = 1e-6
+r = 1000
+[definitions]
+volt = "sin(2*pi*1000*t)" [[source_voltage]] name = "V" nodes = [ "ground", "in" ] value = "volt"
+                          [[resistor]] name = "R" nodes = [ "in", "out" ] value = "r" [[capacitor]] name =
+                              "C" nodes = [ "out", "ground" ] value = "c"[span] end = 0.01 step = 1e-5) ");
+      const double w = 2.0 * M_PI * 1000.0,
+                    tau = 1e-3, t = 0.01;
+  const double voltage =
+      (std::sin(w * t) - w * tau * (std::cos(w * t) - std::exp(-t / tau))) / (1.0 + w * w * tau * tau);
+  for (const char* how : {"", " --method damped/radau:3", " --method damped/radau:3 --adaptive --eps 1e-9"})
+    EXPECT_NEAR(of(json("run " + file + how)["end"], "q", "qC") / 1e-6, voltage, 1e-9) << how;
+}
+
+/// The ring modulator of the IVP test set (published end values, RADAU at 1e-12): velocities are its voltages
+/// and currents.
+TEST_F(DampedCommand, TheRingModulatorHasItsPublishedEnd_slow) {
+  const std::string file =
+      scene("ring_modulator",
+            R"(
+lagrangian = """
+  cc*(v_f1^2 + v_f2^2)/2 + cs*(v_f3^2 + v_f4^2 + v_f5^2 + v_f6^2)/2 + cp*v_f7^2/2
+  + lh*(v_b1^2 + v_b2^2)/2 + l2*(v_b3^2 + v_b5^2)/2 + l3*(v_b4^2 + v_b6^2)/2 + l1*(v_b7^2 + v_b8^2)/2
+  + f1*(v_b1 - 0.5*v_b3 + 0.5*v_b4 + v_b7) + f2*(v_b2 - 0.5*v_b5 + 0.5*v_b6 + v_b8)
+  + f3*v_b3 - f4*v_b4 + f5*v_b5 - f6*v_b6"""
+coordinates = ["f1", "f2", "f3", "f4", "f5", "f6", "f7", "b1", "b2", "b3", "b4", "b5", "b6", "b7", "b8"]
+[parameters]
+cc = 1.6e-8
+cs = 2e-12
+cp = 1e-8
+rr = 25e3
+rp = 50
+lh = 4.45
+l1 = 2e-3
+l2 = 5e-4
+l3 = 5e-4
+r1 = 36.3
+r2 = 17.3
+r3 = 17.3
+ri = 50
+rc = 600
+gam = 40.67286402e-9
+del = 17.7493332
+[definitions]
+u1 = "0.5*sin(2e3*pi*t)" u2 = "2*sin(2e4*pi*t)" d1 = "gam*(exp(del*( v_f3 - v_f5 - v_f7 - u2)) - 1)" d2 =
+                "gam*(exp(del*(-v_f4 + v_f6 - v_f7 - u2)) - 1)" d3 =
+                    "gam*(exp(del*( v_f4 + v_f5 + v_f7 + u2)) - 1)" d4 =
+                        "gam*(exp(del*(-v_f3 - v_f6 + v_f7 + u2)) - 1)"[force] f1 = "-v_f1/rr" f2 =
+                            "-v_f2/rr" f3 = "-d1 + d4" f4 = "d2 - d3" f5 = "d1 - d3" f6 = "-d2 + d4" f7 =
+                                "-v_f7/rp + d1 + d2 - d3 - d4" b3 = "-r2*v_b3" b4 = "-r3*v_b4" b5 =
+                                    "-r2*v_b5" b6 = "-r3*v_b6" b7 = "u1 - (ri + r1)*v_b7" b8 =
+                                        "-(rc + r1)*v_b8"[span] end = 1e-3 step = 1e-7) ");
+      const std::pair<const char*, double>
+          published[] = {
+              {"f1", -0.02339057358486745},  {"f2", -0.007367485485540825}, {"f3", 0.2582956709291169},
+              {"f4", -0.4064465721283450},   {"f5", -0.4039455665149794},   {"f6", 0.2607966765422943},
+              {"f7", 0.1106761861269975},    {"b1", 2.939904342435596e-7},  {"b2", -2.840029933642329e-8},
+              {"b3", 7.267198267264553e-4},  {"b4", 7.929487196960840e-4},  {"b5", -7.255283495698965e-4},
+              {"b6", -7.941401968526521e-4}, {"b7", 7.088495416976114e-5},  {"b8", 2.390059075236570e-5}};
+  const Json end = json("run " + file)["end"];
+  for (const auto& [name, value] : published)
+    EXPECT_NEAR(of(end, "v", name), value, 2e-4 * std::abs(value)) << name;
+}
+
+TEST_F(DampedCommand, VariableStepsNeedNothingButTheMethod) {
+  const Json run = json("run flyball_governor --method damped/radau:4 --adaptive --eps 1e-8");
+  EXPECT_LT(run["error_q"].get<double>(), 1e-7);
+  EXPECT_EQ(run["adaptive"]["eps"], 1e-8);
+  expect_misuse("run knife_edge --method damped/radau:3 --adaptive --control in-step",
+                {"damped/radau:3", "local error"});
+  expect_misuse("run knife_edge --method type1/gl:3 --adaptive --control local-error", {"damped/radau:S"});
+  expect_misuse("run knife_edge --method damped/radau:3 --order 6", {"is not composed", "2S − 1"});
+  expect_misuse("run knife_edge --method damped/radau:3 --rule left", {"no other rule"});
+}
+
+}  // namespace
+}  // namespace diracstep::testing
