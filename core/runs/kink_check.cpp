@@ -51,6 +51,10 @@ void KinkCheck::look(const Integrator& integrator) {
     change_ = change;
     return;
   }
+  if (integrator.met_kinks()) {  // where the step was divided
+    change_ = 0.0;
+    return;
+  }
   if (!(jump > 0.0)) return;
   sum_ += part_of_jump * std::abs(integrator.options().step) * jump;
   if (++jumps_ > 1) return;
