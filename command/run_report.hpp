@@ -27,8 +27,8 @@ struct RunResult {
   std::string doubt;                         ///< empty, or why the points are not to be believed
   std::vector<InvariantEnds> invariants;
   std::vector<std::pair<std::string, double>> outputs;  ///< of the scene, at the end
-  std::string out;  ///< the file written, if any
-  long lines = 0;   ///< points in it
+  std::string out;                                      ///< the file written, if any
+  long lines = 0;                                       ///< points in it
 
   bool has_end() const { return end.q.size() > 0; }
 };

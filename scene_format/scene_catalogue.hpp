@@ -51,6 +51,12 @@ struct Invariant {
   std::optional<double> value;  ///< as stated
 };
 
+/// Times outside which an input of the scene has no value.
+struct InputRange {
+  std::string name;
+  double first, last;
+};
+
 /// A number of the user's own along a motion, a column of its file.
 struct Output {
   std::string name;
@@ -96,6 +102,7 @@ struct CatalogueScene {
   std::vector<KnownState> known = {};  ///< references that hold for the parameters, as the file lists them
   std::vector<Invariant> invariants = {};
   std::vector<Output> outputs = {};
+  std::vector<InputRange> input_ranges = {};
   std::optional<StatedStart> stated_start = {};  ///< none for scenes that are not from files
   Recommendation recommended = {};
   std::vector<SymbolNote> notes = {};  ///< coordinates, sizes and parameters

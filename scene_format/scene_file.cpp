@@ -331,6 +331,18 @@ void add_outputs(CatalogueScene& entry, const LoadedScenePtr& loaded) {
   }
 }
 
+/// Throws SceneError where an input ends before the span does.
+void require_inputs_over_span(const SceneDocument& document, double start) {
+  for (const auto& input : document.inputs)
+    for (const double t : {start, document.t_end})
+      if (!input.hold && !(t >= input.times.front() && t <= input.times.back()))
+        throw SceneError(
+            document.file, input.place,
+            fmt::format("the input '{}' is given from t = {:g} to {:g}, and the scene is at t = {:g}; "
+                        "add points, or hold = true to keep its end values",
+                        input.name, input.times.front(), input.times.back(), t));
+}
+
 CatalogueScene load(const std::string& file, const std::string& text, const Parameters& changes,
                     bool as_written) {
   auto program = compile_scene(file, text, as_written);
@@ -338,6 +350,7 @@ CatalogueScene load(const std::string& file, const std::string& text, const Para
   const LoadedScenePtr loaded = std::make_shared<const LoadedScene>(std::move(program), std::move(values));
   const SceneDocument& document = loaded->program->document;
   StatedStart stated = start_of(*loaded);
+  require_inputs_over_span(document, stated.start.time);
   set_rates_of_states(loaded, stated);
   Scene scene = scene_of(loaded, stated.start);
   require_defined_start(*loaded, scene);
@@ -366,6 +379,8 @@ CatalogueScene load(const std::string& file, const std::string& text, const Para
                                 file_value(loaded, loaded->program->invariants[i].function),
                                 loaded->program->invariants[i].value});
   add_outputs(entry, loaded);
+  for (const auto& input : document.inputs)
+    if (!input.hold) entry.input_ranges.push_back({input.name, input.times.front(), input.times.back()});
   return entry;
 }
 

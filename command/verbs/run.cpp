@@ -404,6 +404,15 @@ void compare_invariants(const RunArguments& options, const CatalogueScene& entry
   }
 }
 
+void require_inputs_until(const CatalogueScene& entry, double end) {
+  for (const auto& [name, first, last] : entry.input_ranges)
+    if (!(end >= first && end <= last))
+      throw Misuse(
+          fmt::format("--end: the input '{}' is given from t = {:g} to {:g} and has no value at t = {:g}; "
+                      "hold = true would keep its end values",
+                      name, first, last, end));
+}
+
 void take_outputs(const CatalogueScene& entry, RunResult& result) {
   if (!result.has_end()) return;
   const Vector& second = entry.scene->lagrangian ? result.end.v : result.end.p;
@@ -460,6 +469,7 @@ void run(const RunArguments& given, Session& session) {
     if (!given.step && options.step)
       options.step = std::copysign(*options.step, end - entry.scene->start.time);
   }
+  require_inputs_until(entry, end);
   IntegratorOptions used = integrator_options(session, options.method);
   used.step = options.step.value_or(std::copysign(entry.natural_step, end - entry.scene->start.time));
   used.substeps = options.substeps;

@@ -4,6 +4,7 @@
 #include <diracstep/core/integrator/prepared_scene.hpp>
 #include <diracstep/core/integrator/step_design.hpp>
 #include <diracstep/core/integrator/step_sequence.hpp>
+#include <diracstep/core/integrator/time_kinks.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <sstream>
 #include <utility>
@@ -46,7 +47,9 @@ Integrator::Integrator(PreparedScene prepared, const Registry& registry, const S
       matrices_(matrix_form(*scene_, options_.dense_limit)),
       reader_(std::make_unique<PointReader>(scene_, solvers, matrices_.full)),
       sequence_(std::make_unique<StepSequence>(
-          scene_, design_step(scene_, registry, method_, options_, matrices_.full), solvers, *reader_)) {
+          scene_, design_step(scene_, registry, method_, options_, matrices_.full), solvers, *reader_)),
+      time_kinks_(std::make_unique<TimeKinks>(scene_->kinks, scene_->start.time, options_.step)) {
+  parts_.reserve(4);
   reset(scene_->start);
 }
 
@@ -114,16 +117,23 @@ StepReport Integrator::take(double h, Guess guess) {
   last_.retry.reset();
   last_.size = h;
   const Interval step{time(), h};
-  int pieces = 1;
   if (const std::string fault = fault_of_own_rows(options_, *scene_, step.start, state_.q); !fault.empty())
     return failed({.status = SolveStatus::refused}, step.start, fault);
-  StepSequence::Outcome outcome = sequence_->solve(step, state_, guess, pieces, work_);
+  time_kinks_->divide(step, parts_);
+  met_kinks_ = parts_.size() > 1 || parts_.front().size != h;
+  StepSequence::Outcome outcome =
+      sequence_->solve(parts_, state_, parts_.size() == 1 ? guess : Guess::plain, work_);
+  std::size_t pieces = parts_.size();
   for (int more = 2; !outcome.ok() && more <= options_.substeps; more *= 2) {
-    StepSequence::Outcome divided = sequence_->solve(step, state_, Guess::plain, more, work_);
+    pieces_.clear();
+    for (const Interval& part : parts_)
+      for (int k = 0; k < more; ++k)
+        pieces_.push_back({part.start + k * (part.size / more), part.size / more});
+    StepSequence::Outcome divided = sequence_->solve(pieces_, state_, Guess::plain, work_);
     if (!divided.ok()) continue;
     ++work_.retries.divided_steps;
     outcome = std::move(divided);
-    pieces = more;
+    pieces = pieces_.size();
   }
   if (!outcome.ok()) return failed(outcome.solve, step.start, outcome.failure);
   StepReport report{outcome.solve, work_.steps, step.start, {}};
@@ -137,7 +147,7 @@ StepReport Integrator::failed(const SolveReport& solve, double time, const std::
   return {solve, work_.steps, time, message.str()};
 }
 
-void Integrator::accept_step(double h, int pieces) {
+void Integrator::accept_step(double h, std::size_t pieces) {
   last_.clock = clock_;
   last_.start.swap(state_);
   state_.swap(sequence_->end());

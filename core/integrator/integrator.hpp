@@ -17,6 +17,7 @@ namespace diracstep {
 
 class PointReader;
 class StepSequence;
+class TimeKinks;
 struct PreparedScene;
 
 /// Steps a scene with one method.  Owns every workspace and its solvers, and shares nothing: integrators on
@@ -37,7 +38,8 @@ class Integrator {
   void reset();
   void reset(const Start& start);
 
-  /// One step, of the size in the options.
+  /// One step, of the size in the options.  Where a function of the scene jumps or has a kink at a known time
+  /// (Scene::kinks) the step is taken in parts that meet there, so that it keeps its order.
   StepReport step() { return step(options_.step); }
 
   /// One step of size h, which may change from step to step and be negative.  Throws Misuse for a step that
@@ -58,6 +60,8 @@ class Integrator {
   const Vector& momentum() const { return state_.p; }
   const Vector& velocity_estimate() const { return state_.v; }
   const Work& work() const { return work_; }
+  /// Whether the last step was taken in parts at such times.
+  bool met_kinks() const { return met_kinks_; }
   const Scene& scene() const { return *scene_; }
   const IntegratorOptions& options() const { return options_; }
   const MethodInfo& method() const { return method_.info; }
@@ -93,7 +97,7 @@ class Integrator {
   void go_on_from(double time, ConstVectorRef q, ConstVectorRef p, ConstVectorRef v, Origin origin);
   StepReport take(double h, Guess guess);
   StepReport failed(const SolveReport& solve, double time, const std::string& why) const;
-  void accept_step(double h, int pieces);
+  void accept_step(double h, std::size_t pieces);
 
   std::shared_ptr<const Scene> scene_;
   std::vector<PlanLine> preparation_;
@@ -102,6 +106,9 @@ class Integrator {
   MatrixForm matrices_;
   std::unique_ptr<PointReader> reader_;  // the sequence refers to it, also after a move
   std::unique_ptr<StepSequence> sequence_;
+  std::unique_ptr<TimeKinks> time_kinks_;
+  std::vector<Interval> parts_, pieces_;  ///< of the step
+  bool met_kinks_ = false;
 
   Clock clock_;
   State state_;

@@ -29,23 +29,23 @@ StepSolver::Task StepSequence::task(Stage& stage, Interval step, const State& st
   return {step, start, stage.predictor, guess, first};
 }
 
-StepSequence::Outcome StepSequence::solve(Interval step, const State& start, Guess guess, int pieces,
+StepSequence::Outcome StepSequence::solve(std::span<const Interval> pieces, const State& start, Guess guess,
                                           Work& work) {
-  const double size = step.size / pieces;
   SolveReport total;
-  double t = step.start;
   const State* at = &start;
-  for (int piece = 0; piece < pieces; ++piece)
+  for (const Interval& piece : pieces) {
+    double t = piece.start;
     for (Stage& stage : stages_) {
       StepSolver& part = parts_[stage.part];
-      const double h = stage.fraction * size;
+      const double h = stage.fraction * piece.size;
       const SolveReport report = part.solve(task(stage, {t, h}, *at, guess), stage.x, work);
-      if (!report.ok()) return failed(report, stage, size);
+      if (!report.ok()) return failed(report, stage, piece.size);
       total.add(report);
       end_.swap(part.end().at);
       at = &end_;
       t += h;
     }
+  }
   return {total, {}};
 }
 
@@ -66,7 +66,7 @@ StepSequence::Outcome StepSequence::failed(const SolveReport& report, Stage& sta
   return {report, message.str()};
 }
 
-void StepSequence::accept_step(int pieces) {
+void StepSequence::accept_step(std::size_t pieces) {
   for (StepSolver& part : parts_) part.accept_step();
   for (Stage& stage : stages_) {
     if (pieces == 1)

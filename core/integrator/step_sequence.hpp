@@ -3,6 +3,7 @@
 #include <diracstep/core/integrator/step_solver.hpp>
 #include <functional>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -17,7 +18,7 @@ struct StepDesign {
   std::vector<std::function<std::unique_ptr<StepProblem>()>> parts;
 };
 
-/// A step as its method or a composition of it takes it, whole or in equal pieces.
+/// A step as its method or a composition of it takes it, whole or in pieces.
 ///
 /// All that a step depends on beside the point where it starts: solutions to guess from, and what the parts
 /// keep.  A solve leaves no trace until accept_step().
@@ -32,12 +33,12 @@ class StepSequence {
     std::string failure;  ///< empty, or what went wrong, with the residual of each block
     bool ok() const { return solve.ok(); }
   };
-  /// A step from `start`, in so many pieces; afterwards end() is where it ends.
-  Outcome solve(Interval step, const State& start, Guess guess, int pieces, Work& work);
+  /// A step from `start`, in pieces one after the other; afterwards end() is where it ends.
+  Outcome solve(std::span<const Interval> pieces, const State& start, Guess guess, Work& work);
   State& end() { return end_; }
 
   /// The step last solved is one of the motion: the next ones are guessed from it and judged by it.
-  void accept_step(int pieces);
+  void accept_step(std::size_t pieces);
   /// Takes the step accepted last out of the history, where it was a whole one; its solution stands in the
   /// unknowns.
   void withdraw_step();

@@ -95,6 +95,10 @@ void KinkCheck::look(const Integrator& integrator) {
     change_ = (force_ - force_before_).cwiseAbs();
     return;
   }
+  if (integrator.met_kinks()) {  // the step was divided there
+    change_.setZero();
+    return;
+  }
   const double impulse = missed(cuts, path);
   if (!(impulse > 0.0)) return;
   const bool instants = std::ranges::any_of(cuts, &KinkCrossing::instant);

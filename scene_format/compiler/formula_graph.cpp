@@ -269,6 +269,7 @@ Node FormulaGraph::partial(Node node, bool second) {
     case Op::abs:
       return apply(Op::sign, a);
     case Op::sign:
+    case Op::floor:
       return number(0.0);
     case Op::hypot:
       return divide(second ? b : a, node);

@@ -51,6 +51,7 @@ enum class Op : unsigned char {
   min,
   max,
   hypot,
+  floor,
   where,     ///< b where a > 0, b/2 where a = 0, else 0: derivatives of min and max
   kepler_E,  ///< from here on for references only, without derivatives
   sn,

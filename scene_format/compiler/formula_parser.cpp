@@ -16,33 +16,22 @@ struct Function {
   bool reference = false;
 };
 
-constexpr std::array functions{Function{"sin", Op::sin, 1},
-                               Function{"cos", Op::cos, 1},
-                               Function{"tan", Op::tan, 1},
-                               Function{"asin", Op::asin, 1},
-                               Function{"acos", Op::acos, 1},
-                               Function{"atan", Op::atan, 1},
-                               Function{"atan2", Op::atan2, 2},
-                               Function{"sinh", Op::sinh, 1},
-                               Function{"cosh", Op::cosh, 1},
-                               Function{"tanh", Op::tanh, 1},
-                               Function{"asinh", Op::asinh, 1},
-                               Function{"acosh", Op::acosh, 1},
-                               Function{"atanh", Op::atanh, 1},
-                               Function{"exp", Op::exp, 1},
-                               Function{"log", Op::log, 1},
-                               Function{"sqrt", Op::sqrt, 1},
-                               Function{"abs", Op::abs, 1},
-                               Function{"pow", Op::pow, 2},
-                               Function{"min", Op::min, 2},
-                               Function{"max", Op::max, 2},
-                               Function{"kepler_E", Op::kepler_E, 2, true},
-                               Function{"sn", Op::sn, 2, true},
-                               Function{"cn", Op::cn, 2, true},
+constexpr std::array functions{Function{"sin", Op::sin, 1},     Function{"cos", Op::cos, 1},
+                               Function{"tan", Op::tan, 1},     Function{"asin", Op::asin, 1},
+                               Function{"acos", Op::acos, 1},   Function{"atan", Op::atan, 1},
+                               Function{"atan2", Op::atan2, 2}, Function{"sinh", Op::sinh, 1},
+                               Function{"cosh", Op::cosh, 1},   Function{"tanh", Op::tanh, 1},
+                               Function{"asinh", Op::asinh, 1}, Function{"acosh", Op::acosh, 1},
+                               Function{"atanh", Op::atanh, 1}, Function{"exp", Op::exp, 1},
+                               Function{"log", Op::log, 1},     Function{"sqrt", Op::sqrt, 1},
+                               Function{"abs", Op::abs, 1},     Function{"pow", Op::pow, 2},
+                               Function{"min", Op::min, 2},     Function{"max", Op::max, 2},
+                               Function{"floor", Op::floor, 1}, Function{"kepler_E", Op::kepler_E, 2, true},
+                               Function{"sn", Op::sn, 2, true}, Function{"cn", Op::cn, 2, true},
                                Function{"dn", Op::dn, 2, true}};
 
 /// Functions with arguments of their own kind.
-constexpr std::array<std::string_view, 3> forms{"sum", "rate", "diff"};
+constexpr std::array<std::string_view, 7> forms{"sum", "rate", "diff", "if", "mod", "and", "or"};
 constexpr std::array<std::string_view, 13> keys{"t",    "pi",     "kind", "digits", "how",
                                                 "with", "source", "name", "method", "project",
                                                 "for",  "each",   "guess"};
@@ -154,6 +143,8 @@ class FormulaParser::Reader : FormulaScanner {
   }
 
   Node named(std::size_t place, const std::string& name) {
+    if (const auto input = symbols_.inputs.find(name); input != symbols_.inputs.end())
+      return located(read_input(place, input->second), place);
     if (peek() == '(') return call(place, name);
     if (name == "pi") return graph_.number(std::numbers::pi);
     for (const int loop : std::views::reverse(context_.loops))
@@ -240,6 +231,8 @@ class FormulaParser::Reader : FormulaScanner {
     if (name == "sum") return sum(place);
     if (name == "rate") return rate(place);
     if (name == "diff") return diff(place);
+    if (name == "if") return choice();
+    if (name == "mod") return modulo();
     const auto function = std::ranges::find(functions, name, &Function::name);
     if (function == functions.end())
       fail(place, "unknown function '" + name + "'" + suggestion(name, function_names()));
@@ -253,6 +246,91 @@ class FormulaParser::Reader : FormulaScanner {
     }
     expect(')', "')'");
     return function->op == Op::pow ? graph_.raise(a, b) : graph_.apply(function->op, a, b);
+  }
+
+  /// a > b, or conditions joined by "and" and "or": a tree of choices.
+  struct Condition {
+    Node difference = none;  ///< positive where it holds; of a comparison
+    bool both = false;
+    std::vector<Condition> parts = {};
+  };
+
+  /// x where the condition holds and y elsewhere; on its edge the mean of both.
+  Node chosen(const Condition& condition, Node x, Node y) {
+    if (condition.parts.empty())
+      return graph_.add(graph_.where(condition.difference, x),
+                        graph_.where(graph_.negative(condition.difference), y));
+    const Condition &first = condition.parts[0], &second = condition.parts[1];
+    return condition.both ? chosen(first, chosen(second, x, y), y) : chosen(first, x, chosen(second, x, y));
+  }
+
+  Condition comparison() {
+    const Node left = expression();
+    const char sign = peek();
+    if (sign != '<' && sign != '>') fail_expecting("'<' or '>', for if takes a comparison");
+    take(sign);
+    take('=');  // <= is <: on the edge the value is the mean of both sides
+    const Node right = expression();
+    return {sign == '>' ? graph_.subtract(left, right) : graph_.subtract(right, left)};
+  }
+
+  Condition condition() {
+    Condition whole = comparison();
+    for (;;) {
+      const std::size_t here = at();
+      const std::string join = word();
+      if (join != "and" && join != "or") {
+        back_to(here);
+        return whole;
+      }
+      Condition next = comparison();
+      whole = {none, join == "and", {std::move(whole), std::move(next)}};
+    }
+  }
+
+  Node choice() {
+    const Condition when = condition();
+    expect(',', "',' and the value where the comparison holds");
+    const Node x = expression();
+    expect(',', "',' and the value where it does not");
+    const Node y = expression();
+    expect(')', "')'");
+    return chosen(when, x, y);
+  }
+
+  /// a − b floor(a/b).
+  Node modulo() {
+    const Node a = expression();
+    expect(',', "',' and the second argument of mod");
+    const Node b = expression();
+    expect(')', "')'");
+    return graph_.subtract(a, graph_.multiply(b, graph_.apply(Op::floor, graph_.divide(a, b))));
+  }
+
+  /// An input at the time, or at what stands in parentheses behind its name.
+  Node read_input(std::size_t place, const InputTable& table) {
+    Node u = none;
+    if (take('(')) {
+      u = expression();
+      expect(')', "')'");
+    } else {
+      if (!context_.time)
+        fail(place, "an input is a function of the time t, which may not stand in " + context_.what);
+      u = graph_.time();
+    }
+    const auto from = [&](double start) { return graph_.subtract(u, graph_.number(start)); };
+    Node value =
+        graph_.where(graph_.negative(from(table.parts.front().from)), graph_.number(table.value_before));
+    for (std::size_t k = 0; k < table.parts.size(); ++k) {
+      const InputTable::Part& part = table.parts[k];
+      const double to = k + 1 < table.parts.size() ? table.parts[k + 1].from : table.last;
+      Node polynomial = graph_.number(0.0);
+      for (const double c : std::views::reverse(part.coefficients))
+        polynomial = graph_.add(graph_.multiply(polynomial, from(part.from)), graph_.number(c));
+      value = graph_.add(value,
+                         graph_.where(from(part.from), graph_.where(graph_.negative(from(to)), polynomial)));
+    }
+    return graph_.add(value, graph_.where(from(table.last), graph_.number(table.value_after)));
   }
 
   int loop() {
@@ -329,6 +407,7 @@ class FormulaParser::Reader : FormulaScanner {
     }
     for (const auto& parameter : symbols_.parameters) names.push_back(parameter.name);
     for (const auto& [name, text] : symbols_.definitions) names.push_back(name);
+    for (const auto& [name, table] : symbols_.inputs) names.push_back(name);
     for (const int loop : context_.loops)
       names.push_back(symbols_.loops[static_cast<std::size_t>(loop)].variable);
     return names;

@@ -19,6 +19,17 @@ struct Loop {
   Node last = none;
 };
 
+/// An input from a table: its value between and at the points, by polynomials Σ c_k (u − from)^k from each
+/// point to the next.  Before the first and after the last point it keeps their values.
+struct InputTable {
+  struct Part {
+    double from;
+    std::vector<double> coefficients;
+  };
+  std::vector<Part> parts;
+  double last = 0.0, value_before = 0.0, value_after = 0.0;
+};
+
 /// What the names in a formula may stand for.
 struct Symbols {
   struct Family {
@@ -33,6 +44,7 @@ struct Symbols {
   std::vector<Family> families;
   std::vector<Parameter> parameters;  ///< sizes first
   std::map<std::string, FormulaText, std::less<>> definitions;
+  std::map<std::string, InputTable, std::less<>> inputs;
   std::vector<Loop> loops;
 
   void add(Family family) {

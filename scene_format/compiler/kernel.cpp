@@ -163,6 +163,8 @@ const char* function_name(Op op) {
       return "diracstep_max";
     case Op::hypot:
       return "hypot";
+    case Op::floor:
+      return "floor";
     case Op::where:
       return "diracstep_where";
     default:

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <diracstep/scene_format/compiler/kink_finder.hpp>
+#include <numbers>
 #include <ranges>
 
 namespace diracstep::scene_compiler {
@@ -40,6 +41,10 @@ void KinkFinder::look_at(Node node, const Source& source) {
     case Op::sign:
     case Op::where:
       return add_switch(found_.kinks, data.a, node, "a jump", source);
+    case Op::floor:  // at whole numbers
+      return add_switch(found_.kinks,
+                        graph_.apply(Op::sin, graph_.multiply(graph_.number(std::numbers::pi), data.a)), node,
+                        "a jump", source);
     case Op::min:
     case Op::max:
       return add_switch(found_.kinks, graph_.subtract(data.a, data.b), node,

@@ -64,6 +64,8 @@ T computed(const NodeData& node, T a, T b) {
       return a < b || std::isnan(a) ? a : b;
     case Op::max:
       return a > b || std::isnan(a) ? a : b;
+    case Op::floor:
+      return std::floor(a);
     case Op::hypot:
       return std::hypot(a, b);
     case Op::where:

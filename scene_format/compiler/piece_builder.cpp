@@ -39,7 +39,8 @@ PieceBuilder::Matrix PieceBuilder::gradients(const Piece& piece, const std::vect
 bool PieceBuilder::has_kink(const Piece& piece) const {
   return std::ranges::any_of(graph_.reachable(piece.outputs), [&](Node node) {
     const Op op = graph_[node].op;
-    const bool kink = op == Op::abs || op == Op::sign || op == Op::min || op == Op::max || op == Op::where;
+    const bool kink = op == Op::abs || op == Op::sign || op == Op::min || op == Op::max || op == Op::where ||
+                      op == Op::floor;
     return kink && varies(node);
   });
 }

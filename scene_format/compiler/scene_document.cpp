@@ -38,7 +38,7 @@ class DocumentReader : TableReader {
                 "hamiltonian", "dissipation", "coordinates", "sizes",    "parameters",     "definitions",
                 "rows",        "force",       "start",       "span",     "reference",      "invariants",
                 "recommended", "inductor",    "capacitor",   "resistor", "source_voltage", "mutual",
-                "redundant",   "outputs",     "states"});
+                "redundant",   "outputs",     "states",      "inputs"});
     read_head(root);
     read_parameters(root, "sizes", true);
     read_parameters(root, "parameters", false);
@@ -49,6 +49,7 @@ class DocumentReader : TableReader {
       require_new_name(item.key, item.place);
       document_.definitions.emplace(item.key, formula(*item.node, item.key));
     }
+    read_inputs(root);
     read_rows(root);
     for (const Item& item : items(root, "force")) document_.force.push_back(entry(item));
     read_start(root);
@@ -200,6 +201,51 @@ class DocumentReader : TableReader {
     if (array == nullptr || array->size() != 2 || !(*array)[0].is_string() || !(*array)[1].is_string())
       fail(place_of(table.source()), fmt::format("expected {} = [\"a\", \"b\"]", key));
     return {(*array)[0].as_string()->get(), (*array)[1].as_string()->get()};
+  }
+
+  std::vector<double> list(const toml::table& table, const char* key, const std::string& what,
+                           Place place) const {
+    const toml::node* node = table.get(key);
+    if (node == nullptr || !node->is_array())
+      fail(node == nullptr ? place : place_of(node->source()),
+           fmt::format("{} needs '{}', a list of numbers", what, key));
+    std::vector<double> values;
+    for (const auto& element : *node->as_array()) values.push_back(number(element, key));
+    return values;
+  }
+
+  void read_inputs(const toml::table& root) {
+    constexpr std::size_t most_points = 1000;  // each becomes a part of the formulas
+    for (const Item& item : items(root, "inputs")) {
+      require_new_name(item.key, item.place);
+      const std::string what = "input '" + item.key + "'";
+      const toml::table& entry = table(item, "wind = { times = [0, 1, 2], values = [0, 3, 1] }");
+      check_keys(entry, what, {"times", "values", "kind", "hold", "unit", "meaning"});
+      SceneDocument::Input input{item.key,
+                                 input_kind(entry),
+                                 list(entry, "times", what, item.place),
+                                 list(entry, "values", what, item.place),
+                                 flag(entry, "hold"),
+                                 item.place};
+      if (input.times.size() != input.values.size() || input.times.size() < 2 ||
+          input.times.size() > most_points)
+        fail(item.place, fmt::format("{} has {} times and {} values; expected as many of both, from 2 to {}",
+                                     what, input.times.size(), input.values.size(), most_points));
+      for (std::size_t k = 1; k < input.times.size(); ++k)
+        if (!(input.times[k] > input.times[k - 1]))
+          fail(place_of((*entry.get("times")->as_array())[k].source()),
+               fmt::format("{}: the time {:g} does not lie behind {:g}; expected them in ascending order",
+                           what, input.times[k], input.times[k - 1]));
+      document_.inputs.push_back(std::move(input));
+    }
+  }
+
+  SceneDocument::Input::Kind input_kind(const toml::table& entry) const {
+    using Kind = SceneDocument::Input::Kind;
+    const std::string kind = string(entry, "kind", "linear");
+    if (kind != "linear" && kind != "cubic" && kind != "step")
+      fail(place_of(entry.get("kind")->source()), "'kind': expected \"linear\", \"cubic\" or \"step\"");
+    return kind == "linear" ? Kind::linear : kind == "cubic" ? Kind::cubic : Kind::step;
   }
 
   void read_states(const toml::table& root) {

@@ -68,6 +68,15 @@ struct SceneDocument {
     FormulaText rate;
     Place place;
   };
+  /// A table of the time.
+  struct Input {
+    enum class Kind { linear, cubic, step };
+    std::string name;
+    Kind kind;
+    std::vector<double> times, values;
+    bool hold = false;  ///< the last value is kept after the last time, the first one before the first
+    Place place;
+  };
   struct Output {
     std::string name;
     FormulaText formula;
@@ -102,6 +111,7 @@ struct SceneDocument {
   std::vector<Parameter> parameters;  ///< sizes first
   std::map<std::string, FormulaText, std::less<>> definitions;
   std::vector<Row> rows;
+  std::vector<Input> inputs;
   std::vector<State> states;  ///< the last of the coordinates, in this order
   std::vector<Entry> force, start;
   std::optional<FormulaText> start_time;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <diracstep/scene_format/compiler/circuit_formulas.hpp>
+#include <diracstep/scene_format/compiler/input_table.hpp>
 #include <diracstep/scene_format/compiler/kink_finder.hpp>
 #include <diracstep/scene_format/compiler/piece_builder.hpp>
 #include <diracstep/scene_format/compiler/scene_program.hpp>
@@ -61,6 +62,7 @@ class SceneCompiler {
     for (const auto& parameter : document_.parameters)
       symbols_.add(Symbols::Parameter{parameter.name, parameter.array});
     symbols_.definitions = document_.definitions;
+    for (const auto& input : document_.inputs) symbols_.inputs.emplace(input.name, table_of(input));
     for (const auto& coordinate : document_.coordinates) {
       Symbols::Family family{coordinate.name, {}, coordinate.cyclic};
       if (coordinate.loops)

@@ -56,6 +56,9 @@ std::vector<std::pair<std::string, std::string>> scene_definition(const SceneDoc
     if (parameter.array)
       all.add("array " + parameter.name, fmt::format("{:.17g}", fmt::join(parameter.values, ", ")));
   for (const auto& [name, text] : document.definitions) all.add("definition " + name, formula(text));
+  for (const auto& input : document.inputs)
+    all.add("input " + input.name, fmt::format("{} {:.17g} at {:.17g}", static_cast<int>(input.kind),
+                                               fmt::join(input.values, ", "), fmt::join(input.times, ", ")));
   for (const auto& row : document.rows)
     all.add("row " + row.name, formula(row.equation) + (row.loops ? " for " + formula(*row.loops) : ""));
   for (const auto& state : document.states) all.add("rate of " + state.name, formula(state.rate));
