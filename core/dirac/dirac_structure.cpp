@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <diracstep/core/dirac/dirac_structure.hpp>
+#include <diracstep/core/dirac/orthonormal_bases.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/numerics/scales.hpp>
 
@@ -25,19 +26,17 @@ double outside_row_space(const Columns& one_forms, const Vector& covector) {
 /// rows f_q = 0,  e_q + f_p − C e_c ∈ range of one_formsᵀ,  e_p = f_q,  f_c = −Cᵀ f_q.
 FlowEffortSpace canonical_structure(const Columns& rows, const Columns& one_forms, const Columns& ports) {
   const Eigen::Index n = ports.rows(), c = ports.cols(), m = rows.rows();
-  const Columns unit = Columns::Identity(n, n);
-  // The part of a covector outside the annihilator, as n rows of rank n − m.
-  const Columns outside =
-      unit - (m == 0 ? Columns(Columns::Zero(n, n))
-                     : Columns(one_forms.completeOrthogonalDecomposition().pseudoInverse() * one_forms));
-  Columns flows = Columns::Zero(m + 2 * n + c, 2 * n + c), efforts = flows;
+  // Covectors in the annihilator are those that vanish on Δ_Q.
+  const Columns on_distribution = orthonormal_bases(one_forms.transpose()).complement.transpose();
+  const Eigen::Index k = on_distribution.rows();
+  Columns flows = Columns::Zero(m + k + n + c, 2 * n + c), efforts = flows;
   flows.block(0, 0, m, n) = rows;
-  flows.block(m, n, n, n) = efforts.block(m, 0, n, n) = outside;
-  efforts.block(m, 2 * n, n, c) = -outside * ports;
-  flows.block(m + n, 0, n, n) = -unit;
-  efforts.block(m + n, n, n, n) = unit;
-  flows.block(m + 2 * n, 0, c, n) = ports.transpose();
-  flows.block(m + 2 * n, 2 * n, c, c).setIdentity();
+  flows.block(m, n, k, n) = efforts.block(m, 0, k, n) = on_distribution;
+  efforts.block(m, 2 * n, k, c) = -on_distribution * ports;
+  flows.block(m + k, 0, n, n) = -Columns::Identity(n, n);
+  efforts.block(m + k, n, n, n).setIdentity();
+  flows.block(m + k + n, 0, c, n) = ports.transpose();
+  flows.block(m + k + n, 2 * n, c, c).setIdentity();
   return FlowEffortSpace::kernel_of(flows, efforts);
 }
 
@@ -138,7 +137,8 @@ FlowEffortSpace DiracStructure::at(double t, const Vector& q) {
 
 FlowEffortSpace DiracStructure::with_ports(double t, const Vector& q, const Columns& ports) {
   require_size("the rows of the ports", ports.rows(), q.size());
-  return canonical_structure(one_forms_at(rows_, t, q), one_forms_at(rows_, t, q), ports);
+  const Columns one_forms = one_forms_at(rows_, t, q);
+  return canonical_structure(one_forms, one_forms, ports);
 }
 
 Membership DiracStructure::membership(double t, const PhaseVelocity& x, const Covector& alpha) {

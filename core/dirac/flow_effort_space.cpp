@@ -1,16 +1,10 @@
 #include <Eigen/QR>
 #include <diracstep/core/dirac/flow_effort_space.hpp>
+#include <diracstep/core/dirac/orthonormal_bases.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/numerics/scales.hpp>
 
 namespace diracstep {
-
-namespace {
-
-/// Orthonormal bases of what some columns span, and of its complement.
-struct OrthonormalBases {
-  Columns span, complement;
-};
 
 OrthonormalBases orthonormal_bases(Columns columns) {
   const Eigen::Index n = columns.rows();
@@ -25,6 +19,8 @@ OrthonormalBases orthonormal_bases(Columns columns) {
   const Columns q = qr.householderQ() * Columns::Identity(n, n);
   return {q.leftCols(qr.rank()), q.rightCols(n - qr.rank())};
 }
+
+namespace {
 
 void require_same_size(const char* what, const Columns& a, const Columns& b) {
   require_size(std::string(what) + ": rows", b.rows(), a.rows());
