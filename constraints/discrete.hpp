@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <diracstep/constraints/pfaffian.hpp>
 #include <diracstep/core/dirac/discrete_rows.hpp>
 #include <diracstep/core/numerics/jet.hpp>
 #include <diracstep/core/system/phase_function.hpp>
@@ -43,6 +44,59 @@ class FormulaDiscreteRows final : public DiscreteRows {
   F formula_;
 };
 
+/// The rows A(q) v = 0 with A(q) = ∂c/∂q1 at (q,q).  A second-order jet in both points gives their
+/// derivatives along the diagonal, ∂A/∂q = ∂1∂2 c + ∂2∂2 c.
+template <int N, int M, class F>
+class InducedRows final : public ConstraintRows {
+ public:
+  InducedRows(F formula, std::vector<std::string> names)
+      : ConstraintRows(false, SparsityPattern::dense(M, N), SparsityPattern::dense(N, N), std::move(names)),
+        formula_(std::move(formula)) {}
+
+  bool workless() const override { return true; }
+
+  void coefficients(double, ConstVectorRef q, VectorRef a, VectorRef b) const override {
+    using Scalar = Jet<N, 1>;
+    std::array<Scalar, N> start;
+    for (std::size_t i = 0; i < N; ++i) start[i] = q[static_cast<Eigen::Index>(i)];
+    const std::array<Scalar, M> c = formula_(start, seed<Scalar, N>(q, 0));
+    for (int r = 0; r < M; ++r)
+      for (int j = 0; j < N; ++j) a[r + j * M] = c[static_cast<std::size_t>(r)].gradient(j);
+    b.setZero();
+  }
+
+  void derivative(double, ConstVectorRef q, ConstVectorRef w, double, VectorRef d) const override {
+    const auto c = on_the_diagonal(q);
+    d.setZero();
+    for (int r = 0; r < M; ++r)
+      for (int j = 0; j < N; ++j)
+        for (int k = 0; k < N; ++k) d[r + k * M] += w[j] * slope(c[static_cast<std::size_t>(r)], j, k);
+  }
+
+  void time_derivative(double, ConstVectorRef, ConstVectorRef, VectorRef d) const override { d.setZero(); }
+
+  void annihilator_derivative(double, ConstVectorRef q, ConstVectorRef lambda, VectorRef d) const override {
+    const auto c = on_the_diagonal(q);
+    d.setZero();
+    for (int r = 0; r < M; ++r)
+      for (int j = 0; j < N; ++j)
+        for (int k = 0; k < N; ++k) d[j + k * N] += lambda[r] * slope(c[static_cast<std::size_t>(r)], j, k);
+  }
+
+ private:
+  using Pair = Jet<2 * N, 2>;  // variables q0, q1
+
+  std::array<Pair, M> on_the_diagonal(ConstVectorRef q) const {
+    return formula_(seed<Pair, N>(q, 0), seed<Pair, N>(q, N));
+  }
+  /// ∂A_rj/∂q_k.
+  static double slope(const Pair& row, int j, int k) {
+    return row.hessian(N + j, k) + row.hessian(N + j, N + k);
+  }
+
+  F formula_;
+};
+
 }  // namespace detail
 
 /// A discrete constraint of one's own, from one formula c(q0, q1) that returns std::array<T, M>:
@@ -55,6 +109,19 @@ class FormulaDiscreteRows final : public DiscreteRows {
 template <int N, int M, class F>
 std::shared_ptr<const DiscreteRows> discrete_rows(F formula) {
   return std::make_shared<const detail::FormulaDiscreteRows<N, M, F>>(std::move(formula));
+}
+
+/// The distribution that a discrete constraint induces, Δ_Q(q) = ker ∂c/∂q1 (q,q)  (Leok and Ohsawa
+/// (4.18), (4.19)), as nonholonomic rows A(q) v = 0: who has c needs no one-forms.  The formula is that of
+/// discrete_rows() without the time, and c(q,q) = 0 for all q (4.17); a scene takes both from it,
+///
+///   scene.constraints = {induced_rows<3, 1>(c)};   options.constraint_rule = discrete_rows<3, 1>(c);
+///
+/// and the integrator checks (4.17) along the motion.
+template <int N, int M, class F>
+std::shared_ptr<const ConstraintRows> induced_rows(F formula, std::vector<std::string> names = {}) {
+  return std::make_shared<const detail::InducedRows<N, M, F>>(std::move(formula),
+                                                              detail::row_names(std::move(names), M));
 }
 
 }  // namespace diracstep

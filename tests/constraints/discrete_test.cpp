@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <diracstep/constraints/discrete.hpp>
+#include <diracstep/constraints/pfaffian.hpp>
 
 #include "misuse.hpp"
 #include "scenes.hpp"
@@ -81,6 +82,62 @@ TEST(OwnDiscreteConstraint, AffineRowsTakeTheTimeAndTheStep) {
       });
   expect_same_motion(std::make_shared<const Scene>(scene), {.method = "type1/midpoint", .step = 0.05}, rows,
                      1e-12);
+}
+
+/// The midpoint rows of v_x + y v_z + sin(z) v_y = 0.
+struct Bent {
+  template <class T>
+  std::array<T, 1> operator()(const std::array<T, 3>& q0, const std::array<T, 3>& q1) const {
+    using std::sin;
+    return {q1[0] - q0[0] + 0.5 * (q0[1] + q1[1]) * (q1[2] - q0[2]) +
+            sin(0.5 * (q0[2] + q1[2])) * (q1[1] - q0[1])};
+  }
+};
+
+TEST(InducedRows, AreTheDistributionOfTheOneFormsWithTheirDerivatives) {
+  const auto induced = induced_rows<3, 1>(Bent{});
+  const auto written = pfaffian<3, 1>([]<class T>(const std::array<T, 3>& q) {
+    using std::sin;
+    return std::array<std::array<T, 3>, 1>{{{T(1.0), sin(q[2]), q[1]}}};
+  });
+  const Vector q{{0.4, -0.9, 1.3}}, w{{0.2, 0.7, -0.5}}, lambda = Vector::Constant(1, 1.7);
+  const auto same = [](const Vector& a, const Vector& b) {
+    EXPECT_LT((a - b).lpNorm<Eigen::Infinity>(), 1e-15);
+  };
+  Vector a(3), b(1), a_written(3), b_written(1);
+  induced->coefficients(0.0, q, a, b);
+  written->coefficients(0.0, q, a_written, b_written);
+  same(a, a_written);
+  EXPECT_EQ(b[0], 0.0);
+  induced->derivative(0.0, q, w, 1.0, a);
+  written->derivative(0.0, q, w, 1.0, a_written);
+  same(a, a_written);
+  Vector curvature(9), curvature_written(9);
+  induced->annihilator_derivative(0.0, q, lambda, curvature);
+  written->annihilator_derivative(0.0, q, lambda, curvature_written);
+  same(curvature, curvature_written);
+}
+
+TEST(InducedRows, ASceneThatGivesTheDiscreteConstraintAloneMovesAsWithBoth) {
+  auto scene = std::make_shared<Scene>(testing::particle("bent"));
+  scene->start.v[0] =
+      -scene->start.q[1] * scene->start.v[2] - std::sin(scene->start.q[2]) * scene->start.v[1];
+  auto with_forms = std::make_shared<Scene>(*scene);
+  scene->constraints = {induced_rows<3, 1>(Bent{})};
+  with_forms->constraints = {pfaffian<3, 1>([]<class T>(const std::array<T, 3>& q) {
+    using std::sin;
+    return std::array<std::array<T, 3>, 1>{{{T(1.0), sin(q[2]), q[1]}}};
+  })};
+  for (const char* method : {"type1/midpoint", "type1/gl:2"}) {
+    IntegratorOptions options{.method = method, .step = 0.05};
+    const auto expected = samples_of(with_forms, options, 100);
+    if (std::string(method) == "type1/midpoint") options.constraint_rule = discrete_rows<3, 1>(Bent{});
+    const auto mine = samples_of(scene, options, 100);
+    for (std::size_t k = 0; k < mine.size(); ++k) {
+      ASSERT_LT((mine[k].q - expected[k].q).lpNorm<Eigen::Infinity>(), 1e-12) << method << k;
+      ASSERT_LT((mine[k].lambda - expected[k].lambda).lpNorm<Eigen::Infinity>(), 1e-10) << method << k;
+    }
+  }
 }
 
 template <class F>
