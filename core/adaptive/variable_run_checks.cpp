@@ -23,7 +23,8 @@ bool VariableRunChecks::divide(double size) {
 }
 
 void VariableRunChecks::after_step() {
-  kinks_.after(integrator_.integrator());
+  // Steps by their local error resolve kinks.
+  if (!integrator_.integrator().method().damped) kinks_.after(integrator_.integrator());
   if (!looking_) return;
   next_look_ += std::min(most_steps_for_a_look, std::max(steps_for_a_look, next_look_));
   if (!integrator_.sample(Momentum::projected, whole_).ok()) return;
