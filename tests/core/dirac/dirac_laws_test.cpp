@@ -276,7 +276,7 @@ DiscreteCurve first_steps(DiscreteCurve curve, std::size_t n) {
 
 /// The principles (7.1), (8.1), (8.2), (9.10), (9.11), (10.1), (10.3) themselves: the sums are varied.
 TEST_P(LawsOfTypesOneToThree, TheSumOfATrajectoryChangesToSecondOrderOnly) {
-  const auto type = method().info.type;
+  const auto type = method().info.type.value();
   for (const auto& scene : testing::every_constraint_class()) {
     if (!generating_function_determines(method(), *scene)) continue;
     const auto s = method().generating_function(*scene);
