@@ -56,6 +56,7 @@ class EquilibriumSearch {
       if (!next && relaxed) return failed("Newton's path ends", here);
       if (!next) relaxed = true;
       here = next ? std::move(*next) : relax(std::move(here));
+      size_ = std::max(size_, here.q.lpNorm<Eigen::Infinity>());
     }
     return failed("none is reached in " + std::to_string(max_path_steps) + " steps", here);
   }
@@ -110,9 +111,7 @@ class EquilibriumSearch {
 
   Vector newton_step(const Point& point) {
     factor(point.jacobian);
-    const Vector change = correction(residual_along(point.allowed, point.residual));
-    size_ = std::max(size_, change.lpNorm<Eigen::Infinity>());
-    return change;
+    return correction(residual_along(point.allowed, point.residual));
   }
 
   void factor(const Columns& jacobian) {

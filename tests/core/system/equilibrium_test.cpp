@@ -62,6 +62,13 @@ TEST(Equilibrium, WhereNewtonsPathEndsItRelaxes) {
   EXPECT_NEAR(found.lambda[0], -gravity / 2.0, 1e-12);  // 2 z λ holds the weight
 }
 
+TEST(Equilibrium, AHugeFirstCorrectionIsNoScale) {
+  const Scene scene = pendulum(std::acos(0.0));  // the stiffness is 6e-17 of the force
+  const Equilibrium at = find_equilibrium(scene, scene.start);
+  ASSERT_TRUE(at.ok()) << at.failure;
+  EXPECT_NEAR(std::sin(at.q[0]), 0.0, 1e-10);
+}
+
 TEST(Equilibrium, VibrationsOfThePendulumAboutBothEquilibria) {
   const double rate = std::sqrt(gravity);
   for (const double angle : {0.1, 3.0}) {
