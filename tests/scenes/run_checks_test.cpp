@@ -284,5 +284,19 @@ TEST(Branches, AreKeptThroughFlatPoses) {
   }
 }
 
+/// The rows of a four-bar mechanism nearly depend on each other there, but not at poses around.
+TEST(Branches, AStartCloseToAFlatPoseIsNotRefused) {
+  const CatalogueScene entry = make_scene("n_four_bar", {{"N", 1}});
+  Scene scene = *entry.scene;
+  const double height = 1e-8, width = std::sqrt(1.0 - height * height);
+  scene.start.q << width, height, 1.0 + width, height;
+  scene.start.v << 0.0, -1.0, 0.0, -1.0;
+  scene.start.v[0] = scene.start.v[2] = height / width;
+  Integrator integrator(std::make_shared<const Scene>(scene), Registry::with_built_ins(), kinsol(),
+                        {.step = 0.01});
+  EXPECT_EQ(doubt_of(integrator, 100), "");
+  EXPECT_EQ(integrator.work().steps, 100);
+}
+
 }  // namespace
 }  // namespace diracstep
