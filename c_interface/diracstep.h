@@ -130,8 +130,8 @@ typedef struct diracstep_options {
   int substeps;         /* a step that cannot be solved is taken in 2, 4, … up to so many; 0: 1 */
   int compensated_sums; /* 1: sums of a step in extended precision */
   int pushed;           /* 1: diracstep_push will be used */
-  double eps;           /* above 0: steps vary, so many radians each, 0.2 is usual; with damped/radau:S by their
-                           local error, 1e-6 is usual */
+  double eps; /* above 0: steps vary, so many radians each, 0.2 is usual; with damped/radau:S by their
+                 local error, 1e-6 is usual */
   const char *control;  /* "integrating", "in-step", "irreversible"; NULL: the first */
   double smallest_step; /* of steps that vary, without sign; 0: 1e-9 of the time to the end */
   long max_steps;       /* of steps that vary: the next one fails; 0: ten million */

@@ -263,56 +263,6 @@ StepReport AdaptiveIntegrator::solve_size(double eps, double guess, double& size
   return failed("no size of the step satisfies the equation for it; take a smaller eps");
 }
 
-void AdaptiveIntegrator::start_local_control() {
-  local_->start(main_);
-  whole_->reset();
-  local_work_ = {};
-  landing_ = 0;
-  next_size_ = up_to_landing(sign_ * local_->first_size());
-}
-
-/// The size, or a part of what is left to the next time that a step has to end at.
-double AdaptiveIntegrator::up_to_landing(double size) const {
-  if (landing_ == landings_.size()) return size;
-  const double left = landings_[landing_].time - main_.time();
-  if (std::abs(size) < 0.5 * std::abs(left)) return size;
-  return std::abs(size) < 0.99 * std::abs(left) ? 0.5 * left : left;
-}
-
-StepReport AdaptiveIntegrator::error_step() {
-  double size = next_size_;
-  StepReport report = local_->advance(main_, *whole_, size, next_size_);
-  report_.refused = local_->refused();
-  const long steps = local_work_.steps;
-  local_work_ = main_.work();
-  local_work_.add(whole_->work());
-  local_work_.steps = report.ok() ? steps + 1 : steps;
-  if (!report.ok()) return report;
-  note(size);
-  const double same_time = 1e-9 * std::abs(size);
-  if (landing_ < landings_.size() && std::abs(time() - landings_[landing_].time) <= same_time) {
-    main_.restart(landings_[landing_++].resume, Vector(main_.position()), Vector(main_.momentum()),
-                  Vector(main_.velocity_estimate()));
-    next_size_ = sign_ * std::min(std::abs(next_size_), local_->first_size());
-  }
-  next_size_ = up_to_landing(next_size_);
-  return report;
-}
-
-/// From the current node to t with the side integrator, each step judged as those of the motion are.
-StepReport AdaptiveIntegrator::side_steps_to(double t) {
-  LocalErrorControl beside = *local_;
-  StepReport report;
-  double next = t - time();
-  while (report.ok() && std::abs(t - side_.time()) > 1e-12 * std::abs(next_size_)) {
-    const double left = t - side_.time();
-    double size = std::abs(next) < std::abs(left) ? next : left;
-    report = beside.advance(side_, *whole_, size, next);
-    ++report_.side_steps;
-  }
-  return report;
-}
-
 StepReport AdaptiveIntegrator::sample_at(double t, Momentum momentum, Sample& sample) {
   const double size = t - time();
   if (!(std::abs(size) <= 2.0 * std::abs(next_size_)))

@@ -76,12 +76,6 @@ ErrorControlReport::Steps RefinementSearch::steps_of(long refinement) const {
   return steps;
 }
 
-/// Radians fall like the refinement; a local error falls so that the sizes of the steps do.
-double RefinementSearch::eps_of(long refinement) const {
-  const double fine = first_ / static_cast<double>(refinement);
-  return local_ ? std::pow(fine, report_.order + 1) : fine;
-}
-
 bool RefinementSearch::reached_end(double t) const {
   return std::abs(t - motion_.end) <= 1e-9 * std::abs(motion_.end - motion_.scene->start.time);
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <chrono>
+#include <cmath>
 #include <diracstep/core/adaptive/convergence.hpp>
 #include <diracstep/core/adaptive/error_control.hpp>
 #include <diracstep/core/adaptive/force_survey.hpp>
@@ -37,7 +38,11 @@ class RefinementSearch {
   bool next(long max_solves);
   Outcome run(long refinement);
   ErrorControlReport::Steps steps_of(long refinement) const;
-  double eps_of(long refinement) const;
+  /// Radians fall like the refinement; a local error falls so that the sizes of the steps do.
+  double eps_of(long refinement) const {
+    const double fine = first_ / static_cast<double>(refinement);
+    return local_ ? std::pow(fine, report_.order + 1) : fine;
+  }
   void count(ErrorControlRun& now, const Work& work);
   bool time_is_up() const;
   bool reached_end(double t) const;

@@ -25,7 +25,7 @@ struct DefaultMethod {
   std::string reason;
 };
 
-/// The method for a scene where none is named: the only place where one is chosen.  First the order p:
+/// The method for a scene where none is named; damping_survey.hpp asks first for damping.  First the order p:
 ///
 ///   an order was asked for             that one
 ///   an error e was asked for           p from e and the size n + m of the systems: what took least time to

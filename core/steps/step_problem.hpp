@@ -24,8 +24,8 @@ struct StepTraits {
   int leading_unknowns;                 ///< how many come before the multipliers, whose guess hardly matters
   int scales = 0, multipliers = 0;      ///< how many of each a StepMemory of the step holds
   std::vector<StageBlock> stages = {};  ///< all unknowns in their order; empty for steps without stages
-  /// It damps what is too fast for it, so that its mean velocity need not come near that of the start as it is
-  /// halved: solutions far from their guess are no sign of another branch.
+  /// It damps what is too fast for it, so that its mean velocity need not come near that of the start as it
+  /// is halved: solutions far from their guess are no sign of another branch.
   bool damped = false;
 };
 

@@ -50,13 +50,17 @@ TEST_P(DefaultMethodOf, IsThatOfASearchForAnError) {
   EXPECT_EQ(report.method_reason, choice.reason);
 }
 
-/// Nothing here is damped strongly, and what keeps its energy is not even looked at.
-TEST_P(DefaultMethodOf, IsNoDampingMethod) {
+/// What keeps its energy is not even looked at; of what is damped, the governor alone has stiff dampers.
+TEST_P(DefaultMethodOf, IsOfTheDampingFamilyOnlyWhereDampersAreStiff) {
   const IntegratorOptions options{.drop_redundant_rows = true};
   const DefaultMethod choice = default_method_of_motion(scene, registry, kinsol(), entry.t_end,
                                                         std::abs(entry.natural_step), options, {});
-  EXPECT_FALSE(registry.method(choice.method).info.damped) << choice.reason;
-  EXPECT_EQ(choice.method, default_method(*scene, {}).method);
+  const bool damped = registry.method(choice.method).info.damped;
+  EXPECT_EQ(damped, GetParam() == "flyball_governor") << choice.reason;
+  if (damped)
+    EXPECT_TRUE(scene->force);
+  else
+    EXPECT_EQ(choice.method, default_method(*scene, {}).method);
 }
 
 INSTANTIATE_TEST_SUITE_P(EveryScene, DefaultMethodOf, ::testing::ValuesIn(scene_names()),

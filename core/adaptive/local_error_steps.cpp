@@ -1,0 +1,68 @@
+#include <algorithm>
+#include <cmath>
+#include <diracstep/core/adaptive/adaptive_integrator.hpp>
+#include <limits>
+
+/// The steps of an AdaptiveIntegrator by their local error.
+namespace diracstep {
+
+namespace {
+
+/// Whether nothing is left to step between two times, for steps of this size.
+bool is_same_time(double a, double b, double size) {
+  constexpr double part = 1e-12, units = 4.0 * std::numeric_limits<double>::epsilon();
+  return std::abs(a - b) <= std::max(part * std::abs(size), units * std::abs(a));
+}
+
+}  // namespace
+
+void AdaptiveIntegrator::start_local_control() {
+  local_->start(main_);
+  whole_->reset();
+  local_work_ = {};
+  landing_ = 0;
+  next_size_ = up_to_landing(sign_ * local_->first_size());
+}
+
+/// The size, or a part of what is left to the next time that a step has to end at.
+double AdaptiveIntegrator::up_to_landing(double size) const {
+  if (landing_ == landings_.size()) return size;
+  const double left = landings_[landing_].time - main_.time();
+  if (std::abs(size) < 0.5 * std::abs(left)) return size;
+  return std::abs(size) < 0.99 * std::abs(left) ? 0.5 * left : left;
+}
+
+StepReport AdaptiveIntegrator::error_step() {
+  double size = next_size_;
+  StepReport report = local_->advance(main_, *whole_, size, next_size_);
+  report_.refused = local_->refused();
+  const long steps = local_work_.steps;
+  local_work_ = main_.work();
+  local_work_.add(whole_->work());
+  local_work_.steps = report.ok() ? steps + 1 : steps;
+  if (!report.ok()) return report;
+  note(size);
+  if (landing_ < landings_.size() && is_same_time(time(), landings_[landing_].time, size)) {
+    main_.restart(landings_[landing_++].resume, Vector(main_.position()), Vector(main_.momentum()),
+                  Vector(main_.velocity_estimate()));
+    next_size_ = sign_ * std::min(std::abs(next_size_), local_->first_size());
+  }
+  next_size_ = up_to_landing(next_size_);
+  return report;
+}
+
+/// From the current node to t with the side integrator, each step judged as those of the motion are.
+StepReport AdaptiveIntegrator::side_steps_to(double t) {
+  LocalErrorControl beside = *local_;
+  StepReport report;
+  double next = t - time();
+  while (report.ok() && !is_same_time(t, side_.time(), next_size_)) {
+    const double left = t - side_.time();
+    double size = std::abs(next) < std::abs(left) ? next : left;
+    report = beside.advance(side_, *whole_, size, next);
+    ++report_.side_steps;
+  }
+  return report;
+}
+
+}  // namespace diracstep
