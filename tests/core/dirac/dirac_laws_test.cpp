@@ -134,7 +134,7 @@ Covector differential(GeneratingFunction& s, const Trajectory& t, std::size_t k,
 }
 
 TEST_P(LawsOfTypesOneToThree, EveryStepIsAMemberOfTheDiscreteDiracStructure) {
-  const auto type = method().info.type;
+  const auto type = method().info.type.value();
   for (const auto& scene : testing::every_constraint_class()) {
     if (!generating_function_determines(method(), *scene)) continue;
     const auto s = method().generating_function(*scene);
@@ -194,7 +194,7 @@ TEST(DiscreteDiracStructure, ReadsTheBasePointAsAMomentumOrAsItsClass) {
 }
 
 TEST_P(LawsOfTypesOneToThree, TrajectoriesAreStationaryForTheirPrinciple) {
-  const auto type = method().info.type;
+  const auto type = method().info.type.value();
   for (const auto& scene : testing::every_constraint_class()) {
     if (!generating_function_determines(method(), *scene)) continue;
     const auto s = method().generating_function(*scene);
