@@ -51,13 +51,14 @@ step = 0.0005
 
 TEST_F(Doubt, HasAnExitStatusOfItsOwn) {
   const std::string file = scene("load", stiff_load);
-  const Outcome doubted = run("run " + file + " --json");
+  const std::string undamped = "run " + file + " --method type1/gl:3";
+  const Outcome doubted = run(undamped + " --json");
   EXPECT_EQ(doubted.status, 3) << doubted.err;
   const Json json = Json::parse(doubted.out);
   EXPECT_EQ(json["status"], "doubted");
   EXPECT_FALSE(json["doubt"].is_null());
-  EXPECT_EQ(run("run " + file + " --doubt ignore").status, 0);
-  const Outcome resolved = run("run " + file + " --step 5e-7 --json");
+  EXPECT_EQ(run(undamped + " --doubt ignore").status, 0);
+  const Outcome resolved = run(undamped + " --step 5e-7 --json");
   EXPECT_EQ(resolved.status, 0) << resolved.err;
   EXPECT_EQ(Json::parse(resolved.out)["status"], "ok");
   expect_misuse("run " + file + " --doubt perhaps", {"perhaps", "report", "ignore"});
@@ -348,7 +349,7 @@ x = "-1e6*(v_x - sin(2000*t))"
 end = 1
 step = 1e-3
 )toml");
-  const Outcome outcome = run("plan " + file);
+  const Outcome outcome = run("plan " + file + " --method type1/gl:3");
   ASSERT_EQ(outcome.status, 0) << outcome.err;
   EXPECT_NE(outcome.out.find("they would take about"), std::string::npos) << outcome.out;
   EXPECT_EQ(outcome.out.find("save time: --adaptive"), std::string::npos) << outcome.out;
