@@ -51,16 +51,19 @@ StepReport EventSearch::see(const Sample& point, const Read& read) {
   return {};
 }
 
-/// The Illinois method: of the two ends of the bracket one is at or behind the zero, and is the hit.
+/// The Illinois method: the end of the bracket at or behind the zero is the hit.  A guess next to an end is
+/// taken a little inside, so that the bracket closes at once where the guesses have converged.
 StepReport EventSearch::locate(std::size_t event, double here, const Sample& point, const Read& read,
                                EventHit& hit) const {
   double before = last_time_, after = point.time, at_before = last_[event], at_after = here;
   hit.sample = point;
   const double smallest = round_off_of_times * std::max(std::abs(before), std::abs(after));
   int side = 0;
-  for (int k = 0; k < most_readings && std::abs(after - before) > smallest && at_after != 0.0; ++k) {
+  for (int k = 0; k < most_readings && std::abs(after - before) > 2.0 * smallest && at_after != 0.0; ++k) {
+    const double sense = after > before ? 1.0 : -1.0;
     double t = after - at_after * (after - before) / (at_after - at_before);
-    if (k % 8 == 7 || !((t - before) * (after - t) > 0.0)) t = before + 0.5 * (after - before);
+    if (k % 8 == 7 || !std::isfinite(t)) t = before + 0.5 * (after - before);
+    t = sense * std::clamp(sense * t, sense * before + smallest, sense * after - smallest);
     Sample between;
     if (StepReport report = read(t, between); !report.ok()) return report;
     const double value_there = value(event, between);
