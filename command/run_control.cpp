@@ -6,6 +6,7 @@
 #include <diracstep/command/interrupt.hpp>
 #include <diracstep/command/progress.hpp>
 #include <diracstep/command/run_control.hpp>
+#include <diracstep/core/runs/event_search.hpp>
 #include <diracstep/core/runs/run.hpp>
 #include <diracstep/core/runs/run_checks.hpp>
 #include <diracstep/core/runs/step_loop.hpp>
@@ -39,6 +40,7 @@ class Run {
         keeping_(keeping),
         result_(result),
         doubt_(integrator, steps - integrator.work().steps),
+        events_(keeping.events, !integrator.scene().lagrangian),
         every_look_(std::max(1L, steps / points_looked_at)),
         next_checkpoint_(Clock::now() + between_checkpoints),
         progress_(static_cast<double>(integrator.work().steps) / static_cast<double>(steps)) {
@@ -51,15 +53,22 @@ class Run {
     const long first = integrator_.work().steps;
     if (first == 0 || wanted(first)) keep();
     keep_chosen_times();
+    look_for_events();
     CheckedSteps steps{integrator_, &doubt_};
     const StepReport last = step_while(
         steps, [&](long k) { return first + k < steps_ && result_.failure.empty(); },
         [&](long k) { return visit(first + k); });
     if (!last.ok())
       result_.failure = last.failure;
-    else if (result_.failure.empty() && integrator_.work().steps < steps_)
+    else if (result_.failure.empty() && !events_.stopped() && integrator_.work().steps < steps_)
       result_.failure = fmt::format("{} at t = {:.10g}", interruption(), integrator_.time());
-    if (integrator_.time() != kept_time_) keep();
+    if (events_.stopped())
+      end_at(events_.hits().back().sample);
+    else if (integrator_.time() != kept_time_)
+      keep();
+    result_.events = events_.events();
+    result_.hits = events_.hits();
+    result_.stopped = events_.stopped();
     result_.work = integrator_.work();
     result_.doubt = doubt_.text();
   }
@@ -68,6 +77,8 @@ class Run {
   /// What there is to do after step k; whether the run goes on.  The signal is asked for once, and the
   /// checkpoint is saved before the point is kept: a run that goes on from it does not keep the point twice.
   bool visit(long k) {
+    look_for_events();
+    if (events_.stopped()) return false;
     const bool stopped = interrupted();
     if (k == steps_ || stopped || checkpoint_due(k)) save();
     if (wanted(k))
@@ -81,6 +92,27 @@ class Run {
 
   bool wanted(long k) const {
     return k == steps_ || (keeping_.file != nullptr && keeping_.times.empty() && k % keeping_.every == 0);
+  }
+
+  /// Between the last node and this one.
+  void look_for_events() {
+    if (events_.empty()) return;
+    Sample here;
+    const auto read = [&](double t, Sample& sample) {
+      return sample_at(integrator_, t, keeping_.momentum, sample);
+    };
+    StepReport report;
+    report.solve = integrator_.sample(keeping_.momentum, here);
+    if (report.ok()) report = events_.see(here, read);
+    if (!report.ok() && result_.failure.empty())
+      result_.failure = fmt::format("looking for events before t = {:g}: {}", integrator_.time(),
+                                    report.failure.empty() ? describe(report.solve.status) : report.failure);
+  }
+
+  /// The point at which an event ends the run is the last one of its file.
+  void end_at(const Sample& sample) {
+    if (keeping_.file != nullptr) keeping_.file->write(sample);
+    result_.end = sample;
   }
 
   /// In steps of this run.
@@ -149,6 +181,7 @@ class Run {
   const Keeping& keeping_;
   RunResult& result_;
   RunChecks doubt_;
+  EventSearch events_;
   long every_look_;
   Sample looked_at_;
   std::vector<double>::const_iterator next_time_;

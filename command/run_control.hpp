@@ -16,6 +16,7 @@ struct Keeping {
   long every = 1;  ///< each so many points go to the file
   /// In place of each so many: times in the direction of the steps, which may lie between nodes.
   std::vector<double> times = {};
+  std::vector<Event> events = {};                                  ///< that are looked for at each step
   TrajectoryFile* file = nullptr;                                  ///< none: only the end is read
   std::string checkpoint = {};                                     ///< path, or empty
   long checkpoint_every = 0;                                       ///< steps; 0: every ten seconds

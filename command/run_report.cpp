@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <diracstep/command/run_report.hpp>
 #include <diracstep/reports/json.hpp>
@@ -95,6 +96,28 @@ std::string outputs_text(const RunResult& result) {
 Json outputs_json(const RunResult& result) {
   Json json = Json::object();
   for (const auto& [name, value] : result.outputs) add_member(json, name, Json(value));
+  return json;
+}
+
+std::string events_text(const RunResult& result) {
+  constexpr std::size_t most = 20;
+  std::string text;
+  for (std::size_t k = 0; k < std::min(most, result.hits.size()); ++k)
+    text += fmt::format("event {}: t = {:.15g}\n", result.events[result.hits[k].event].name,
+                        result.hits[k].sample.time);
+  if (result.hits.size() > most)
+    text += fmt::format("… {} of {} events left out; --json has them all\n", result.hits.size() - most,
+                        result.hits.size());
+  return text;
+}
+
+Json events_json(const RunResult& result, const Scene& scene) {
+  Json json = Json::array();
+  for (const EventHit& hit : result.hits)
+    json.push_back({{"name", result.events[hit.event].name},
+                    {"t", Json(hit.sample.time)},
+                    {"q", by_name(scene.coordinates, hit.sample.q)},
+                    {"v", by_name(scene.coordinates, hit.sample.v)}});
   return json;
 }
 
@@ -196,7 +219,7 @@ std::string run_text(const RunResult& result, const CatalogueScene& entry, const
   if (result.has_end()) {
     text += fmt::format("\nt = {:.10g}\n{}energy: {:.15g}, changed by {:.2e}\n", result.end.time,
                         end_table(result.end, *entry.scene), result.end.energy, energy_change(result, entry));
-    text += invariants_text(result) + outputs_text(result);
+    text += invariants_text(result) + outputs_text(result) + events_text(result);
     if (std::isfinite(result.check.error_q))
       text += fmt::format("error against the {} reference: q {:.2e}, p {:.2e}\n", entry.reference.kind,
                           result.check.error_q, result.check.error_p);
@@ -228,6 +251,8 @@ std::string run_json(const RunResult& result, const CatalogueScene& entry, const
   json["energy_error"] = Json(check.energy_error);
   json["invariants"] = invariants_json(result);
   json["outputs"] = outputs_json(result);
+  json["events"] = events_json(result, *entry.scene);
+  json["stopped"] = result.stopped;
   json["steps"] = result.work.steps;
   json["newton_iterations"] = result.work.iterations;
   json["residual_evaluations"] = result.work.residual_evaluations;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <diracstep/command/variable_steps.hpp>
+#include <diracstep/core/runs/event_search.hpp>
 #include <diracstep/validation/studies/study_run.hpp>
 #include <optional>
 #include <string>
@@ -27,6 +28,9 @@ struct RunResult {
   std::string doubt;                         ///< empty, or why the points are not to be believed
   std::vector<InvariantEnds> invariants;
   std::vector<std::pair<std::string, double>> outputs;  ///< of the scene, at the end
+  std::vector<Event> events;                            ///< of the scene
+  std::vector<EventHit> hits;                           ///< where they were met
+  bool stopped = false;                                 ///< by the last of these
   std::string out;                                      ///< the file written, if any
   long lines = 0;                                       ///< points in it
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <diracstep/core/system/event.hpp>
 #include <diracstep/core/system/scene.hpp>
 #include <functional>
 #include <map>
@@ -103,6 +104,7 @@ struct CatalogueScene {
   std::vector<Invariant> invariants = {};
   std::vector<Output> outputs = {};
   std::vector<InputRange> input_ranges = {};
+  std::vector<Event> events = {};
   std::optional<StatedStart> stated_start = {};  ///< none for scenes that are not from files
   Recommendation recommended = {};
   std::vector<SymbolNote> notes = {};  ///< coordinates, sizes and parameters

@@ -331,6 +331,18 @@ void add_outputs(CatalogueScene& entry, const LoadedScenePtr& loaded) {
   }
 }
 
+void add_events(CatalogueScene& entry, const LoadedScenePtr& loaded) {
+  using Stated = SceneDocument::Event::Direction;
+  const SceneProgram& program = *loaded->program;
+  for (std::size_t i = 0; i < program.events.size(); ++i) {
+    const SceneDocument::Event& stated = program.document.events[i];
+    const Event::Direction direction = stated.direction == Stated::both     ? Event::Direction::both
+                                       : stated.direction == Stated::rising ? Event::Direction::rising
+                                                                            : Event::Direction::falling;
+    entry.events.push_back({stated.name, file_value(loaded, program.events[i]), direction, stated.stop});
+  }
+}
+
 /// Throws SceneError where an input ends before the span does.
 void require_inputs_over_span(const SceneDocument& document, double start) {
   for (const auto& input : document.inputs)
@@ -379,6 +391,7 @@ CatalogueScene load(const std::string& file, const std::string& text, const Para
                                 file_value(loaded, loaded->program->invariants[i].function),
                                 loaded->program->invariants[i].value});
   add_outputs(entry, loaded);
+  add_events(entry, loaded);
   for (const auto& input : document.inputs)
     if (!input.hold) entry.input_ranges.push_back({input.name, input.times.front(), input.times.back()});
   return entry;

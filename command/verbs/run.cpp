@@ -215,6 +215,7 @@ void run_fixed(const RunArguments& options, const CatalogueScene& entry, const S
   keeping.times = chosen_times(
       options, entry, entry.scene->start.time + static_cast<double>(steps) * integrator.options().step);
   require_within(keeping.times, integrator, steps);
+  keeping.events = entry.events;
   keeping.checkpoint = checkpoint_path(options);
   keeping.checkpoint_every = options.checkpoint_every;
   if (!keeping.checkpoint.empty())  // else nothing is saved or compared, and no plugin has to be read for it
@@ -236,19 +237,35 @@ void run_variable(const RunArguments& options, const CatalogueScene& entry, Adap
                   VariableRunChecks& checks, double end, TrajectoryFile* file, RunResult& result) {
   Progress progress;
   const double start = entry.scene->start.time;
+  EventSearch events(entry.events, !entry.scene->lagrangian);
+  StepReport searched;
+  long points = 0;
   const auto keep = [&](const Sample& sample) {
-    if (file != nullptr) file->write(sample);
-    result.end = sample;
+    if (!events.empty()) {
+      searched = events.see(sample, [&](double t, Sample& between) {
+        return sample_at(integrator, t, result.momentum, between);
+      });
+      if (!searched.ok()) return false;
+    }
+    const Sample& shown = events.stopped() ? events.hits().back().sample : sample;
+    const bool due = events.empty() || events.stopped() || points % options.every == 0 || sample.time == end;
+    ++points;
+    if (file != nullptr && due) file->write(shown);
+    result.end = shown;
     progress.show((sample.time - start) / (end - start), fmt::format("t = {:g}", sample.time));
-    return !interrupted();
+    return !events.stopped() && !interrupted();
   };
   const std::vector<double> times = chosen_times(options, entry, end);
-  const RunReport report = times.empty()
-                               ? run_until(integrator, end, result.momentum, options.every, keep, &checks)
-                               : run_at(integrator, times, result.momentum, keep, &checks);
+  const RunReport report = times.empty() ? run_until(integrator, end, result.momentum,
+                                                     events.empty() ? options.every : 1, keep, &checks)
+                                         : run_at(integrator, times, result.momentum, keep, &checks);
   result.failure = report.last.failure;
+  if (result.failure.empty() && !searched.ok()) result.failure = "looking for events: " + searched.failure;
   if (result.failure.empty() && interrupted())
     result.failure = fmt::format("{} at t = {:.10g}", interruption(), integrator.time());
+  result.events = events.events();
+  result.hits = events.hits();
+  result.stopped = events.stopped();
   result.work = integrator.work();
   result.doubt = checks.text();
   result.variable =
@@ -413,6 +430,19 @@ void require_inputs_until(const CatalogueScene& entry, double end) {
                       name, first, last, end));
 }
 
+/// Throws Misuse for runs that do not look for events, where the scene has some.
+void require_events_found(const CatalogueScene& entry, const RunArguments& options) {
+  if (entry.events.empty()) return;
+  if (!checkpoint_path(options).empty())
+    throw Misuse("--checkpoint and --resume do not go with the events of the scene");
+  if (options.error)
+    throw Misuse("--error does not go with the events of the scene: name a method and a step");
+  const bool times = !options.at.empty() || options.every_time,
+             stops = std::ranges::any_of(entry.events, &Event::stop);
+  if (times && (options.adaptive || stops))
+    throw Misuse("--at and --every-time go with fixed steps and with events that do not stop the run only");
+}
+
 void take_outputs(const CatalogueScene& entry, RunResult& result) {
   if (!result.has_end()) return;
   const Vector& second = entry.scene->lagrangian ? result.end.v : result.end.p;
@@ -470,6 +500,7 @@ void run(const RunArguments& given, Session& session) {
       options.step = std::copysign(*options.step, end - entry.scene->start.time);
   }
   require_inputs_until(entry, end);
+  require_events_found(entry, options);
   IntegratorOptions used = integrator_options(session, options.method);
   used.step = options.step.value_or(std::copysign(entry.natural_step, end - entry.scene->start.time));
   used.substeps = options.substeps;

@@ -7,7 +7,7 @@ namespace diracstep {
 
 namespace {
 
-constexpr double steps_in_a_window = 512.0;
+constexpr double steps_in_a_window = 4096.0;  // about as many as are looked at in it at least
 constexpr double gap = 8.0 * std::numeric_limits<double>::epsilon();  // of t, on both sides of a kink
 constexpr double apart = 4.0;  // of these gaps, from the ends of a step
 

@@ -38,7 +38,7 @@ class DocumentReader : TableReader {
                 "hamiltonian", "dissipation", "coordinates", "sizes",    "parameters",     "definitions",
                 "rows",        "force",       "start",       "span",     "reference",      "invariants",
                 "recommended", "inductor",    "capacitor",   "resistor", "source_voltage", "mutual",
-                "redundant",   "outputs",     "states",      "inputs"});
+                "redundant",   "outputs",     "states",      "inputs",   "events"});
     read_head(root);
     read_parameters(root, "sizes", true);
     read_parameters(root, "parameters", false);
@@ -57,6 +57,7 @@ class DocumentReader : TableReader {
     read_references(root);
     read_invariants(root);
     read_outputs(root);
+    read_events(root);
     read_recommended(root);
     return std::move(document_);
   }
@@ -369,6 +370,30 @@ class DocumentReader : TableReader {
                            item.key, taken));
       if (item.key == "energy") fail(item.place, "the column 'energy' is that of the scene itself");
       document_.outputs.push_back({item.key, formula(*item.node, item.key), item.place});
+    }
+  }
+
+  void read_events(const toml::table& root) {
+    using Direction = SceneDocument::Event::Direction;
+    std::set<std::string> names;
+    for (const toml::table* event : tables(root, "events")) {
+      check_keys(*event, "[[events]]", {"name", "when", "direction", "action"});
+      const Place place = place_of(event->source());
+      const std::string name = required_string(*event, "name", "[[events]]");
+      if (!is_name(name)) fail(place, fmt::format("'{}' is no name for an event", name));
+      if (!names.insert(name).second) fail(place, fmt::format("two events are named '{}'", name));
+      const std::string direction = string(*event, "direction", "both"),
+                        action = string(*event, "action", "record");
+      if (direction != "both" && direction != "rising" && direction != "falling")
+        fail(place_of(event->get("direction")->source()),
+             "'direction': expected \"rising\", \"falling\" or \"both\"");
+      if (action != "record" && action != "stop")
+        fail(place_of(event->get("action")->source()), "'action': expected \"record\" or \"stop\"");
+      document_.events.push_back({name, required_formula(*event, "when", "[[events]]"),
+                                  direction == "both"     ? Direction::both
+                                  : direction == "rising" ? Direction::rising
+                                                          : Direction::falling,
+                                  action == "stop"});
     }
   }
 

@@ -77,6 +77,13 @@ struct SceneDocument {
     bool hold = false;  ///< the last value is kept after the last time, the first one before the first
     Place place;
   };
+  struct Event {
+    enum class Direction { both, rising, falling };
+    std::string name;
+    FormulaText when;
+    Direction direction = Direction::both;
+    bool stop = false;
+  };
   struct Output {
     std::string name;
     FormulaText formula;
@@ -112,6 +119,7 @@ struct SceneDocument {
   std::map<std::string, FormulaText, std::less<>> definitions;
   std::vector<Row> rows;
   std::vector<Input> inputs;
+  std::vector<Event> events;
   std::vector<State> states;  ///< the last of the coordinates, in this order
   std::vector<Entry> force, start;
   std::optional<FormulaText> start_time;

@@ -39,6 +39,8 @@ class SceneCompiler {
     for (const auto& output : document_.outputs)
       program_.outputs.push_back(
           {output.name, value_function(output.formula, "output '" + output.name + "'")});
+    for (const auto& event : document_.events)
+      program_.events.push_back(value_function(event.when, "event '" + event.name + "'"));
     write_source();
     program_.kinks = KinkFinder(program_, builder_).find();
   }

@@ -121,6 +121,7 @@ struct SceneProgram {
   std::vector<InvariantProgram> invariants;
   std::vector<OutputProgram> outputs;
   std::vector<StateProgram> states;
+  std::vector<SceneFunction> events;  ///< as in the document
   KinkProgram kinks;
   std::string source;  ///< C for all kernels
   std::string name;    ///< of the source, by its content; the table in it is diracstep_kernels_NAME

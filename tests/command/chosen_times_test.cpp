@@ -98,6 +98,17 @@ TEST_F(ChosenTimes, AResumedRunGoesOnWithItsTimes) {
                 {"times of the trajectory"});
 }
 
+TEST_F(ChosenTimes, AResumedRunDividesItsStepsAtTheSameKinks) {
+  const std::string scene = "run " +
+                            oscillator("[force]\nx = \"if(mod(t, 0.7123) < 0.3, 1, 0)*sin(3*t)\"\n") +
+                            " --method type1/gl:2 --step 0.001";
+  const std::string whole = path("whole.csv"), parts = path("parts.csv"), state = path("state");
+  ASSERT_EQ(run(scene + " --end 10 --out '" + whole + "'").status, 0);
+  ASSERT_EQ(run(scene + " --end 5 --checkpoint '" + state + "' --out '" + parts + "'").status, 0);
+  ASSERT_EQ(run(scene + " --end 10 --resume '" + state + "' --out '" + parts + "'").status, 0);
+  EXPECT_EQ(contents(parts), contents(whole));
+}
+
 TEST_F(ChosenTimes, TimesThatCannotBeShownAreMisuse) {
   expect_misuse("run knife_edge --at 1,0.5", {"--at", "t = 0.5"});
   expect_misuse("run knife_edge --end 1 --at 2", {"--at", "t = 2", "t = 1"});

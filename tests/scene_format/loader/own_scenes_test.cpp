@@ -36,13 +36,14 @@ INSTANTIATE_TEST_SUITE_P(Examples, OwnScenes,
 TEST(Schema, HasTheKeysOfTheReader) {
   std::ifstream file(DIRACSTEP_SCHEMA);
   const auto schema = nlohmann::json::parse(file)["properties"];
-  for (const char* key : {"name",       "class",       "description",    "source",      "needs",
-                          "lagrangian", "hamiltonian", "dissipation",    "coordinates", "sizes",
-                          "parameters", "definitions", "rows",           "force",       "start",
-                          "span",       "reference",   "invariants",     "recommended", "inductor",
-                          "capacitor",  "resistor",    "source_voltage", "mutual",      "redundant"})
+  for (const char* key :
+       {"name",        "class",       "description", "source",   "needs",          "lagrangian",
+        "hamiltonian", "dissipation", "coordinates", "sizes",    "parameters",     "definitions",
+        "rows",        "force",       "start",       "span",     "reference",      "invariants",
+        "recommended", "inductor",    "capacitor",   "resistor", "source_voltage", "mutual",
+        "redundant",   "inputs",      "states",      "outputs",  "events"})
     EXPECT_TRUE(schema.contains(key)) << key;
-  EXPECT_EQ(schema.size(), 25u);
+  EXPECT_EQ(schema.size(), 29u);
 }
 
 }  // namespace

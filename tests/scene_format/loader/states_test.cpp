@@ -145,6 +145,37 @@ step = 0.05
   EXPECT_NEAR(end.lambda[0], -3.0 * std::exp(-2.0) / 0.25, 1e-7);
 }
 
+TEST(States, APidControllerWithALimitHoldsAPendulumUp) {
+  const CatalogueScene entry = scene_from_text("scene.toml", R"toml(
+name = "pid_cart"
+lagrangian = "mc*v_x^2/2 + mp*((v_x + l*cos(th)*v_th)^2 + (l*sin(th)*v_th)^2)/2 - mp*g*l*cos(th)"
+[coordinates]
+x = {}
+th = {}
+[states]
+in = { rate = "th" }
+[parameters]
+mc = 1
+mp = 0.2
+l = 0.5
+g = 9.81
+[force]
+x = "min(8, max(-8, 60*th + 40*in + 8*v_th))"
+th = "0.5*max(0, min(1, 1e3*(t - 2)))*max(0, min(1, 1e3*(2.2 - t)))"
+[start]
+th = 0.15
+[span]
+end = 5
+step = 0.01
+)toml");
+  // The first-order equations by DOP853 at 1e-11 with steps up to 1e-4.
+  const Sample reached = end_of(entry.scene, 5.0, 1e-4);
+  EXPECT_NEAR(reached.q[0], 3.55580148321, 1e-8);
+  EXPECT_NEAR(reached.q[1], -0.00226645857, 1e-9);
+  EXPECT_NEAR(reached.q[2], 0.00231624525, 1e-9);
+  EXPECT_NEAR(reached.v[0], 1.02309363777, 1e-8);
+}
+
 TEST(States, BadOnesAreToldWithTheirPlace) {
   const auto with = [](const std::string& states, const std::string& rest = "") {
     return "name = \"s\"\nlagrangian = \"v_x^2/2 - k*x^2/2\"\n[coordinates]\nx = {}\n[parameters]\nk = "
