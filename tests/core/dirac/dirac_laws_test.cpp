@@ -136,20 +136,29 @@ TEST_P(LawsOfTypesOneToThree, EveryStepIsAMemberOfTheDiscreteDiracStructure) {
     const auto s = method().generating_function(*scene);
     const Trajectory t = trajectory_of(scene, options());
     DiscreteDiracStructure structure(scene->constraints, scene->dimension(), method().info.constraint_rule);
-    for (std::size_t k = 0; k < steps; ++k) {
+    const auto memberships_of = [&](std::size_t k, const Vector& q1) {
       const Interval step{static_cast<double>(k) * h, h};
       std::vector<Membership> memberships;
       if (type != GeneratingType::three)
-        memberships.push_back(structure.plus(step, {t.q[k], t.plus[k]}, {t.q[k + 1], t.plus[k + 1]},
-                                             differential(*s, t, k, true)));
+        memberships.push_back(
+            structure.plus(step, {t.q[k], t.plus[k]}, {q1, t.plus[k + 1]}, differential(*s, t, k, true)));
       if (type != GeneratingType::two)
-        memberships.push_back(structure.minus(step, {t.q[k], t.minus[k]}, {t.q[k + 1], t.minus[k + 1]},
-                                              differential(*s, t, k, false)));
-      for (const Membership& m : memberships) {
+        memberships.push_back(
+            structure.minus(step, {t.q[k], t.minus[k]}, {q1, t.minus[k + 1]}, differential(*s, t, k, false)));
+      return memberships;
+    };
+    for (std::size_t k = 0; k < steps; ++k)
+      for (const Membership& m : memberships_of(k, t.q[k + 1])) {
         EXPECT_LT(m.constraint, 1e-14) << scene->name << " " << k;
         EXPECT_LT(m.annihilator, 5e-12) << scene->name << " " << k;
         EXPECT_LE(m.annihilator_of_class, m.annihilator + 1e-14) << scene->name << " " << k;
       }
+    for (const Membership& m : memberships_of(0, t.q[1] + Vector::Constant(3, 1e-3))) {
+      if (scene->rows() > 0) {
+        EXPECT_GT(m.constraint, 1e-4) << scene->name << ": a wrong end passes";
+      }
+      EXPECT_GT(m.annihilator, 9e-4) << scene->name << ": a wrong end passes";
+      EXPECT_GT(m.annihilator_of_class, 9e-4) << scene->name << ": a wrong end passes";
     }
   }
 }
