@@ -9,6 +9,7 @@
 
 #include "differences.hpp"
 #include "methods.hpp"
+#include "misuse.hpp"
 #include "scenes.hpp"
 #include "stepping.hpp"
 
@@ -473,6 +474,33 @@ TEST(DiscreteDiracStructure, StepsByOneSidedRulesAreMembersOfTheContinuousStruct
   const FlowAndEffort back = flow_and_effort_minus(right.start(false), right.end(false), right.alpha(false));
   EXPECT_LT(structure.at(h, right.t.q[1]).outside(back.flow, back.effort), 1e-12);
   EXPECT_GT(structure.at(0.0, right.t.q[0]).outside(back.flow, back.effort), 1e-5);
+}
+
+TEST(DiscreteVectorFields, WhatHasNoneIsRefusedOrTold) {
+  ChangedStep of("type1/midpoint");
+  const PhasePoint z = of.start(true), small{Vector::Zero(2), Vector::Zero(2)};
+  const auto type_four =
+      Registry::with_built_ins().method("type4/legendre(type1/left)").generating_function(*of.scene);
+  testing::expect_misuse(
+      [&] {
+        discrete_vector_field_plus(*type_four, of.structure, {0.0, h}, z, z);
+      },
+      {"type 4"});
+  testing::expect_misuse(
+      [&] {
+        discrete_vector_field_plus(*of.s, of.structure, {0.0, h}, small, z);
+      },
+      {"phase space"});
+  testing::expect_misuse(
+      [&] {
+        discrete_vector_field_minus(*of.s, of.structure, {0.0, h}, z, small);
+      },
+      {"guess"});
+  const auto edge = testing::edge_of_the_domain();  // no force beyond x = 1
+  const auto s = of.method.generating_function(*edge);
+  DiscreteDiracStructure structure({}, 1, StepRule::midpoint);
+  const PhasePoint beyond{Vector::Constant(1, 2.0), Vector::Zero(1)};
+  EXPECT_FALSE(discrete_vector_field_plus(*s, structure, {0.0, h}, beyond, beyond));
 }
 
 /// Divided by h, flow and effort of a step tend to those of the motion: D_{d±} beside D_{Δ_Q}.
