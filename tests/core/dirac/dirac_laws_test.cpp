@@ -501,6 +501,10 @@ TEST(DiscreteVectorFields, WhatHasNoneIsRefusedOrTold) {
   DiscreteDiracStructure structure({}, 1, StepRule::midpoint);
   const PhasePoint beyond{Vector::Constant(1, 2.0), Vector::Zero(1)};
   EXPECT_FALSE(discrete_vector_field_plus(*s, structure, {0.0, h}, beyond, beyond));
+  const auto transformed =
+      Registry::with_built_ins().method("type2/legendre(type1/midpoint)").generating_function(*edge);
+  Columns y = Columns::Constant(1, 3, 2.0);
+  EXPECT_FALSE(make_stationary(*transformed, {0.0, h}, y));
 }
 
 /// Divided by h, flow and effort of a step tend to those of the motion: D_{d±} beside D_{Δ_Q}.
