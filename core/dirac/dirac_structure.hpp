@@ -29,7 +29,7 @@ struct PhaseVelocity {
 Covector omega_flat(const PhaseVelocity& z);
 /// κ_Q : T(T*Q) → T*(TQ),  (q,p,q̇,ṗ) ↦ (q,q̇; ṗ,p)                        (3.15)
 Covector kappa(const PhaseVelocity& z);
-/// γ_Q = Ω♭∘κ_Q⁻¹ : T*(TQ) → T*(T*Q),  (q,v; ξ,η) ↦ (q,η; −ξ,v)            (3.16)
+/// γ_Q = Ω♭∘κ_Q⁻¹ : T*(TQ) → T*(T*Q),  (q,v; ξ,η) ↦ (q,η; −ξ,v)            (4.1)
 Covector gamma(const Covector& on_tangent_bundle);
 /// 𝔇L = γ_Q∘dL : TQ → T*(T*Q),  (q,v) ↦ (q,∂L/∂v; −∂L/∂q,v)                (4.6)
 Covector dirac_differential(const Lagrangian& lagrangian, double t, const Vector& q, const Vector& v);

@@ -19,10 +19,11 @@ bool solve_by_differences(Residual residual, Vector& x) {
       const Vector change = Vector::Unit(x.size(), i) * 1e-5 * std::max(1.0, std::abs(x[i]));
       jacobian.col(i) = (residual(x + change) - residual(x - change)) / (2.0 * change[i]);
     }
+    if (!r.allFinite() || !jacobian.allFinite()) return false;  // its solution would be zero
     const Vector change = jacobian.fullPivLu().solve(-r);
-    if (!change.allFinite()) return false;
     x += change;
-    if (max_norm(change) <= 1e-12 * std::max(1.0, max_norm(x))) return true;
+    const double size = std::max(1.0, max_norm(x));
+    if (max_norm(change) <= 1e-12 * size) return max_norm(residual(x)) <= 1e-10 * size;
   }
   return false;
 }

@@ -19,6 +19,7 @@ bool make_stationary(GeneratingFunction& s, Interval step, ColumnsRef y) {
           const int row = n * i + entries[k].first, column = n * j + entries[k].second;
           inner(row, column) = inner(column, row) = blocks(static_cast<int>(k), s.pair(2 + i, 2 + j));
         }
+    if (!inner.allFinite() || !g.allFinite()) return false;  // its solution would be zero
     const Vector change = inner.fullPivLu().solve(-g.rightCols(r).reshaped());
     y.rightCols(r) += change.reshaped(n, r);
     if (!change.allFinite()) return false;

@@ -9,6 +9,7 @@
 
 #include "differences.hpp"
 #include "methods.hpp"
+#include "misuse.hpp"
 #include "scenes.hpp"
 #include "stepping.hpp"
 
@@ -140,20 +141,29 @@ TEST_P(LawsOfTypesOneToThree, EveryStepIsAMemberOfTheDiscreteDiracStructure) {
     const auto s = method().generating_function(*scene);
     const Trajectory t = trajectory_of(scene, options());
     DiscreteDiracStructure structure(scene->constraints, scene->dimension(), method().info.constraint_rule);
-    for (std::size_t k = 0; k < steps; ++k) {
+    const auto memberships_of = [&](std::size_t k, const Vector& q1) {
       const Interval step{static_cast<double>(k) * h, h};
       std::vector<Membership> memberships;
       if (type != GeneratingType::three)
-        memberships.push_back(structure.plus(step, {t.q[k], t.plus[k]}, {t.q[k + 1], t.plus[k + 1]},
-                                             differential(*s, t, k, true)));
+        memberships.push_back(
+            structure.plus(step, {t.q[k], t.plus[k]}, {q1, t.plus[k + 1]}, differential(*s, t, k, true)));
       if (type != GeneratingType::two)
-        memberships.push_back(structure.minus(step, {t.q[k], t.minus[k]}, {t.q[k + 1], t.minus[k + 1]},
-                                              differential(*s, t, k, false)));
-      for (const Membership& m : memberships) {
+        memberships.push_back(
+            structure.minus(step, {t.q[k], t.minus[k]}, {q1, t.minus[k + 1]}, differential(*s, t, k, false)));
+      return memberships;
+    };
+    for (std::size_t k = 0; k < steps; ++k)
+      for (const Membership& m : memberships_of(k, t.q[k + 1])) {
         EXPECT_LT(m.constraint, 1e-14) << scene->name << " " << k;
         EXPECT_LT(m.annihilator, 5e-12) << scene->name << " " << k;
         EXPECT_LE(m.annihilator_of_class, m.annihilator + 1e-14) << scene->name << " " << k;
       }
+    for (const Membership& m : memberships_of(0, t.q[1] + Vector::Constant(3, 1e-3))) {
+      if (scene->rows() > 0) {
+        EXPECT_GT(m.constraint, 1e-4) << scene->name << ": a wrong end passes";
+      }
+      EXPECT_GT(m.annihilator, 9e-4) << scene->name << ": a wrong end passes";
+      EXPECT_GT(m.annihilator_of_class, 9e-4) << scene->name << ": a wrong end passes";
     }
   }
 }
@@ -469,6 +479,37 @@ TEST(DiscreteDiracStructure, StepsByOneSidedRulesAreMembersOfTheContinuousStruct
   const FlowAndEffort back = flow_and_effort_minus(right.start(false), right.end(false), right.alpha(false));
   EXPECT_LT(structure.at(h, right.t.q[1]).outside(back.flow, back.effort), 1e-12);
   EXPECT_GT(structure.at(0.0, right.t.q[0]).outside(back.flow, back.effort), 1e-5);
+}
+
+TEST(DiscreteVectorFields, WhatHasNoneIsRefusedOrTold) {
+  ChangedStep of("type1/midpoint");
+  const PhasePoint z = of.start(true), small{Vector::Zero(2), Vector::Zero(2)};
+  const auto type_four =
+      Registry::with_built_ins().method("type4/legendre(type1/left)").generating_function(*of.scene);
+  testing::expect_misuse(
+      [&] {
+        discrete_vector_field_plus(*type_four, of.structure, {0.0, h}, z, z);
+      },
+      {"type 4"});
+  testing::expect_misuse(
+      [&] {
+        discrete_vector_field_plus(*of.s, of.structure, {0.0, h}, small, z);
+      },
+      {"phase space"});
+  testing::expect_misuse(
+      [&] {
+        discrete_vector_field_minus(*of.s, of.structure, {0.0, h}, z, small);
+      },
+      {"guess"});
+  const auto edge = testing::edge_of_the_domain();  // no force beyond x = 1
+  const auto s = of.method.generating_function(*edge);
+  DiscreteDiracStructure structure({}, 1, StepRule::midpoint);
+  const PhasePoint beyond{Vector::Constant(1, 2.0), Vector::Zero(1)};
+  EXPECT_FALSE(discrete_vector_field_plus(*s, structure, {0.0, h}, beyond, beyond));
+  const auto transformed =
+      Registry::with_built_ins().method("type2/legendre(type1/midpoint)").generating_function(*edge);
+  Columns y = Columns::Constant(1, 3, 2.0);
+  EXPECT_FALSE(make_stationary(*transformed, {0.0, h}, y));
 }
 
 /// Divided by h, flow and effort of a step tend to those of the motion: D_{d±} beside D_{Δ_Q}.
