@@ -135,7 +135,8 @@ TEST(RestoredIntegrator, RefusesASnapshotThatDoesNotFitByNameAndStandsAtItsStart
   };
   const IntegratorOptions same{.method = "type1/gl:2", .step = 0.05};
   refused({.method = "type1/gl:3", .step = 0.05}, snapshot,
-          {"'integrator of type1/gl:2, order 4'", "'integrator of type1/gl:3, order 6'", "another scene, method"});
+          {"'integrator of type1/gl:2, order 4'", "'integrator of type1/gl:3, order 6'",
+           "another scene, method"});
   refused({.method = "type1/gl:2", .order = 6, .step = 0.05}, snapshot, {"order 4", "order 6"});
   refused({.method = "type1/gl:2", .step = 0.025}, snapshot, {"steps of 0.05", "takes 0.025"});
   IntegratorOptions compensated = same;
