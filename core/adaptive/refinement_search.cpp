@@ -1,10 +1,10 @@
 #include <algorithm>
 #include <cmath>
+#include <diracstep/core/adaptive/end_errors.hpp>
 #include <diracstep/core/adaptive/refinement_search.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/core/runs/run_checks.hpp>
-#include <limits>
 #include <utility>
 
 namespace diracstep::detail {
@@ -19,24 +19,6 @@ constexpr double missed_allowed = 0.1;        // by the forces surveyed, in part
 constexpr double error_out_of_reach = 1e-15;  // differences of runs hold nothing but round-off below it
 constexpr long nodes_between_looks = 64;
 constexpr long energies_read = 100;  // of a run
-
-constexpr double no_size = 1e-14;  // of the largest on the way: an end that comes back to zero
-
-/// What errors of a column at the end are parts of: of the largest on the way where nothing is left of it.
-double size_at_end(const Vector& column, double largest) {
-  const double size = max_norm(column);
-  return size > no_size * largest ? size : largest;
-}
-
-/// What rounding adds up to in a run: no error is known to be smaller.
-double round_off_of(long steps) {
-  return std::numeric_limits<double>::epsilon() * std::sqrt(static_cast<double>(std::max(1L, steps)));
-}
-
-double relative_change(const Vector& a, const Vector& b, double largest) {
-  const double change = max_norm(a - b);
-  return change == 0.0 ? 0.0 : change / size_at_end(b, largest);
-}
 
 std::string text(double value) { return to_text(value, 3); }
 
