@@ -557,9 +557,10 @@ void add_run(CLI::App& app, Session& session) {
   verb->add_option("--eps", options->eps,
                    "With --adaptive: radians of a step of varying size, 0.2 without; or its local error,\n"
                    "1e-6 without");
-  verb->add_option("--control", options->control,
-                   "How its size is found: integrating (without), in-step, or irreversible (for comparison);\n"
-                   "for damped/radau:S always local-error");
+  verb->add_option(
+      "--control", options->control,
+      "How its size is found: integrating (without), in-step, or irreversible (for comparison);\n"
+      "for damped/radau:S always local-error");
   verb->add_option("--at", options->at,
                    "Times T1,T2,… to show instead of the steps, each by a step of the method from the last\n"
                    "node; the motion keeps its bits.  With --adaptive the last of them ends the run")

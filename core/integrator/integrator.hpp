@@ -72,10 +72,10 @@ class Integrator {
 
   std::vector<PlanLine> plan() const;
 
-  /// All that the next steps depend on.  After `restore`, an integrator of the same scene, method and step goes on
-  /// with the same bits as the one saved.  restore() throws Misuse for a snapshot that does not fit, naming
-  /// what does not, and then the integrator is as after reset().  The last step before it cannot be taken
-  /// again by retry().
+  /// All that the next steps depend on.  After `restore`, an integrator of the same scene, method and step
+  /// goes on with the same bits as the one saved.  restore() throws Misuse for a snapshot that does not fit,
+  /// naming what does not, and then the integrator is as after reset().  The last step before it cannot be
+  /// taken again by retry().
   Snapshot save() const;
   void restore(const Snapshot& from);
   /// The same beside fields of the caller's.  After a Misuse the integrator is to be reset().

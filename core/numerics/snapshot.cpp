@@ -74,7 +74,8 @@ std::string Snapshot::bytes() const {
 
 Snapshot Snapshot::from_bytes(std::string_view bytes) {
   const auto first = take_line(bytes);
-  if (!first || !first->starts_with(magic)) throw Misuse("these bytes are no snapshot: their header is another");
+  if (!first || !first->starts_with(magic))
+    throw Misuse("these bytes are no snapshot: their header is another");
   const std::string_view version = first->substr(magic.size());
   if (version != std::to_string(layout))
     throw Misuse("the snapshot has layout " + std::string(version) + "; this version reads layout " +
