@@ -5,10 +5,12 @@
 #include <cmath>
 #include <diracstep/command/arguments.hpp>
 #include <diracstep/command/interrupt.hpp>
+#include <diracstep/command/kept_invariants.hpp>
 #include <diracstep/command/progress.hpp>
 #include <diracstep/command/run_control.hpp>
 #include <diracstep/command/run_identity.hpp>
 #include <diracstep/command/verbs.hpp>
+#include <diracstep/command/verbs/run_arguments.hpp>
 #include <diracstep/core/adaptive/adaptive_run.hpp>
 #include <diracstep/core/adaptive/damping_survey.hpp>
 #include <diracstep/core/adaptive/error_control.hpp>
@@ -17,7 +19,6 @@
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/runs/run.hpp>
 #include <diracstep/files/file_lock.hpp>
-#include <diracstep/files/paths.hpp>
 #include <memory>
 #include <optional>
 
@@ -27,38 +28,6 @@ namespace {
 
 constexpr long most_fixed_steps = 1'000'000'000'000;
 constexpr double most_chosen_times = 1e8;
-constexpr double most_seconds = 1e8;  // three years
-
-struct RunArguments {
-  std::string scene;
-  MethodChoice method;
-  std::optional<double> step;
-  std::optional<double> end;
-  std::string momentum = "projected";
-  std::string out;
-  long every = 1;
-  int substeps = 1;
-  std::string checkpoint;
-  long checkpoint_every = 0;
-  std::string resume;
-  bool adaptive = false;
-  std::optional<double> eps;
-  std::optional<std::string> control;
-  std::string at;
-  std::optional<double> every_time;
-  std::optional<double> error;
-  bool fixed = false;
-  std::optional<long> max_solves;
-  std::optional<double> max_time;
-  std::optional<long> max_steps;
-  double smallest_step = 0.0;
-  std::string doubt = "report";
-  std::vector<std::string> set;
-  bool json = false;
-};
-
-constexpr const char* usual_control = "integrating";
-constexpr double stated_to = 1e-6;  ///< relative, of an invariant's stated value
 
 StepGrid fitted_steps(const CatalogueScene& entry, double end, double step, const RunArguments& options) {
   const StepGrid grid = fit_steps(entry.scene->start.time, end, step);
@@ -69,85 +38,6 @@ StepGrid fitted_steps(const CatalogueScene& entry, double end, double step, cons
     say(fmt::format("step {:g} adjusted to {:.10g}, so that {} steps end at t = {:g}", step, grid.step,
                     grid.steps, end));
   return grid;
-}
-
-void require_limits(const RunArguments& options) {
-  if (options.max_solves && *options.max_solves < 1)
-    throw Misuse(fmt::format("--max-solves = {}; 1 or more is needed", *options.max_solves));
-  if (options.max_steps && *options.max_steps < 1)
-    throw Misuse(fmt::format("--max-steps = {}; 1 or more is needed", *options.max_steps));
-  if (options.max_steps && options.error)
-    throw Misuse("--max-steps does not go with --error: the work of its search is limited by --max-solves");
-  if (options.max_time && !(*options.max_time > 0.0 && *options.max_time <= most_seconds))
-    throw Misuse(fmt::format("--max-time = {:g}; a number of seconds above 0, up to {:g}, is needed",
-                             *options.max_time, most_seconds));
-  if (!(options.smallest_step >= 0.0) ||
-      (options.smallest_step > 0.0 && (!options.adaptive || options.error)))
-    throw Misuse(fmt::format("--smallest-step = {:g}; 0 or more is needed, and --adaptive without --error",
-                             options.smallest_step));
-}
-
-/// An option that nothing would read is a mistake.
-void require_use(const RunArguments& options) {
-  const bool variable = options.adaptive && !options.error;
-  if (options.eps && !variable)
-    throw Misuse("--eps needs --adaptive without --error: it is the size of variable steps");
-  if (options.control && !options.adaptive && !options.error) throw Misuse("--control needs --adaptive");
-  if (options.control && options.fixed) throw Misuse("--control and --fixed exclude each other");
-  if (options.max_solves && !options.error)
-    throw Misuse("--max-solves needs --error: --max-steps limits other runs");
-  if (options.fixed && !options.error)
-    throw Misuse("--fixed needs --error: without it steps are of fixed size unless --adaptive is given");
-}
-
-void require_sense(const RunArguments& options) {
-  const bool checkpoints = !options.checkpoint.empty() || !options.resume.empty();
-  if (options.every < 1) throw Misuse(fmt::format("--every = {}; 1 or more is needed", options.every));
-  const bool chosen_times = !options.at.empty() || options.every_time;
-  if (!options.at.empty() && options.every_time) throw Misuse("--at and --every-time exclude each other");
-  if (options.every_time && !(*options.every_time > 0.0 && std::isfinite(*options.every_time)))
-    throw Misuse(fmt::format("--every-time = {}; a number above 0 is needed", *options.every_time));
-  if (chosen_times && options.every != 1)
-    throw Misuse("--every counts steps; it does not go with --at and --every-time");
-  if (chosen_times && options.error)
-    throw Misuse("--at and --every-time do not go with --error: name the method and the step that it finds");
-  if (options.eps && std::isnan(*options.eps)) throw Misuse("--eps is not a number");
-  if (options.fixed && options.adaptive) throw Misuse("--fixed and --adaptive exclude each other");
-  require_limits(options);
-  require_use(options);
-  if (options.out == standard_output && (options.json || checkpoints))
-    throw Misuse("--out - gives standard output to the points: --json, --checkpoint and --resume exclude it");
-  if (options.doubt != "report" && options.doubt != "ignore")
-    throw Misuse(fmt::format("--doubt: '{}' is not one of report, ignore", options.doubt));
-  if (options.checkpoint_every < 0)
-    throw Misuse(
-        fmt::format("--checkpoint-every = {}; a number of steps is needed, or 0 for every ten seconds",
-                    options.checkpoint_every));
-  if (options.checkpoint_every > 0 && !checkpoints)
-    throw Misuse("--checkpoint-every without --checkpoint FILE");
-  if (checkpoints && options.adaptive)
-    throw Misuse("--checkpoint and --resume do not go with --adaptive: checkpoints cover fixed steps only");
-  if (checkpoints && options.error)
-    throw Misuse("--checkpoint and --resume do not go with --error: name the method and the step instead");
-}
-
-/// The file that checkpoints go to, or empty.
-std::string checkpoint_path(const RunArguments& options) {
-  return options.checkpoint.empty() ? options.resume : options.checkpoint;
-}
-
-/// Before anything is computed: what could not be written in the end, or would be written over something
-/// read.
-void require_files(const RunArguments& options, const Session& session) {
-  std::vector<NamedPath> inputs, outputs;
-  if (options.scene.ends_with(".toml")) inputs.push_back({"the scene", options.scene});
-  for (const Plugin& plugin : session.plugins) inputs.push_back({"the plugin", plugin.path()});
-  if (!options.out.empty() && options.out != standard_output) outputs.push_back({"--out", options.out});
-  if (const std::string checkpoint = checkpoint_path(options); !checkpoint.empty())
-    outputs.push_back({options.checkpoint.empty() ? "--resume" : "--checkpoint", checkpoint});
-  if (!options.resume.empty() && !options.out.empty() && same_file(options.resume, options.out))
-    throw Misuse(fmt::format("--out and --resume are both '{}'", options.resume));
-  require_outputs(outputs, inputs);
 }
 
 /// The columns of a trajectory that its scene does not have of itself.
@@ -362,65 +252,6 @@ IntegratorOptions take_found(const RunArguments& options, const CatalogueScene& 
   return used;
 }
 
-/// How much errors `error` of q and v, in parts of the largest of each, may change an invariant, to first
-/// order.
-double change_by_error(const Invariant& invariant, const Sample& end, const Vector& speeds, double error) {
-  const double here = invariant.at(end.time, end.q, speeds);
-  double sum = 0.0;
-  Vector q = end.q, y = speeds;
-  for (Vector* column : {&q, &y}) {
-    const double off = error * column->lpNorm<Eigen::Infinity>();
-    for (Eigen::Index i = 0; i < column->size(); ++i) {
-      const double kept = (*column)[i];
-      (*column)[i] = kept + off;
-      sum += std::abs(invariant.at(end.time, q, y) - here);
-      (*column)[i] = kept;
-    }
-  }
-  return sum;
-}
-
-/// Empty, or that an accepted run cannot have the error asked for, since an invariant changed by more.
-std::string denied_by(const InvariantEnds& ends, const Invariant& invariant, const Sample& end,
-                      const Vector& speeds, double error) {
-  constexpr int most_coordinates = 200;
-  constexpr double more = 10.0, rounding = 1e-12;
-  if (end.q.size() > most_coordinates) return {};
-  const double change = std::abs(ends.end - ends.start);
-  const double allowed = change_by_error(invariant, end, speeds, error);
-  if (!(change > more * allowed + rounding * std::max(std::abs(ends.start), std::abs(ends.end)))) return {};
-  return fmt::format(
-      "the invariant {} changed by {:.2e}; an error of {:g} allows about {:.2e}, so that the "
-      "runs agree on a wrong motion",
-      ends.name, change, error, allowed);
-}
-
-/// What the scene declares as kept, at both ends; what is not as stated is a doubt, where no parameter has
-/// been changed, and a change that the error asked for does not allow.
-void compare_invariants(const RunArguments& options, const CatalogueScene& entry, RunResult& result) {
-  if (!result.has_end()) return;
-  const auto scene = completed(entry.scene);
-  const Start& start = scene->start;
-  const bool by_momentum = !entry.scene->lagrangian;
-  for (const Invariant& invariant : entry.invariants) {
-    const Vector& first = by_momentum ? entry.scene->start.p : start.v;
-    if (first.size() == 0) continue;
-    InvariantEnds ends{
-        .name = invariant.name,
-        .start = invariant.at(start.time, start.q, first),
-        .end = invariant.at(result.end.time, result.end.q, by_momentum ? result.end.p : result.end.v),
-        .stated = invariant.value};
-    if (ends.stated && options.set.empty() &&
-        !(std::abs(ends.start - *ends.stated) <= stated_to * std::abs(*ends.stated)) && result.doubt.empty())
-      result.doubt = fmt::format("the invariant {} is {:.15g} at the start; the scene states {:.15g}",
-                                 ends.name, ends.start, *ends.stated);
-    if (result.search && result.search->ok() && result.doubt.empty())
-      result.doubt =
-          denied_by(ends, invariant, result.end, by_momentum ? result.end.p : result.end.v, *options.error);
-    result.invariants.push_back(std::move(ends));
-  }
-}
-
 void require_inputs_until(const CatalogueScene& entry, double end) {
   for (const auto& [name, first, last] : entry.input_ranges)
     if (!(end >= first && end <= last))
@@ -473,8 +304,9 @@ void choose_method(RunArguments& options, const CatalogueScene& entry, const Ses
                                {used.order, 0.0, used.constraint_rule, large_from(used.dense_limit)});
   if (!session.registry.method(choice.method).info.damped) return;
   used.method = choice.method;
-  const bool fixed = step_given || options.fixed || options.substeps > 1 || !options.checkpoint.empty() ||
-                     !options.resume.empty();
+  const bool times_with_events = !entry.events.empty() && (!options.at.empty() || options.every_time);
+  const bool fixed = step_given || options.fixed || options.substeps > 1 || times_with_events ||
+                     !checkpoint_path(options).empty();
   if (!fixed) options.adaptive = true;
   say(fmt::format("{}; {}{}", choice.method, choice.reason,
                   fixed ? "" : "; steps vary by their local error, --step H takes fixed ones"));
@@ -512,7 +344,7 @@ void run(const RunArguments& given, Session& session) {
     used = run_once(options, entry, session, used, end, result);
   }
   compare_with_reference(result, entry, *completed(entry.scene));
-  compare_invariants(options, entry, result);
+  compare_invariants(entry, options.set.empty(), options.error, result);
   take_outputs(entry, result);
   report(result, options, entry, used, session);
 }
@@ -521,75 +353,8 @@ void run(const RunArguments& given, Session& session) {
 
 void add_run(CLI::App& app, Session& session) {
   CLI::App* verb = app.add_subcommand("run", "One trajectory");
-  add_solver_options(*verb, session);
   const auto options = std::make_shared<RunArguments>();
-  verb->add_option("SCENE", options->scene, "A scene; see diracstep list scenes")->required();
-  add_method_options(*verb, options->method);
-  verb->add_option("--step", options->step, "Step size; the scene's own without it");
-  verb->add_option("--end", options->end, "End time; the scene's own without it");
-  verb->add_option("--momentum", options->momentum,
-                   "Representative of the momentum: plus, minus or projected")
-      ->capture_default_str();
-  verb->add_option("--out", options->out, "CSV file for the trajectory; - is standard output")
-      ->type_name("FILE");
-  verb->add_option("--every", options->every, "Keep each K-th point")->type_name("K")->capture_default_str();
-  verb->add_option("--substeps", options->substeps,
-                   "Take a step that cannot be solved in 2, 4, … up to N smaller ones")
-      ->type_name("N")
-      ->capture_default_str();
-  verb->add_option("--checkpoint", options->checkpoint, "Keep all that is needed to go on in this file")
-      ->type_name("FILE");
-  verb->add_option("--checkpoint-every", options->checkpoint_every,
-                   "Write it at each K-th step; without, every ten seconds and at the end")
-      ->type_name("K");
-  verb->add_option("--resume", options->resume,
-                   "Go on from a checkpoint, with the same bits as if never interrupted")
-      ->type_name("FILE");
-  verb->add_option("--max-steps", options->max_steps,
-                   "Refuse a run of more steps; with --adaptive it fails at the next one")
-      ->type_name("N");
-  verb->add_option("--max-time", options->max_time,
-                   "End the run after so many seconds, as an interrupt does: with its checkpoint;\n"
-                   "with --error the whole search, which then shows its best answer (30 without)")
-      ->type_name("S");
-  verb->add_flag("--adaptive", options->adaptive,
-                 "Steps of varying size: reversible ones, or by their local error with damped/radau:S");
-  verb->add_option("--eps", options->eps,
-                   "With --adaptive: radians of a step of varying size, 0.2 without; or its local error,\n"
-                   "1e-6 without");
-  verb->add_option(
-      "--control", options->control,
-      "How its size is found: integrating (without), in-step, or irreversible (for comparison);\n"
-      "for damped/radau:S always local-error");
-  verb->add_option("--at", options->at,
-                   "Times T1,T2,… to show instead of the steps, each by a step of the method from the last\n"
-                   "node; the motion keeps its bits.  With --adaptive the last of them ends the run")
-      ->type_name("T1,T2,…");
-  verb->add_option("--every-time", options->every_time, "The same at the start and after every so much time")
-      ->type_name("T");
-  verb->add_option(
-          "--error", options->error,
-          "Relative error at the end; the library chooses method and step,\nand repeats the run until its "
-          "estimate is below")
-      ->type_name("E");
-  add_redundancy_option(*verb, session);
-  verb->add_flag("--fixed", options->fixed,
-                 "With --error: steps of fixed size, also where variable ones are cheaper");
-  verb->add_option("--max-solves", options->max_solves,
-                   "With --error: nonlinear systems, of each kind of steps tried; the best answer so far is "
-                   "then shown (1000000 without)")
-      ->type_name("N");
-  verb->add_option("--smallest-step", options->smallest_step,
-                   "With --adaptive: steps do not become smaller; 0: 1e-9 of the motion")
-      ->type_name("H")
-      ->capture_default_str();
-  verb->add_option("--doubt", options->doubt,
-                   "A run whose result is doubted exits with status 3 (report), or with 0 (ignore)")
-      ->type_name("WHAT")
-      ->capture_default_str();
-  add_set_option(*verb, options->set);
-  add_tolerance_option(*verb, session);
-  verb->add_flag("--json", options->json, "One JSON document on standard output");
+  add_run_arguments(*verb, session, *options);
   verb->footer(
       "Examples:\n"
       "  diracstep run knife_edge --step 0.05 --out knife_edge.csv\n"
