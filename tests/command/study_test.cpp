@@ -71,7 +71,7 @@ TEST_F(StudyCommand, WritesTablesAndPictures) {
     EXPECT_EQ(rows_of(scene + ",type1/midpoint,"), 6) << scene;
     EXPECT_GE(rows_of(scene + ",ida,"), 2)
         << scene << ": of each formulation that was fastest at a tolerance";
-    EXPECT_EQ(rows_of(scene + ",erk,"), 2) << scene;
+    EXPECT_GE(rows_of(scene + ",erk,"), 2) << scene;
   }
   EXPECT_EQ(csv[0].rfind("scene,method,order,momentum,step,rtol,status,error_q,error_p", 0), 0u);
   if (outcome.err.find("gnuplot was not found") != std::string::npos) GTEST_SKIP() << "no gnuplot here";
