@@ -26,7 +26,7 @@ struct diracstep_integrator {
   std::variant<diracstep::Integrator, diracstep::AdaptiveIntegrator> stepper;
   std::shared_ptr<const diracstep::Scene> scene;  ///< completed
   std::vector<diracstep::Invariant> invariants;
-  bool invariants_by_momentum;
+  bool invariants_by_momentum, has_events;
   diracstep::Parameters parameters;
   std::vector<diracstep::PlanLine> notes;  ///< of the model, for the plan
   double end;                              ///< where a run ends that names none

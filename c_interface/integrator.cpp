@@ -73,8 +73,8 @@ std::unique_ptr<diracstep_integrator> make(const diracstep_model& model, const d
                         ? Stepper(varying(model, scene, stepping, options))
                         : Stepper(Integrator(scene, model.registry, solvers_from(options), stepping));
   auto handle = std::make_unique<diracstep_integrator>(diracstep_integrator{
-      std::move(stepper), model.scene, entry.invariants, !entry.scene->lagrangian, entry.parameters,
-      notes_of(model, options), end_from(model, options), std::move(push)});
+      std::move(stepper), model.scene, entry.invariants, !entry.scene->lagrangian, !entry.events.empty(),
+      entry.parameters, notes_of(model, options), end_from(model, options), std::move(push)});
   if (const auto* const made = std::get_if<AdaptiveIntegrator>(&handle->stepper))
     handle->side = [scene, registry = model.registry, solvers = solvers_from(options),
                     used = made->options()] { return Integrator(scene, registry, solvers, used); };

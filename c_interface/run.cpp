@@ -52,6 +52,9 @@ void require_sense(const diracstep_course& course) {
 
 namespace {
 
+constexpr const char* events_not_met =
+    "the events of the scene are not looked for in runs through this interface; diracstep run does";
+
 long every_of(const diracstep_course& course) { return course.every > 0 ? course.every : 1; }
 
 /// The steps of an integrator with the checks around each, until the caller asks for the end.
@@ -114,7 +117,7 @@ class Run {
     detail::RunOf<Stepper, WatchedSteps<Stepper, Checks>, Checks> run(
         stepper_, {stepper_, checks_, course_.stop, stopped_}, momentum_, every_of(course_), keep, &checks_);
     const RunReport report = steps(run, end, size);
-    handle_.doubt = checks_.text();
+    handle_.doubt = joined_doubts({checks_.text(), handle_.has_events ? events_not_met : ""});
     if (report.ok()) return;
     keep_last();
     if (stopped_) throw Interruption("interrupted at t = " + to_text(stepper_.time(), 17));

@@ -32,13 +32,16 @@ StepReport EventSearch::see(const Sample& point, const Read& read) {
     const double here = value(k, point);
     if (last_.size() <= k) {
       last_.push_back(here);
+      met_at_last_.push_back(false);
       continue;
     }
-    if (changes(k, last_[k], here)) {
+    const bool change = changes(k, last_[k], here);
+    if (change && !met_at_last_[k]) {
       EventHit hit{k, {}};
       if (StepReport report = locate(k, here, point, read, hit); !report.ok()) return report;
       met.push_back(std::move(hit));
     }
+    met_at_last_[k] = change && here == 0.0;
     if (here != 0.0) last_[k] = here;
   }
   const double sense = point.time >= last_time_ ? 1.0 : -1.0;

@@ -47,6 +47,8 @@ class EventSearch {
   bool by_momentum_;
   double last_time_ = 0.0;
   std::vector<double> last_;  ///< values at the last point; empty before the first
+  std::vector<bool>
+      met_at_last_;  ///< the last point was the zero, so that the change of sign behind it is none
   std::vector<EventHit> hits_;
 };
 

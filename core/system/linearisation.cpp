@@ -43,7 +43,8 @@ double variation_between(const BalanceAt& first, const BalanceAt& second, double
   if (size > 0.0) largest = std::max(largest, second.left.lpNorm<Eigen::Infinity>() / size);
   if (b.on_positions == 0) return largest;
   const double position = (b.one_forms.topRows(b.on_positions).cwiseAbs() * second.q.cwiseAbs()).maxCoeff();
-  return position > 0.0 ? std::max(largest, b.position.lpNorm<Eigen::Infinity>() / position) : largest;
+  const double moved = b.position.lpNorm<Eigen::Infinity>();
+  return std::max(largest, position > 0.0 ? moved / position : moved > 0.0 ? 1.0 : 0.0);
 }
 
 bool symmetric(const Columns& matrix) {
@@ -106,6 +107,8 @@ Linearisation linearise(const Scene& given, const Equilibrium& at, double later)
   if (s.cols() > 0)
     set_state(linear, s.transpose() * balance.mass * linear.drift,
               linear.stiffness + s.transpose() * balance.damping * linear.drift);
+  else
+    linear.state = n.transpose() * linear.drift;  // rows alone determine the motion
   const double reach = given.start.q.lpNorm<Eigen::Infinity>();
   for (const double part : {0.382, 0.618}) {  // unequal, so that a period does not hide between them
     const double t = part * (later - at.time);

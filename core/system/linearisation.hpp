@@ -24,7 +24,8 @@ struct Linearisation {
   Columns damping;    ///< Sᵀ C S: gyroscopic terms are in its antisymmetric part
   Columns stiffness;  ///< Sᵀ K N
 
-  /// d/dt (y, u) = state (y, u); d/dt y = state y where all of M vanishes, as for phase-space Lagrangians.
+  /// d/dt (y, u) = state (y, u); d/dt y = state y where all of M vanishes, as for phase-space
+  /// Lagrangians, and where rows leave no u.
   Columns state;
   /// All terms symmetric and none in u: motions M ü + K u = 0.
   bool conservative = false;

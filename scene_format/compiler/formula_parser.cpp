@@ -377,6 +377,11 @@ class FormulaParser::Reader : FormulaScanner {
     const Node f = expression();
     expect(')', "')'");
     require_no_sum(f, place, "rate");
+    for (const Node node : graph_.reachable(std::span(&f, 1)))
+      if (graph_[node].op == Op::coordinate && graph_[node].c == static_cast<int>(Role::second))
+        fail(place,
+             "rate(f) of a formula that holds velocities would need accelerations, which formulas do not "
+             "know");
     return parser_.rate(f);
   }
 

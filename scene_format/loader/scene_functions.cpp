@@ -281,7 +281,9 @@ bool vanishes(const LoadedScene& scene, const SceneFunction& function) {
   std::set<Node> zero;
   for (std::size_t k = 0; k < known.size(); ++k)
     if (values.value(k) == 0.0L) zero.insert(known[k]);
-  for (const Node node : nodes) {  // arguments before what holds them
+  const std::set<Node> decided(known.begin(), known.end());  // 0/0 is no zero
+  for (const Node node : nodes) {                            // arguments before what holds them
+    if (decided.contains(node)) continue;
     const NodeData& data = graph[node];
     const bool a = zero.contains(data.a), b = zero.contains(data.b);
     const bool both = data.op == Op::add || data.op == Op::subtract;

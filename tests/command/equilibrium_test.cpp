@@ -43,6 +43,27 @@ const std::vector<std::complex<double>> at_0 = {-5.53094371765393, -3.1316432479
 const std::vector<std::complex<double>> at_10 = {
     -24.62459635017404, 0.16105338653172, {-3.72016840437287, 10.90681139476287}};
 
+/// a' = 5a + b, b' = a - 3b: 1 ± √17.
+TEST_F(EquilibriumVerb, StatesAloneHaveTheirEigenvalues) {
+  std::ofstream(path("states.toml"))
+      << "name = \"states\"\nlagrangian = \"0\"\n[coordinates]\n[states]\na = { rate = \"5*a + b\" }\n"
+         "b = { rate = \"a - 3*b\" }\n[span]\nend = 1\nstep = 0.1\n";
+  const Json json = found("'" + path("states.toml") + "'");
+  expect_eigenvalues(json, {1.0 - std::sqrt(17.0), 1.0 + std::sqrt(17.0)});
+  EXPECT_EQ(json["stability"].get<std::string>().substr(0, 8), "unstable");
+}
+
+TEST_F(EquilibriumVerb, RowsThatMoveAreTold) {
+  for (const char* row : {"v_x = 1", "x = 0.1*sin(3*t)"}) {
+    std::ofstream(path("belt.toml"))
+        << "name = \"belt\"\nlagrangian = \"(v_x^2 + v_y^2 - y^2)/2\"\n[coordinates]\n"
+           "x = {}\ny = {}\n[[rows]]\nequation = \""
+        << row << "\"\n[span]\nend = 1\nstep = 0.1\n";
+    const Outcome outcome = run("equilibrium '" + path("belt.toml") + "'");
+    EXPECT_NE(outcome.status, 0) << row << outcome.out;
+  }
+}
+
 TEST_F(EquilibriumVerb, LinearBicycleHasThePublishedEigenvalues) {
   const Json json = found(examples + "bicycle_linear.toml");
   expect_eigenvalues(json, at_5);

@@ -50,6 +50,16 @@ direction = "falling"
   }
 };
 
+TEST_F(Events, AZeroAtANodeIsMetOnce) {
+  std::ofstream(path("node.toml"))
+      << "name = \"node\"\nlagrangian = \"v_x^2/2\"\n[coordinates]\nx = {}\n[start]\n"
+         "v_x = 1\n[span]\nend = 2\nstep = 0.25\n[[events]]\nname = \"one\"\n"
+         "when = \"x - 1\"\n[[events]]\nname = \"touched\"\nwhen = \"(t - 1)*(t - 1)\"\n";
+  const Outcome outcome = run("run '" + path("node.toml") + "' --json");
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_EQ(outcome.out.find("\"one\""), outcome.out.rfind("\"one\"")) << outcome.out;
+}
+
 const double lands = (3.0 + std::sqrt(9.0 + 4.0 * 9.81)) / 9.81;
 
 TEST_F(Events, StopEndsTheRunWhereTheBallLands) {

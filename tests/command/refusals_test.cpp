@@ -52,6 +52,23 @@ TEST_F(Refusals, RowsThatContradictEachOtherAreNotRedundant) {
   }
 }
 
+TEST_F(Refusals, FormulasWithoutAValueAreNoZero) {
+  for (const char* force : {"0/0", "(0/0)*v_x", "k/k", "k*log(k)"}) {
+    const Outcome outcome = run("run '" +
+                                scene("nan", std::string("lagrangian = \"v_x^2/2\"\n[coordinates]\nx = {}\n"
+                                                         "[parameters]\nk = 0\n[force]\nx = \"") +
+                                                 force + "\"\n[span]\nend = 1\nstep = 0.1\n") +
+                                "'");
+    EXPECT_NE(outcome.status, 0) << force << outcome.out;
+  }
+  expect_told(run("run '" +
+                  scene("rate",
+                        "lagrangian = \"v_x^2/2 - x^2/2\"\n[coordinates]\nx = {}\n[outputs]\n"
+                        "a = \"rate(v_x)\"\n[span]\nend = 1\nstep = 0.1\n") +
+                  "'"),
+              {":6:", "accelerations"});
+}
+
 TEST_F(Refusals, RowsThatAreNearlyParallelAreNamed) {
   for (const char* part : {"1e-9", "1e-8"})
     expect_told(run("run " + two_rows("parallel", "x = y", std::string("x = y + ") + part + "*z")),
