@@ -26,8 +26,8 @@ std::vector<std::string> stepped_scenes() {
 std::vector<std::string> small_scenes() {
   std::vector<std::string> names = stepped_scenes();
   std::erase_if(names, [](const std::string& name) {
-    const Scene& scene = *make_scene(name).scene;
-    return scene.lagrangian->structure().phase_space() || scene.dimension() > 4;
+    const std::shared_ptr<const Scene> scene = make_scene(name).scene;
+    return scene->lagrangian->structure().phase_space() || scene->dimension() > 4;
   });
   return names;
 }
