@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <diracstep/command/files/trajectory_file.hpp>
 #include <diracstep/command/verbs/run_arguments.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/files/paths.hpp>

@@ -21,7 +21,8 @@ void require_full_size(const Scene& scene) {
 
 ConstraintBlocks positions_first(const ConstraintBlocks& blocks) {
   ConstraintBlocks sorted = blocks;
-  std::ranges::stable_partition(sorted, [](const auto& block) { return is_on_positions(*block); });
+  std::stable_partition(sorted.begin(), sorted.end(),
+                        [](const auto& block) { return is_on_positions(*block); });
   return sorted;
 }
 

@@ -147,7 +147,8 @@ class FormulaParser::Reader : FormulaScanner {
       return located(read_input(place, input->second), place);
     if (peek() == '(') return call(place, name);
     if (name == "pi") return graph_.number(std::numbers::pi);
-    for (const int loop : std::views::reverse(context_.loops))
+    const std::vector<int> inner_first(context_.loops.rbegin(), context_.loops.rend());
+    for (const int loop : inner_first)
       if (symbols_.loops[static_cast<std::size_t>(loop)].variable == name) return graph_.loop_index(loop);
     if (name == "t") {
       if (!context_.time) fail(place, "the time t may not stand in " + context_.what);
@@ -325,7 +326,8 @@ class FormulaParser::Reader : FormulaScanner {
       const InputTable::Part& part = table.parts[k];
       const double to = k + 1 < table.parts.size() ? table.parts[k + 1].from : table.last;
       Node polynomial = graph_.number(0.0);
-      for (const double c : std::views::reverse(part.coefficients))
+      const std::vector<double> highest_first(part.coefficients.rbegin(), part.coefficients.rend());
+      for (const double c : highest_first)
         polynomial = graph_.add(graph_.multiply(polynomial, from(part.from)), graph_.number(c));
       value = graph_.add(value,
                          graph_.where(from(part.from), graph_.where(graph_.negative(from(to)), polynomial)));
@@ -367,7 +369,8 @@ class FormulaParser::Reader : FormulaScanner {
     Node node = expression();
     expect(')', "')'");
     context_.loops = outside;
-    for (const int id : std::views::reverse(loops)) node = located(graph_.sum(node, id), place);
+    const std::vector<int> last_first(loops.rbegin(), loops.rend());
+    for (const int id : last_first) node = located(graph_.sum(node, id), place);
     return node;
   }
 
