@@ -11,12 +11,6 @@ using Json = nlohmann::json;
 
 class DampedCommand : public Command {
  protected:
-  std::string scene(const std::string& name, const std::string& text) const {
-    const std::string file = path(name + ".toml");
-    std::ofstream(file) << "name = \"" << name << "\"\n" << text;
-    return file;
-  }
-
   Json json(const std::string& arguments) const {
     const Outcome outcome = run(arguments + " --json");
     EXPECT_EQ(outcome.status, 0) << outcome.err;
@@ -26,36 +20,6 @@ class DampedCommand : public Command {
 
 double of(const Json& end, const char* what, const char* name) { return end[what][name].get<double>(); }
 
-/// A load of 1 mH and 1 kΩ, whose current follows its voltage within 1 µs, behind a source of 50 Hz.
-constexpr const char* decoupling = R"toml(
-[parameters]
-c = 1e-5
-r = 1000
-[definitions]
-volt = "5 + sin(2*pi*50*t)"
-[[source_voltage]]
-name = "V"
-nodes = ["ground", "p"]
-value = "volt"
-[[capacitor]]
-name = "C"
-nodes = ["p", "ground"]
-value = "c"
-[[inductor]]
-name = "L"
-nodes = ["p", "m"]
-value = "1e-3"
-[[resistor]]
-name = "R"
-nodes = ["m", "ground"]
-value = "r"
-[start]
-qC = "5*c"
-[span]
-end = 0.013
-step = 0.0005
-)toml";
-
 /// L di/dt + R i = 5 + sin(ωt), after the transient.
 double current_of_the_load(double t) {
   constexpr double l = 1e-3, r = 1000.0;
@@ -64,7 +28,7 @@ double current_of_the_load(double t) {
 }
 
 TEST_F(DampedCommand, ALoadOfAMicrosecondIsDampedByDefault) {
-  const std::string file = scene("decoupling", decoupling);
+  const std::string file = scene("decoupling", stiff_load);
   const Json by_default = json("run " + file);
   EXPECT_EQ(by_default["method"], "damped/radau:3");
   EXPECT_EQ(by_default["adaptive"]["control"], "local-error");
@@ -78,7 +42,7 @@ TEST_F(DampedCommand, ALoadOfAMicrosecondIsDampedByDefault) {
 }
 
 TEST_F(DampedCommand, APlanSaysWhy) {
-  const Outcome outcome = run("plan " + scene("decoupling", decoupling));
+  const Outcome outcome = run("plan " + scene("decoupling", stiff_load));
   ASSERT_EQ(outcome.status, 0) << outcome.err;
   for (const char* words : {"damped/radau:3", "strong damping", "by their local error"})
     EXPECT_NE(outcome.out.find(words), std::string::npos) << words << '\n' << outcome.out;

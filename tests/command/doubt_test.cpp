@@ -10,44 +10,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-class Doubt : public Command {
- protected:
-  /// A scene file of this text, and its path.
-  std::string scene(const std::string& name, const std::string& text) const {
-    std::ofstream(path(name + ".toml")) << "name = \"" << name << "\"\n" << text;
-    return path(name + ".toml");
-  }
-};
-
-/// A load of 1 mH and 1 kΩ at a ripple of 50 Hz with steps of 0.5 ms: R/L h = 500.
-const char* const stiff_load = R"toml(
-[parameters]
-c = 1e-5
-r = 1000
-[definitions]
-volt = "5 + sin(2*pi*50*t)"
-[[source_voltage]]
-name = "V"
-nodes = ["ground", "p"]
-value = "volt"
-[[capacitor]]
-name = "C"
-nodes = ["p", "ground"]
-value = "c"
-[[inductor]]
-name = "L"
-nodes = ["p", "m"]
-value = "1e-3"
-[[resistor]]
-name = "R"
-nodes = ["m", "ground"]
-value = "r"
-[start]
-qC = "5*c"
-[span]
-end = 0.013
-step = 0.0005
-)toml";
+class Doubt : public Command {};
 
 TEST_F(Doubt, HasAnExitStatusOfItsOwn) {
   const std::string file = scene("load", stiff_load);

@@ -10,12 +10,6 @@ using Json = nlohmann::json;
 
 class Refusals : public Command {
  protected:
-  /// A scene file of this text, and its path.
-  std::string scene(const std::string& name, const std::string& text) const {
-    std::ofstream(path(name + ".toml")) << "name = \"" << name << "\"\n" << text;
-    return path(name + ".toml");
-  }
-
   /// A particle in the plane with two rows.
   std::string two_rows(const std::string& name, const std::string& first, const std::string& second) const {
     return scene(name,

@@ -39,6 +39,37 @@ inline std::vector<std::string> fields(const std::string& line) {
   return all;
 }
 
+/// A load of 1 mH and 1 kΩ, whose current follows its voltage within 1 µs, behind a source of 50 Hz with
+/// steps of 0.5 ms: R/L h = 500.
+inline constexpr const char* stiff_load = R"toml(
+[parameters]
+c = 1e-5
+r = 1000
+[definitions]
+volt = "5 + sin(2*pi*50*t)"
+[[source_voltage]]
+name = "V"
+nodes = ["ground", "p"]
+value = "volt"
+[[capacitor]]
+name = "C"
+nodes = ["p", "ground"]
+value = "c"
+[[inductor]]
+name = "L"
+nodes = ["p", "m"]
+value = "1e-3"
+[[resistor]]
+name = "R"
+nodes = ["m", "ground"]
+value = "r"
+[start]
+qC = "5*c"
+[span]
+end = 0.013
+step = 0.0005
+)toml";
+
 /// A directory of its own for each test, removed afterwards.
 class Command : public ::testing::Test {
  protected:
@@ -52,6 +83,12 @@ class Command : public ::testing::Test {
   ~Command() override { std::filesystem::remove_all(directory_); }
 
   std::string path(const std::string& name) const { return (directory_ / name).string(); }
+
+  /// A scene file of this text, and its path.
+  std::string scene(const std::string& name, const std::string& text) const {
+    std::ofstream(path(name + ".toml")) << "name = \"" << name << "\"\n" << text;
+    return path(name + ".toml");
+  }
 
   /// `arguments` as typed in a shell; `before` precedes the command, "VAR=x" or "timeout 1".
   Outcome run(const std::string& arguments, const std::string& before = "") const {
