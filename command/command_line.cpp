@@ -145,7 +145,7 @@ int read_and_run(CLI::App& app, const Session& session, int count, char** argume
   }
 }
 
-int with_all_verbs(int count, char** arguments, bool run_verbs) {
+int with_all_verbs(int count, char** arguments, bool run_verbs, const Processes& processes) {
   CLI::App app("Discrete Dirac integrators for constrained Lagrangian and Hamiltonian systems", "diracstep");
   app.set_version_flag("--version", "diracstep " DIRACSTEP_VERSION);
   app.require_subcommand(1);
@@ -156,6 +156,7 @@ int with_all_verbs(int count, char** arguments, bool run_verbs) {
       "  diracstep study knife_edge --orders 2,4,8 --out results\n"
       "Exit status: 0 done, 1 numerical failure or interrupt, 2 misuse, 3 a result that is doubted.");
   Session session;
+  session.processes = processes;
   add_help(app);
   add_check(app, session);
   add_equilibrium(app, session);
@@ -167,15 +168,16 @@ int with_all_verbs(int count, char** arguments, bool run_verbs) {
   add_stability(app, session);
   add_start(app, session);
   add_study(app, session);
+  add_sweep(app, session);
   take_plugins(app, session, run_verbs);
   return read_and_run(app, session, count, arguments);
 }
 
 }  // namespace
 
-int execute(int count, char** arguments, bool run_verbs) {
+int execute(int count, char** arguments, bool run_verbs, const Processes& processes) {
   try {
-    return with_all_verbs(count, arguments, run_verbs);
+    return with_all_verbs(count, arguments, run_verbs, processes);
   } catch (const std::bad_alloc&) {  // what tells it may not take memory
     std::fputs("diracstep: there is not enough memory\n", stderr);
     return failed;

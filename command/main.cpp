@@ -3,6 +3,9 @@
 #include <cstdlib>
 #include <diracstep/command/command_line.hpp>
 #include <diracstep/command/interrupt.hpp>
+#if defined(DIRACSTEP_WITH_MPI)
+#include <diracstep/command/mpi_processes.hpp>
+#endif
 #include <exception>
 #include <new>
 #include <string_view>
@@ -32,5 +35,12 @@ int main(int count, char** arguments) {
   std::set_new_handler(note_short_memory);
   std::set_terminate(end_without_memory);
   diracstep::command::prepare_standard_streams();
+#if defined(DIRACSTEP_WITH_MPI)
+  diracstep::command::MpiProcesses mpi(count, arguments);
+  const int status = diracstep::command::execute(count, arguments, true, mpi.processes());
+  mpi.end(status);
+  return status;
+#else
   return diracstep::command::execute(count, arguments);
+#endif
 }

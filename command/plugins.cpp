@@ -79,10 +79,15 @@ std::vector<std::string> scene_names(const Session& session) {
   return names;
 }
 
-CatalogueScene make_scene(const Session& session, const std::string& name, const Parameters& changes) {
+CatalogueScene scene_as_asked(const Session& session, const std::string& name, const Parameters& changes) {
   CatalogueScene entry = made(session, name, changes);
   if (session.drop_redundant_rows) drop_redundant_rows(entry);
   set_tolerances(entry, parameters(session.tolerances, "--tolerance"));
+  return entry;
+}
+
+CatalogueScene make_scene(const Session& session, const std::string& name, const Parameters& changes) {
+  CatalogueScene entry = scene_as_asked(session, name, changes);
   for (const std::string& change : entry.changes) say(entry.scene->name + ": " + change);
   return entry;
 }

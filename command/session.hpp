@@ -1,5 +1,6 @@
 #pragma once
 
+#include <diracstep/command/processes.hpp>
 #include <diracstep/core/integrator/integrator.hpp>
 #include <diracstep/core/methods/registry.hpp>
 #include <diracstep/plugins/loaded_plugin.hpp>
@@ -32,6 +33,7 @@ struct Session {
   std::vector<Plugin> plugins;            ///< those and the ones on DIRACSTEP_PLUGIN_PATH
   bool drop_redundant_rows = false;       ///< of every scene that is made
   std::vector<std::string> tolerances;    ///< of its coordinates, as given by --tolerance
+  Processes processes = {};               ///< that mpirun started
   int exit_status = done;
 };
 
@@ -42,6 +44,9 @@ void load_plugins(Session& session);
 /// A scene of a plugin or of the catalogue, or a file, with what was changed in it told to the person; throws
 /// Misuse as diracstep::make_scene does.
 CatalogueScene make_scene(const Session& session, const std::string& name, const Parameters& changes = {});
+
+/// The same, and nothing is told.
+CatalogueScene scene_as_asked(const Session& session, const std::string& name, const Parameters& changes);
 
 /// Names of the catalogue's scenes and of those of plugins.
 std::vector<std::string> scene_names(const Session& session);

@@ -17,5 +17,6 @@ void add_run(CLI::App& app, Session& session);
 void add_stability(CLI::App& app, Session& session);
 void add_start(CLI::App& app, Session& session);
 void add_study(CLI::App& app, Session& session);
+void add_sweep(CLI::App& app, Session& session);
 
 }  // namespace diracstep::command

@@ -10,6 +10,7 @@ BEGIN {
   library["toml++"] = "^toml[+][+]/"
   library["CLI11"] = "^CLI/"
   library["nlohmann"] = "^nlohmann/"
+  library["MPI"] = "^mpi[.]h"
   library["GoogleTest"] = "^g(test|mock)/"
 }
 

@@ -1,0 +1,208 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <diracstep/core/adaptive/damping_survey.hpp>
+#include <diracstep/core/adaptive/error_control.hpp>
+#include <diracstep/core/numerics/near_names.hpp>
+#include <diracstep/core/runs/event_search.hpp>
+#include <diracstep/core/runs/run.hpp>
+#include <diracstep/core/system/consistent_start.hpp>
+#include <diracstep/sweeps/member_run.hpp>
+#include <limits>
+
+namespace diracstep {
+
+namespace {
+
+constexpr long tried_for_an_example = 100;
+constexpr double unknown_number = std::numeric_limits<double>::quiet_NaN();
+constexpr const char* start_prefix = "start.";
+
+/// A component of a start by its name, "x", "v_x" or "p_x".
+struct Component {
+  int coordinate = -1;
+  char of = 'q';  ///< or 'v', 'p'
+};
+
+Component component(const Scene& scene, const std::string& name) {
+  const auto find = [&](std::string_view coordinate) {
+    const auto found = std::ranges::find(scene.coordinates, coordinate);
+    return found == scene.coordinates.end() ? -1 : static_cast<int>(found - scene.coordinates.begin());
+  };
+  if (const int i = find(name); i >= 0) return {i, 'q'};
+  if (name.starts_with("v_") || name.starts_with("p_"))
+    if (const int i = find(std::string_view(name).substr(2)); i >= 0) return {i, name[0]};
+  throw Misuse(fmt::format("'start.{}': the scene '{}' has no such coordinate{}", name, scene.name,
+                           did_you_mean(name, scene.coordinates)));
+}
+
+void set_start(const Scene& scene, Start& start, const std::string& name, double value) {
+  const Component at = component(scene, name);
+  Vector& column = at.of == 'q' ? start.q : at.of == 'v' ? start.v : start.p;
+  if (column.size() == 0)
+    throw Misuse(fmt::format("start.{}: the scene '{}' starts with {}", name, scene.name,
+                             at.of == 'v' ? "momenta: start.p_x" : "velocities: start.v_x"));
+  column[at.coordinate] = value;
+}
+
+/// What may be moved onto the constraints: all where `project`, else what the scene's file calls a guess and
+/// rates of states; never what the sweep gives.
+std::optional<Guesses> guesses(const CatalogueScene& entry, bool project,
+                               const std::vector<std::string>& given) {
+  const auto n = static_cast<std::size_t>(entry.scene->dimension());
+  Guesses movable{std::vector<bool>(n, project), std::vector<bool>(n, project)};
+  const auto mark = [](std::vector<bool>& flags, const std::vector<StartOrigin>& origins) {
+    for (std::size_t i = 0; i < origins.size(); ++i)
+      if (origins[i] == StartOrigin::guess || origins[i] == StartOrigin::rate) flags[i] = true;
+  };
+  if (entry.stated_start) {
+    mark(movable.q, entry.stated_start->q);
+    mark(movable.v, entry.stated_start->v);
+  }
+  for (const std::string& name : given) {
+    const Component at = component(*entry.scene, name);
+    (at.of == 'q' ? movable.q : movable.v)[static_cast<std::size_t>(at.coordinate)] = false;
+  }
+  const auto none = [](const std::vector<bool>& flags) {
+    return std::ranges::find(flags, true) == flags.end();
+  };
+  return none(movable.q) && none(movable.v) ? std::nullopt : std::optional(movable);
+}
+
+void require_inputs(const CatalogueScene& entry, double end) {
+  for (const auto& [name, first, last] : entry.input_ranges)
+    if (!(end >= first && end <= last))
+      throw Misuse(
+          fmt::format("end = {:g}: the input '{}' is given from t = {:g} to {:g}", end, name, first, last));
+}
+
+}  // namespace
+
+MemberRuns::MemberRuns(const Sweep& sweep, SceneMaker make_scene, const Registry& registry,
+                       SolverFactory solvers)
+    : sweep_(sweep), make_scene_(std::move(make_scene)), registry_(registry), solvers_(std::move(solvers)) {
+  const long count = std::min(tried_for_an_example, sweep.members());
+  for (long k = 0; !example_.scene; ++k) try {
+      example_ = scene_of(k);
+    } catch (const Misuse& misuse) {
+      if (k + 1 < count) continue;
+      throw Misuse(fmt::format("{}: no scene of the first {} members can be made: {}", sweep.file, count,
+                               misuse.what()));
+    }
+  if (!sweep_.end) sweep_.end = example_.t_end;
+  if (sweep_.step == 0.0 && !sweep_.error) sweep_.step = example_.natural_step;
+  sweep_.values = recorded_values(sweep, example_);
+  const Recorded checked(sweep_, example_);
+  choose_method();
+}
+
+/// Strong damping, where there is any, is looked for in the example alone: one method for all members.
+void MemberRuns::choose_method() {
+  options_.method = sweep_.method;
+  options_.order = sweep_.order;
+  if (sweep_.rule) options_.constraint_rule = registry_.rule(*sweep_.rule);
+  if (sweep_.method != automatic_method || sweep_.error) return;
+  const double step = std::abs(sweep_.step);
+  options_.step = std::copysign(step, *sweep_.end - example_.scene->start.time);
+  const DefaultMethod chosen = default_method_of_motion(
+      example_.scene, registry_, solvers_, *sweep_.end, step, options_,
+      {options_.order, 0.0, options_.constraint_rule, large_from(options_.dense_limit)});
+  options_.method = sweep_.method = chosen.method;
+  options_.order = sweep_.order = chosen.order;
+}
+
+CatalogueScene MemberRuns::scene_of(long number) const {
+  const std::vector<std::string> names = sweep_.names();
+  const std::vector<double> values = sweep_.member(number);
+  Parameters changes = sweep_.set;
+  for (std::size_t k = 0; k < names.size(); ++k)
+    if (!names[k].starts_with(start_prefix)) changes[names[k]] = values[k];
+  CatalogueScene entry = make_scene_(changes);
+  Start start = entry.scene->start;
+  std::vector<std::string> given;
+  for (std::size_t k = 0; k < names.size(); ++k) {
+    if (!names[k].starts_with(start_prefix)) continue;
+    given.push_back(names[k].substr(std::string_view(start_prefix).size()));
+    set_start(*entry.scene, start, given.back(), values[k]);
+  }
+  if (given.empty() && !sweep_.project) return entry;
+  if (const auto movable = guesses(entry, sweep_.project, given))
+    start = project_start(*entry.scene, start, solvers_, *movable).start;
+  auto scene = std::make_shared<Scene>(*entry.scene);
+  scene->start = std::move(start);
+  entry.scene = std::move(scene);
+  return entry;
+}
+
+MemberResult MemberRuns::run(long number) const {
+  MemberResult result;
+  try {
+    result = take(number);
+  } catch (const std::bad_alloc&) {
+    throw;
+  } catch (const std::exception& exception) {
+    result.status = MemberResult::Status::failed;
+    result.reason = exception.what();
+    result.time = unknown_number;
+  }
+  if (result.status == MemberResult::Status::failed)
+    result.numbers.assign(recorded_names(sweep_).size(), unknown_number);
+  return result;
+}
+
+MemberResult MemberRuns::take(long number) const {
+  const CatalogueScene entry = scene_of(number);
+  require_inputs(entry, *sweep_.end);
+  return sweep_.error ? search(entry) : take_steps(entry);
+}
+
+MemberResult MemberRuns::take_steps(const CatalogueScene& entry) const {
+  const double start = entry.scene->start.time;
+  const StepGrid grid = fit_steps(start, *sweep_.end, std::copysign(sweep_.step, *sweep_.end - start));
+  IntegratorOptions options = options_;
+  options.step = grid.step;
+  Integrator integrator(entry.scene, registry_, solvers_, options);
+  RunChecks checks(integrator, grid.steps);
+  Recorded recorded(sweep_, entry);
+  EventSearch search(entry.events, !entry.scene->lagrangian);
+  StepReport searched;
+  Sample end;
+  const auto see = [&](const Sample& node) {
+    if (!search.empty()) {
+      searched = search.see(node, [&](double t, Sample& between) {
+        return sample_at(integrator, t, Momentum::projected, between);
+      });
+      if (!searched.ok()) return false;
+    }
+    end = search.stopped() ? search.hits().back().sample : node;
+    recorded.see(entry, end);
+    return !search.stopped();
+  };
+  const bool every_point = recorded.needs_every_point() || !search.empty();
+  const RunReport report =
+      run_steps(integrator, grid.steps, Momentum::projected, every_point ? 1 : grid.steps, see, &checks);
+  for (const EventHit& hit : search.hits()) recorded.see_event(entry.events[hit.event].name, hit.sample.time);
+  const std::string failure = !report.ok() ? report.last.failure : searched.failure;
+  if (!failure.empty()) return {MemberResult::Status::failed, failure, end.time, {}};
+  const std::string doubt = checks.text();
+  return {doubt.empty() ? MemberResult::Status::ok : MemberResult::Status::doubted, doubt, end.time,
+          recorded.numbers(entry, end)};
+}
+
+MemberResult MemberRuns::search(const CatalogueScene& entry) const {
+  if (!entry.events.empty()) throw Misuse("'error' does not go with the events of the scene: give a step");
+  ErrorControlOptions wanted;
+  wanted.error = *sweep_.error;
+  wanted.method = sweep_.method;
+  wanted.order = sweep_.order;
+  wanted.integrator = options_;
+  wanted.max_time =
+      std::numeric_limits<double>::infinity();  // solves alone, so that the answer is the same anywhere
+  const ErrorControlReport found = solve_to_error(entry.scene, registry_, solvers_, *sweep_.end, wanted);
+  if (!found.ok()) return {MemberResult::Status::failed, found.refusal, found.end.time, {}};
+  return {found.warning.empty() ? MemberResult::Status::ok : MemberResult::Status::doubted, found.warning,
+          found.end.time, Recorded(sweep_, entry).numbers(entry, found.end)};
+}
+
+}  // namespace diracstep

@@ -1,0 +1,26 @@
+#!/bin/sh
+# mpi_test.sh COMMAND COMMAND_WITH_MPI MPIRUN WORK: ranks share a sweep, and the results are those of one process.
+set -eu
+command="$1" with_mpi="$2" mpirun="$3" work="$4"
+rm -rf "$work" && mkdir -p "$work" && cd "$work"
+cat >orbits.toml <<'END'
+scene = "kepler_e06"
+method = "type1/gl:2"
+step = 0.01
+end = 20
+block = 2
+[grid]
+e = { from = 0.1, to = 0.5, count = 20 }
+END
+"$command" sweep orbits.toml --out one --json >one.json
+export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 OMPI_MCA_rmaps_base_oversubscribe=1
+for ranks in 2 4; do
+  "$mpirun" -n "$ranks" "$with_mpi" sweep orbits.toml --out "ranks$ranks" --threads 1 --json >"ranks$ranks.json"
+  for file in results.csv results.npy report.html; do cmp "one/$file" "ranks$ranks/$file"; done
+  [ "$(grep -c '"complete": true' "ranks$ranks.json")" = 1 ]
+done
+# A rank that cannot write ends all of them.
+if "$mpirun" -n 2 "$with_mpi" sweep orbits.toml --out no/such/folder 2>messages; then exit 1; fi
+grep -q "no/such/folder" messages
+"$with_mpi" sweep orbits.toml --out alone --json >alone.json  # without mpirun
+cmp one/results.csv alone/results.csv

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <diracstep/solvers/kinsol_solver.hpp>
+#include <diracstep/sweeps/sweep_folder.hpp>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <string>
+
+namespace diracstep::testing {
+
+/// A folder of its own for each test, removed afterwards.
+class SweepTest : public ::testing::Test {
+ protected:
+  SweepTest()
+      : folder_(std::filesystem::temp_directory_path() /
+                ("diracstep_sweep_" +
+                 std::string(::testing::UnitTest::GetInstance()->current_test_info()->name()) + "_" +
+                 std::to_string(getpid()))) {
+    std::filesystem::create_directories(folder_);
+  }
+  ~SweepTest() override { std::filesystem::remove_all(folder_); }
+
+  std::string path(const std::string& name) const { return (folder_ / name).string(); }
+
+  std::string write(const std::string& name, const std::string& text) const {
+    std::ofstream(path(name)) << text;
+    return path(name);
+  }
+
+  static std::string contents(const std::string& file) {
+    std::ifstream stream(file, std::ios::binary);
+    return (std::ostringstream() << stream.rdbuf()).str();
+  }
+
+  static SweepReport run(const Sweep& sweep, const SweepOptions& options) {
+    static const Registry registry = Registry::with_built_ins();
+    return run_sweep(
+        sweep, [&](const Parameters& changes) { return make_scene(sweep.scene, changes); }, registry,
+        kinsol(), options);
+  }
+
+ private:
+  std::filesystem::path folder_;
+};
+
+}  // namespace diracstep::testing

@@ -1,0 +1,270 @@
+#include <cmath>
+#include <diracstep/core/runs/run.hpp>
+#include <misuse.hpp>
+
+#include "sweep_fixture.hpp"
+
+namespace diracstep::testing {
+namespace {
+
+constexpr const char* orbits = R"(scene = "kepler_e06"
+method = "type1/gl:2"
+step = 0.05
+end = 2.0
+block = 3
+[grid]
+e = [0.0, 0.3, 0.6]
+[random]
+count = 4
+seed = 5
+[random.of]
+"start.x" = { uniform = [0.9, 1.1] }
+[record]
+values = ["x", "v_y", "energy"]
+extrema = ["y"]
+)";
+
+class SweepFolder : public SweepTest {
+ protected:
+  Sweep orbit_sweep() const { return read_sweep(write("orbits.toml", orbits)); }
+  std::string results(const std::string& folder) const {
+    return contents(path(folder + "/results.csv")) + contents(path(folder + "/results.npy"));
+  }
+  static std::vector<std::string> fields(const std::string& line) {
+    std::vector<std::string> all;
+    std::istringstream stream(line);
+    for (std::string field; std::getline(stream, field, ',');) all.push_back(field);
+    return all;
+  }
+  std::vector<std::string> rows(const std::string& folder) const {
+    std::istringstream stream(contents(path(folder + "/results.csv")));
+    std::vector<std::string> all;
+    for (std::string line; std::getline(stream, line);) all.push_back(line);
+    return all;
+  }
+};
+
+TEST_F(SweepFolder, AMemberIsTheRunOfItsScene) {
+  const Sweep sweep = orbit_sweep();
+  const SweepReport report = run(sweep, {.folder = path("out")});
+  EXPECT_TRUE(report.complete);
+  EXPECT_EQ(report.ok, 12);
+  EXPECT_EQ(rows("out")[0], "member,e,start.x,status,t,x,v_y,energy,min_y,max_y,reason");
+  const std::vector<std::string> line = fields(rows("out")[1 + 7]);
+  EXPECT_EQ(line[0], "7");
+  EXPECT_EQ(std::stod(line[1]), 0.3);
+
+  CatalogueScene entry = make_scene("kepler_e06", {{"e", 0.3}});
+  auto scene = std::make_shared<Scene>(*entry.scene);
+  scene->start.q[0] = sweep.member(7)[1];
+  EXPECT_EQ(std::stod(line[2]), scene->start.q[0]);
+  Integrator integrator(scene, Registry::with_built_ins(), kinsol(), {.method = "type1/gl:2", .step = 0.05});
+  Sample end;
+  double least = HUGE_VAL, most = -HUGE_VAL;
+  const RunReport ran = run_steps(integrator, 40, Momentum::projected, 1, [&](const Sample& node) {
+    least = std::min(least, node.q[1]);
+    most = std::max(most, node.q[1]);
+    end = node;
+    return true;
+  });
+  ASSERT_TRUE(ran.ok());
+  EXPECT_EQ(std::stod(line[4]), 2.0);
+  EXPECT_EQ(std::stod(line[5]), end.q[0]);
+  EXPECT_EQ(std::stod(line[6]), end.v[1]);
+  EXPECT_EQ(std::stod(line[7]), end.energy);
+  EXPECT_EQ(std::stod(line[8]), least);
+  EXPECT_EQ(std::stod(line[9]), most);
+}
+
+TEST_F(SweepFolder, TheResultsAreTheSameBytesForAnyDistribution) {
+  const Sweep sweep = orbit_sweep();
+  (void)run(sweep, {.folder = path("one"), .threads = 1});
+  const std::string expected = results("one");
+  ASSERT_GT(expected.size(), 1000u);
+
+  (void)run(sweep, {.folder = path("threads"), .threads = 3});
+  EXPECT_EQ(results("threads"), expected);
+
+  for (long part = 3; part >= 1; --part) {
+    const SweepReport report = run(sweep, {.folder = path("parts"), .part = part, .parts = 3});
+    EXPECT_EQ(report.complete, part == 1);
+    EXPECT_EQ(report.merged_here, part == 1);
+  }
+  EXPECT_EQ(results("parts"), expected);
+
+  Sweep other_blocks = sweep;
+  other_blocks.block = 5;
+  (void)run(other_blocks, {.folder = path("blocks")});
+  EXPECT_EQ(results("blocks"), expected);
+
+  long drawn = 0;
+  SweepOptions counter{.folder = path("counter")};
+  counter.next_block = [&] { return drawn++; };
+  (void)run(sweep, counter);
+  EXPECT_EQ(results("counter"), expected);
+}
+
+TEST_F(SweepFolder, GoesOnWithWhatIsMissing) {
+  const Sweep sweep = orbit_sweep();
+  (void)run(sweep, {.folder = path("whole")});
+  long asked = 0;
+  SweepOptions ended{.folder = path("ended"), .threads = 1};
+  ended.goes_on = [&] { return ++asked < 8; };
+  const SweepReport first = run(sweep, ended);
+  EXPECT_FALSE(first.complete);
+  EXPECT_GT(first.done, 0);
+  EXPECT_LT(first.done, 12);
+  const SweepReport second = run(sweep, {.folder = path("ended")});
+  EXPECT_TRUE(second.complete);
+  EXPECT_EQ(second.run_here, 12 - first.done);
+  EXPECT_EQ(results("ended"), results("whole"));
+  EXPECT_EQ(run(sweep, {.folder = path("ended")}).run_here, 0);
+}
+
+TEST_F(SweepFolder, ADamagedBlockIsRunAgain) {
+  const Sweep sweep = orbit_sweep();
+  (void)run(sweep, {.folder = path("out")});
+  const std::string expected = results("out"), block = path("out/blocks/000000000003.csv");
+  std::string text = contents(block);
+  text[text.size() - 20] ^= 1;
+  std::ofstream(block) << text;
+  const SweepReport report = run(sweep, {.folder = path("out")});
+  ASSERT_EQ(report.messages.size(), 1u);
+  expect_parts(report.messages[0], {"000000000003.csv", "not whole"});
+  EXPECT_EQ(report.run_here, 3);
+  EXPECT_EQ(results("out"), expected);
+}
+
+TEST_F(SweepFolder, HoldsOneSweep) {
+  const Sweep sweep = orbit_sweep();
+  (void)run(sweep, {.folder = path("out")});
+  std::string changed = orbits;
+  changed.replace(changed.find("seed = 5"), 8, "seed = 6");
+  const Sweep other = read_sweep(write("other.toml", changed));
+  expect_misuse([&] { (void)run(other, {.folder = path("out")}); }, {"another sweep", "sweep file"});
+  std::filesystem::create_directory(path("full"));
+  write("full/notes.txt", "x");
+  expect_misuse([&] { (void)run(sweep, {.folder = path("full")}); }, {"full", "not empty"});
+  expect_misuse([&] { (void)run(sweep, {.folder = path("none/out")}); }, {"none/out", "No such file"});
+  expect_misuse([&] { (void)run(sweep, {.folder = path("out"), .part = 4, .parts = 3}); }, {"part 4 of 3"});
+}
+
+/// e = 1.2 is refused by the scene, and with e = 0.9 so large a step does not keep the energy.
+TEST_F(SweepFolder, AFailedMemberIsARow) {
+  const Sweep sweep = read_sweep(write("s.toml", R"(scene = "kepler_e06"
+step = 0.25
+end = 6
+[grid]
+e = [0.1, 1.2, 0.9]
+)"));
+  const SweepReport report = run(sweep, {.folder = path("out")});
+  EXPECT_TRUE(report.complete);
+  EXPECT_EQ(report.failed, 1);
+  EXPECT_EQ(report.doubted, 1);
+  EXPECT_EQ(report.ok, 1);
+  const std::vector<std::string> line = fields(rows("out")[2]);
+  EXPECT_EQ(line[2], "failed");
+  EXPECT_EQ(line[4], "");
+  expect_parts(rows("out")[2], {"1.2"});
+  ASSERT_EQ(report.reasons.size(), 2u);
+  expect_parts(report.reasons[0], {"member 1, failed", "e = 1.2"});
+  expect_parts(report.reasons[1], {"member 2, doubted"});
+}
+
+/// A body that falls from h is at the ground at √(2h/g).
+TEST_F(SweepFolder, EventsAreTakenFromEachMember) {
+  write("fall.toml", R"(name = "fall"
+lagrangian = "v_y^2/2 - g*y"
+[coordinates]
+y = {}
+[parameters]
+g = 10
+[start]
+y = 1
+[[events]]
+name = "ground"
+when = "y"
+direction = "falling"
+action = "stop"
+[span]
+end = 5
+step = 0.1
+)");
+  const Sweep sweep = read_sweep(write("falls.toml", R"(scene = "fall.toml"
+[grid]
+g = [10, 20]
+"start.y" = [1, 4]
+[record]
+events = ["ground"]
+values = ["y", "v_y"]
+)"));
+  (void)run(sweep, {.folder = path("out")});
+  EXPECT_EQ(rows("out")[0], "member,g,start.y,status,t,y,v_y,ground_time,ground_count,reason");
+  for (std::size_t k = 0; k < 4; ++k) {
+    const std::vector<std::string> line = fields(rows("out")[1 + k]);
+    const double g = std::stod(line[1]), h = std::stod(line[2]), fall = std::sqrt(2.0 * h / g);
+    EXPECT_EQ(line[3], "ok") << rows("out")[1 + k];
+    EXPECT_NEAR(std::stod(line[4]), fall, 1e-13);
+    EXPECT_NEAR(std::stod(line[5]), 0.0, 1e-13);
+    EXPECT_NEAR(std::stod(line[6]), -g * fall, 1e-12);
+    EXPECT_EQ(line[7], line[4]);
+    EXPECT_EQ(line[8], "1");
+  }
+}
+
+/// What the sweep gives stays, and the rest of the start is found: y of the rod from its x.
+TEST_F(SweepFolder, ProjectionMovesWhatIsNotGiven) {
+  const std::string text = R"(scene = "pendulum_cartesian"
+step = 0.01
+end = 0.01
+project = true
+[grid]
+"start.x" = [0.6, 0.8]
+"start.y" = [-0.5]
+[record]
+values = ["x"]
+)";
+  const Sweep off = read_sweep(write("off.toml", text));
+  expect_misuse([&] { (void)run(off, {.folder = path("off")}); }, {"row 'rod'", "what is given stays"});
+  std::string guessed = text;
+  guessed.replace(guessed.find("\"start.y\" = [-0.5]\n"), 19, "");
+  write("rod.toml", R"(name = "rod"
+lagrangian = "(v_x^2 + v_y^2)/2 - 10*y"
+[coordinates]
+x = {}
+y = {}
+[[rows]]
+name = "rod"
+equation = "x^2 + y^2 = 1"
+[start]
+x = 0.6
+y = -0.8
+[span]
+end = 0.01
+step = 0.01
+)");
+  guessed.replace(guessed.find("pendulum_cartesian"), 18, "rod.toml");
+  guessed.replace(guessed.find("[\"x\"]"), 5, "[\"x\", \"y\"]");
+  const SweepReport on = run(read_sweep(write("on.toml", guessed)), {.folder = path("on")});
+  EXPECT_EQ(on.ok, 2);
+  const std::vector<std::string> line = fields(rows("on")[2]);
+  EXPECT_NEAR(std::stod(line[4]), 0.8, 1e-3);
+  EXPECT_NEAR(std::stod(line[5]), -0.6, 1e-3);
+}
+
+TEST_F(SweepFolder, UnknownNamesAreRefusedBeforeAnythingIsRun) {
+  const auto refused = [&](const std::string& text, std::initializer_list<std::string> parts) {
+    const Sweep sweep = read_sweep(write("s.toml", text));
+    expect_misuse([&] { (void)run(sweep, {.folder = path("out")}); }, parts);
+    EXPECT_FALSE(std::filesystem::exists(path("out")));
+  };
+  refused("scene = \"kepler_e06\"\n[grid]\nexcentricity = [1]\n", {"no parameter 'excentricity'"});
+  refused("scene = \"kepler_e06\"\n[grid]\n\"start.z\" = [1]\n", {"'start.z'", "no such coordinate"});
+  refused("scene = \"kepler_e06\"\n[grid]\ne = [0.1]\n[record]\nvalues = [\"enrgy\"]\n",
+          {"'enrgy'", "energy"});
+  refused("scene = \"kepler_e06\"\n[grid]\ne = [0.1]\n[record]\nevents = [\"a\"]\n", {"no event 'a'"});
+  refused("scene = \"keplar_e06\"\n[grid]\ne = [0.1]\n", {"keplar_e06", "kepler_e06"});
+}
+
+}  // namespace
+}  // namespace diracstep::testing
