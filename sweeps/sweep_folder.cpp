@@ -105,19 +105,22 @@ std::unique_ptr<FileLock> lock_if_free(const std::string& path) {
   }
 }
 
+/// But for what a sweep leaves that ends before it has written what it is.
+void require_empty(const fs::path& folder) {
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
+    const std::string name = entry.path().filename().string();
+    if (name.starts_with("sweep.json") || (name == "blocks" && fs::is_empty(entry.path()))) continue;
+    throw Misuse(fmt::format("'{}' is no folder of a sweep and not empty, it holds '{}': give another one",
+                             folder.string(), name));
+  }
+}
+
 /// Reads sweep.json, or makes it with the folder; the size of a block.
 long join(const MemberRuns& runs, const SweepOptions& options, int threads) {
   const fs::path folder = options.folder, manifest = folder / "sweep.json";
   std::error_code refused;
-  const bool made = fs::create_directory(folder, refused);
+  fs::create_directory(folder, refused);
   if (refused) throw Misuse(fmt::format("'{}' cannot be made: {}", options.folder, refused.message()));
-  const auto others = [&] {
-    return std::ranges::any_of(fs::directory_iterator(folder), [](const fs::directory_entry& entry) {
-      return !entry.path().filename().string().starts_with("sweep.json");
-    });
-  };
-  if (!made && !fs::exists(manifest) && others())
-    throw Misuse(fmt::format("'{}' is no folder of a sweep and not empty: give another one", options.folder));
   const Json here = identity(runs);
   const std::unique_ptr<FileLock> lock = waited_lock(manifest.string());
   if (fs::exists(manifest)) {
@@ -128,6 +131,7 @@ long join(const MemberRuns& runs, const SweepOptions& options, int threads) {
     require_same_sweep(there["identity"], here, options.folder);
     return there["block"].get<long>();
   }
+  require_empty(folder);
   const long block = block_size(runs, threads, options.parts);
   fs::create_directory(folder / "blocks");
   replace_file(manifest.string(), to_text(Json{{"block", block}, {"identity", here}}, 2) + '\n');

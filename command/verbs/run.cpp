@@ -226,6 +226,8 @@ IntegratorOptions take_found(const RunArguments& options, const CatalogueScene& 
                              RunResult& result) {
   const ErrorControlReport& found = *result.search;
   result.failure = found.refusal;
+  if (const std::string ended = "interrupted"; interrupted() && result.failure.ends_with(ended))
+    result.failure.replace(result.failure.size() - ended.size(), ended.size(), interruption());
   result.doubt = found.warning;
   result.end = found.end;
   result.work = found.work;

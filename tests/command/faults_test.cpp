@@ -160,18 +160,19 @@ TEST_F(EndingPlugin, ThatReturnsAnErrorIsTold) {
 
 TEST_F(EndingPlugin, ThatLoopsIsToldAndEndedByALimitOrASecondSignal) {
   const auto begin = std::chrono::steady_clock::now();
-  const Outcome limited = run(saving() + " --max-time 0.5", "ENDING=loop");
+  const Outcome limited = run(saving() + " --max-time 2", "ENDING=loop");
   EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(20));
   EXPECT_EQ(limited.status, 1);
   EXPECT_NE(limited.err.find("does not end"), std::string::npos) << limited.err;
   expect_whole_files();
 
   fs::remove(path("c"));
-  // INT at 0.5 s, a message three seconds later, and TERM
+  // INT once it loops, soon after its first checkpoint, a message three seconds later, and TERM
   const std::string looping =
       "ENDING=loop '" DIRACSTEP_COMMAND "' " + saving() + " 2>'" + path("told") + "' & ";
-  const Outcome twice = run("--version >/dev/null; " + looping +
-                            "sleep 0.5; kill -INT $!; sleep 3.5; kill -TERM $!; wait $!; echo $?");
+  const Outcome twice =
+      run("--version >/dev/null; " + looping + "until [ -e '" + path("c") +
+          "' ]; do sleep 0.1; done; sleep 0.5; kill -INT $!; sleep 3.5; kill -TERM $!; wait $!; echo $?");
   EXPECT_NE(twice.out.find("143"), std::string::npos) << twice.out;
   EXPECT_NE(contents(path("told")).find("has not ended yet"), std::string::npos) << contents(path("told"));
   expect_whole_files();

@@ -22,7 +22,9 @@ TEST_F(StudyCommand, JsonHasTheKeysOfTheContract) {
   EXPECT_EQ(study["unknowns"], 4);
   EXPECT_EQ(study["reference"]["kind"], "exact");
   EXPECT_TRUE(study["reference"]["self_error"].is_number());
-  ASSERT_EQ(study["rows"].size(), 10u);
+  // IDA has a row more for each formulation that was the fastest at a tolerance.
+  EXPECT_EQ(std::ranges::count_if(study["rows"], [](const Json& row) { return row["method"] != "ida"; }), 8);
+  EXPECT_GE(study["rows"].size(), 10u);
   for (const Json& row : study["rows"]) {
     EXPECT_EQ(row["status"], "ok");
     for (const char* key : {"error_q", "error_p", "constraint", "energy_error", "steps", "newton_iterations",

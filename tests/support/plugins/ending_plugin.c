@@ -1,4 +1,4 @@
-/* A plugin that behaves until t = 5 and then, as ENDING says in the environment, loops for ever, ends the
+/* A plugin that behaves until t = 1 and then, as ENDING says in the environment, loops for ever, ends the
  * program by exit(), or returns an error. */
 #include <diracstep/plugins/diracstep_plugin.h>
 #include <stdlib.h>
@@ -13,10 +13,10 @@ static int value(void *self, const diracstep_system *system, diracstep_interval 
                  double *s) {
   (void)self;
   volatile int forever = 1;
-  if (step.start > 5.0 && ends("loop"))
+  if (step.start > 1.0 && ends("loop"))
     while (forever) continue;
-  if (step.start > 5.0 && ends("exit")) exit(0);
-  if (step.start > 5.0 && ends("error")) return 7;
+  if (step.start > 1.0 && ends("exit")) exit(0);
+  if (step.start > 1.0 && ends("error")) return 7;
   const int n = system->dimension;
   double v[64];
   for (int i = 0; i < n; ++i) v[i] = (y[n + i] - y[i]) / step.size;
