@@ -91,10 +91,20 @@ MemberRuns::MemberRuns(const Sweep& sweep, SceneMaker make_scene, const Registry
                                misuse.what()));
     }
   if (!sweep_.end) sweep_.end = example_.t_end;
+  take_recommendation();
   if (sweep_.step == 0.0 && !sweep_.error) sweep_.step = example_.natural_step;
   sweep_.values = recorded_values(sweep, example_);
   const Recorded checked(sweep_, example_);
   choose_method();
+}
+
+/// As a run does: the method and the step of the scene's file where the sweep names no method.
+void MemberRuns::take_recommendation() {
+  const Recommendation& advice = example_.recommended;
+  if (!advice.stated || sweep_.error || sweep_.method != automatic_method || sweep_.order != 0) return;
+  sweep_.method = advice.method;
+  sweep_.order = advice.order;
+  if (sweep_.step == 0.0) sweep_.step = advice.step;
 }
 
 /// Strong damping, where there is any, is looked for in the example alone: one method for all members.

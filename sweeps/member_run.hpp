@@ -40,6 +40,7 @@ class MemberRuns {
   MemberResult take(long number) const;
   MemberResult take_steps(const CatalogueScene& entry) const;
   MemberResult search(const CatalogueScene& entry) const;
+  void take_recommendation();
   void choose_method();
 
   Sweep sweep_;
