@@ -51,8 +51,8 @@ if(DIRACSTEP_BUILD_PLUGINS)
 endif()
 if(DIRACSTEP_BUILD_VALIDATION)
   sundials_libraries(validation_libraries ${DIRACSTEP_VALIDATION_SUNDIALS})
-  pkg_config_file(diracstep-validation "DiracStep: scenes, references and studies" REQUIRES diracstep-plugins
-    LIBS diracstep_reports diracstep_validation diracstep_scene_format diracstep_files
+  pkg_config_file(diracstep-validation "DiracStep: scenes, references, studies and sweeps" REQUIRES diracstep-plugins
+    LIBS diracstep_sweeps diracstep_reports diracstep_validation diracstep_scene_format diracstep_files
     PRIVATE_LIBS ${validation_libraries} PRIVATE_REQUIRES fmt tomlplusplus)
 endif()
 if(DIRACSTEP_BUILD_C_INTERFACE)

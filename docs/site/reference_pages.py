@@ -16,6 +16,7 @@ FOLDERS = {
     "scene_format": "Scenes from text files, and the catalogue.",
     "validation": "Reference solutions, studies, and checks of methods and scenes.",
     "reports": "Studies as tables, pictures and pages.",
+    "sweeps": "One scene for many parameters and starts.",
     "files": "Files that are written whole or not at all.",
 }
 INTRODUCTION = """\
