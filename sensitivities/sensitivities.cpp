@@ -71,6 +71,7 @@ Sensitivities::~Sensitivities() {
 }
 Sensitivities::Sensitivities(Sensitivities&&) noexcept = default;
 
+const Scene& Sensitivities::scene() const { return parts_->integrator.scene(); }
 int Sensitivities::coordinates() const { return parts_->n(); }
 int Sensitivities::parameters() const { return parts_->count(); }
 
@@ -110,10 +111,14 @@ Directions Sensitivities::by_parameters() const {
 }
 
 StepReport Sensitivities::step(Directions& z) {
-  require_size("directions: rows", z.rows(), 2 * coordinates() + parameters());
   StepReport report = parts_->integrator.step();
-  if (report.ok()) parts_->motion->push(parts_->integrator.solved_stages(), z);
+  if (report.ok()) follow(z);
   return report;
+}
+
+void Sensitivities::follow(Directions& z) {
+  require_size("directions: rows", z.rows(), 2 * coordinates() + parameters());
+  parts_->motion->push(parts_->integrator.solved_stages(), z);
 }
 
 ReadDirections Sensitivities::read(const Directions& z) {

@@ -49,6 +49,7 @@ class Sensitivities {
   ~Sensitivities();
   Sensitivities(Sensitivities&&) noexcept;
 
+  const Scene& scene() const;  ///< as it is stepped
   int coordinates() const;
   int parameters() const;
 
@@ -65,6 +66,8 @@ class Sensitivities {
   /// One step of the integrator, and of the directions with it.  Where it fails they stay.  Throws Error
   /// where F_x is singular.
   StepReport step(Directions& z);
+  /// The same for a step that the integrator has taken last, of any size.
+  void follow(Directions& z);
 
   /// What directions at the current point are in the velocity and the projected momentum there.
   ReadDirections read(const Directions& z);
