@@ -23,6 +23,7 @@ void follow_rows(const Columns& k, const Columns& a, const Columns& right, const
   const Eigen::Index m = a.rows();
   const Indices moved = components(guessed, n, true), held = components(guessed, n, false);
   const auto f = static_cast<Eigen::Index>(moved.size());
+  if (f == 0) return;
   Columns matrix = Columns::Zero(f + m, f + m), side(f + m, y.cols());
   matrix.topLeftCorner(f, f) = k(moved, moved);
   matrix.topRightCorner(f, m) = -a(Eigen::all, moved).transpose();
@@ -37,6 +38,7 @@ void follow_rows(const Columns& k, const Columns& a, const Columns& right, const
 /// Multipliers with Aᵀμ = force along the guessed components.
 Vector multipliers(const Columns& a, const Vector& force, const std::vector<bool>& guessed) {
   const Indices moved = components(guessed, static_cast<int>(a.cols()), true);
+  if (moved.empty() || a.rows() == 0) return Vector::Zero(a.rows());
   const Columns along = a(Eigen::all, moved).transpose();
   return along.completeOrthogonalDecomposition().solve(force(moved));
 }

@@ -160,7 +160,7 @@ void expect_as_runs_of(const std::string& text, const std::string& parameter, do
         return join(join(end.q, end.v), end.p);
       },
       2e-3);
-  EXPECT_LT(distance(exact, approximate), 3e-9) << parameter;
+  EXPECT_LT(distance(exact, approximate), 3e-9) << parameter << ", " << options.method;
 }
 
 const char* const rod = R"toml(name = "rod"
