@@ -77,6 +77,7 @@ class Run {
   /// What there is to do after step k; whether the run goes on.  The signal is asked for once, and the
   /// checkpoint is saved before the point is kept: a run that goes on from it does not keep the point twice.
   bool visit(long k) {
+    if (keeping_.sensitivities != nullptr) keeping_.sensitivities->follow_step();
     look_for_events();
     if (events_.stopped()) return false;
     const bool stopped = interrupted();

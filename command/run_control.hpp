@@ -3,6 +3,7 @@
 #include <diracstep/command/files/checkpoint_file.hpp>
 #include <diracstep/command/files/trajectory_file.hpp>
 #include <diracstep/command/run_report.hpp>
+#include <diracstep/command/run_sensitivities.hpp>
 #include <optional>
 #include <string>
 #include <utility>
@@ -18,6 +19,7 @@ struct Keeping {
   std::vector<double> times = {};
   std::vector<Event> events = {};                                  ///< that are looked for at each step
   TrajectoryFile* file = nullptr;                                  ///< none: only the end is read
+  RunSensitivities* sensitivities = nullptr;                       ///< that follow each step, if any
   std::string checkpoint = {};                                     ///< path, or empty
   long checkpoint_every = 0;                                       ///< steps; 0: every ten seconds
   std::vector<std::pair<std::string, std::string>> identity = {};  ///< of the run, for the checkpoint

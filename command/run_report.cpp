@@ -99,6 +99,35 @@ Json outputs_json(const RunResult& result) {
   return json;
 }
 
+std::string sensitivities_text(const RunResult& result, const Scene& scene) {
+  std::string text;
+  for (const SensitivityColumn& column : result.sensitivities) {
+    std::vector<std::vector<std::string>> rows{{fmt::format("d/d({})", column.by), "q", "v", "p"}};
+    for_shown(
+        scene.dimension(),
+        [&](int i) {
+          rows.push_back({scene.coordinates[static_cast<std::size_t>(i)], fmt::format("{:.15g}", column.q[i]),
+                          column.v.size() > 0 ? fmt::format("{:.15g}", column.v[i]) : "",
+                          fmt::format("{:.15g}", column.p[i])});
+        },
+        [&](int) {
+          rows.push_back({"…", "", "", ""});
+        });
+    text += aligned(rows);
+  }
+  return text;
+}
+
+Json sensitivities_json(const RunResult& result, const Scene& scene) {
+  Json json = Json::object();
+  for (const SensitivityColumn& column : result.sensitivities) {
+    Json by{{"q", by_name(scene.coordinates, column.q)}, {"p", by_name(scene.coordinates, column.p)}};
+    by["v"] = column.v.size() > 0 ? by_name(scene.coordinates, column.v) : Json(nullptr);
+    add_member(json, column.by, by);
+  }
+  return json;
+}
+
 std::string events_text(const RunResult& result) {
   constexpr std::size_t most = 20;
   std::string text;
@@ -220,6 +249,7 @@ std::string run_text(const RunResult& result, const CatalogueScene& entry, const
     text += fmt::format("\nt = {:.10g}\n{}energy: {:.15g}, changed by {:.2e}\n", result.end.time,
                         end_table(result.end, *entry.scene), result.end.energy, energy_change(result, entry));
     text += invariants_text(result) + outputs_text(result) + events_text(result);
+    text += sensitivities_text(result, *entry.scene);
     if (std::isfinite(result.check.error_q))
       text += fmt::format("error against the {} reference: q {:.2e}, p {:.2e}\n", entry.reference.kind,
                           result.check.error_q, result.check.error_p);
@@ -251,6 +281,7 @@ std::string run_json(const RunResult& result, const CatalogueScene& entry, const
   json["energy_error"] = Json(check.energy_error);
   json["invariants"] = invariants_json(result);
   json["outputs"] = outputs_json(result);
+  if (!result.sensitivities.empty()) json["sensitivities"] = sensitivities_json(result, *entry.scene);
   json["events"] = events_json(result, *entry.scene);
   json["stopped"] = result.stopped;
   json["steps"] = result.work.steps;

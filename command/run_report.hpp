@@ -1,5 +1,6 @@
 #pragma once
 
+#include <diracstep/command/run_sensitivities.hpp>
 #include <diracstep/command/variable_steps.hpp>
 #include <diracstep/core/runs/event_search.hpp>
 #include <diracstep/validation/studies/study_run.hpp>
@@ -28,6 +29,7 @@ struct RunResult {
   std::string doubt;                         ///< empty, or why the points are not to be believed
   std::vector<InvariantEnds> invariants;
   std::vector<std::pair<std::string, double>> outputs;  ///< of the scene, at the end
+  std::vector<SensitivityColumn> sensitivities;         ///< of the end, where they were asked for
   std::vector<Event> events;                            ///< of the scene
   std::vector<EventHit> hits;                           ///< where they were met
   bool stopped = false;                                 ///< by the last of these

@@ -4,7 +4,10 @@
 #include <diracstep/core/numerics/near_names.hpp>
 #include <diracstep/core/system/contradictory_rows.hpp>
 #include <diracstep/core/system/redundant_rows.hpp>
+#include <diracstep/files/input_file.hpp>
+#include <diracstep/scene_format/compiler/size_limits.hpp>
 #include <diracstep/scene_format/loader/shipped_scenes.hpp>
+#include <diracstep/scene_format/parametric_scene_file.hpp>
 #include <diracstep/scene_format/scene_catalogue.hpp>
 #include <diracstep/scene_format/scene_file.hpp>
 
@@ -44,17 +47,33 @@ void set_tolerances(CatalogueScene& entry, const Parameters& tolerances) {
   entry.scene = std::move(scene);
 }
 
-CatalogueScene make_scene(const std::string& name, const Parameters& changes) {
-  if (name.ends_with(".toml")) return scene_from_file(name, changes);
+namespace {
+
+/// The text of a scene by its name or the path of its file.
+std::string text_of_scene(const std::string& name) {
+  if (name.ends_with(".toml"))
+    return read_file(name, "the scene file", scene_compiler::size_limits().file_bytes);
   std::string known;
   for (const ShippedScene& scene : shipped_scenes()) {
-    if (scene.name == name)
-      return scene_from_text(name, std::string(reinterpret_cast<const char*>(scene.text), scene.size),
-                             changes);
+    if (scene.name == name) return {reinterpret_cast<const char*>(scene.text), scene.size};
     known += std::string(" ") + scene.name;
   }
   throw Misuse("unknown scene '" + name + "'" + did_you_mean(name, scene_names()) + "; the scenes are" +
                known + "; or give the path of a file NAME.toml");
+}
+
+}  // namespace
+
+CatalogueScene make_scene(const std::string& name, const Parameters& changes) {
+  return scene_from_text(name, text_of_scene(name), changes);
+}
+
+ParametricScene parametric_scene(const std::string& name, const CatalogueScene& entry,
+                                 const std::vector<std::string>& parameters, const Parameters& changes) {
+  if (parameters.empty()) return {entry.scene, nullptr};
+  if (!entry.stated_start)
+    throw Misuse("scene '" + name + "' is not from a file: it has no parameters to be differentiated by");
+  return parametric_scene_from_text(name, text_of_scene(name), entry, parameters, changes);
 }
 
 }  // namespace diracstep

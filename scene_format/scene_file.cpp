@@ -10,7 +10,9 @@
 #include <diracstep/scene_format/loader/scene_definition.hpp>
 #include <diracstep/scene_format/loader/scene_functions.hpp>
 #include <diracstep/scene_format/loader/scene_kinks.hpp>
+#include <diracstep/scene_format/parametric_scene_file.hpp>
 #include <diracstep/scene_format/scene_file.hpp>
+#include <diracstep/sensitivities/moved_start.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
 #include <limits>
 
@@ -397,7 +399,89 @@ CatalogueScene load(const std::string& file, const std::string& text, const Para
   return entry;
 }
 
+/// ∂q0/∂θ and ∂v0/∂θ by the formulas of the start, and where it is given by momenta through ∂H/∂p.
+void differentiate_start(const LoadedScene& loaded, const Start& start, ParametricScene& result) {
+  const SceneProgram& program = *loaded.program;
+  const int n = result.scene->dimension();
+  const auto count = static_cast<Eigen::Index>(program.differentiated.size());
+  result.start_q = result.start_v = Columns::Zero(n, count);
+  for (Eigen::Index k = 0; k < count; ++k)
+    for (const NamedValue& named : program.start_derivatives[static_cast<std::size_t>(k)])
+      for_each_value(loaded, named, start.time, [&](int index, double value) {
+        (named.role == Role::position ? result.start_q : result.start_v)(index, k) = value;
+      });
+  if (start.p.size() == 0) return;
+  const Hamiltonian& h = *result.extended->hamiltonian;
+  Vector xx(h.pattern().nonzeros()), xp = xx, pp = xx, x(n + count), p = Vector::Zero(n + count);
+  x << start.q, result.parameters;
+  p.head(n) = start.p;
+  h.hessian(start.time, x, p, xx, xp, pp);
+  Columns dx(n + count, count);
+  dx << result.start_q, Columns::Identity(count, count);
+  result.start_v = h.pattern().full(xp).leftCols(n).transpose() * dx +
+                   h.pattern().full(pp).topLeftCorner(n, n) * result.start_v;
+}
+
+/// Where the file, or the rate of a state, moves the start.
+void move_start(const LoadedScene& loaded, const CatalogueScene& entry, ParametricScene& result) {
+  const Start& stated = entry.stated_start->start;
+  Guesses guesses = guesses_of(loaded);
+  const bool moves = loaded.program->document.project || !guesses.q.empty();
+  if (stated.v.size() == 0 || (!moves && loaded.program->states.empty())) return;
+  const auto n = static_cast<std::size_t>(result.scene->dimension());
+  if (!moves) guesses = {std::vector<bool>(n, false), std::vector<bool>(n, false)};
+  for (const StateProgram& state : loaded.program->states)
+    if (!guesses.v.empty())
+      guesses.v[static_cast<std::size_t>(loaded.layout.position(state.family, {0, 0}))] = true;
+  guesses.q.resize(std::min(n, guesses.q.size()));  // without the parameters
+  guesses.v.resize(std::min(n, guesses.v.size()));
+  move_start_derivatives(result.extended, result.parameters, stated, entry.scene->start, guesses,
+                         result.start_q, result.start_v);
+}
+
+ParametricScene load_parametric(const std::string& file, const std::string& text, const CatalogueScene& entry,
+                                const std::vector<std::string>& parameters, const Parameters& changes,
+                                bool as_written) {
+  auto program = compile_scene(file, text, as_written, parameters);
+  ParameterValues values = parameter_values(program->document, changes);
+  const LoadedScenePtr loaded = std::make_shared<const LoadedScene>(std::move(program), std::move(values));
+  ParametricScene result{entry.scene, nullptr};
+  result.parameters.resize(static_cast<Eigen::Index>(parameters.size()));
+  for (std::size_t k = 0; k < parameters.size(); ++k)
+    result.parameters[static_cast<Eigen::Index>(k)] =
+        loaded->parameters[static_cast<std::size_t>(loaded->program->symbols.parameter(parameters[k]))][0];
+  Start start = entry.scene->start;
+  const auto extend = [&](Vector& column, const Vector& by) {
+    if (column.size() == 0) return;
+    const Vector own = column;
+    column.resize(own.size() + by.size());
+    column << own, by;
+  };
+  extend(start.q, result.parameters);
+  extend(start.v, Vector::Zero(result.parameters.size()));
+  extend(start.p, Vector::Zero(result.parameters.size()));
+  auto extended = std::make_shared<Scene>(scene_of(loaded, start));
+  extended->kinks = nullptr;
+  result.extended = std::move(extended);
+  differentiate_start(*loaded, entry.scene->start, result);
+  move_start(*loaded, entry, result);
+  return result;
+}
+
 }  // namespace
+
+ParametricScene parametric_scene_from_text(const std::string& file, const std::string& text,
+                                           const CatalogueScene& entry,
+                                           const std::vector<std::string>& parameters,
+                                           const Parameters& changes) {
+  if (!entry.stated_start)
+    throw Misuse("scene '" + file + "' is not from a file: it has no parameters to be differentiated by");
+  try {
+    return load_parametric(file, text, entry, parameters, changes, false);
+  } catch (const ConstantOutOfRange&) {
+    return load_parametric(file, text, entry, parameters, changes, true);
+  }
+}
 
 CatalogueScene scene_from_text(const std::string& file, const std::string& text, const Parameters& changes) {
   try {

@@ -51,8 +51,14 @@ std::vector<Output> further_columns(const CatalogueScene& entry) {
 
 /// Where the file goes on: from the checkpoint, or from its beginning.
 void open_trajectory(std::optional<TrajectoryFile>& file, const RunArguments& options,
-                     const CatalogueScene& entry, const std::optional<Checkpoint>& saved) {
+                     const CatalogueScene& entry, const std::optional<Checkpoint>& saved,
+                     const std::vector<Output>& sensitivities = {}) {
   if (options.out.empty()) return;
+  if (!sensitivities.empty()) {
+    std::vector<Output> columns = further_columns(entry);
+    columns.insert(columns.end(), sensitivities.begin(), sensitivities.end());
+    return void(file.emplace(options.out, *entry.scene, columns));
+  }
   if (saved)
     file.emplace(options.out, *entry.scene, TrajectoryFile::Mark{saved->points, saved->bytes},
                  further_columns(entry));
@@ -117,9 +123,15 @@ void run_fixed(const RunArguments& options, const CatalogueScene& entry, const S
     require_same_run(*saved, keeping.identity, options.resume);
     go_on(*saved, options, integrator);
   }
-  open_trajectory(file, options, entry, saved);
+  std::optional<RunSensitivities> derivatives;
+  if (!options.sensitivities.empty())
+    derivatives.emplace(names("--sensitivities", options.sensitivities), options.scene,
+                        parameters(options.set), entry, session.registry, integrator);
+  open_trajectory(file, options, entry, saved, derivatives ? derivatives->columns() : std::vector<Output>{});
   if (file) keeping.file = &*file;
+  if (derivatives) keeping.sensitivities = &*derivatives;
   run_to(steps, integrator, keeping, result);
+  if (derivatives && result.failure.empty()) result.sensitivities = derivatives->read();
 }
 
 /// Variable steps to the end, or to the last of the times given.
@@ -307,8 +319,8 @@ void choose_method(RunArguments& options, const CatalogueScene& entry, const Ses
   if (!session.registry.method(choice.method).info.damped) return;
   used.method = choice.method;
   const bool times_with_events = !entry.events.empty() && (!options.at.empty() || options.every_time);
-  const bool fixed = step_given || options.fixed || options.substeps > 1 || times_with_events ||
-                     !checkpoint_path(options).empty();
+  const bool fixed = step_given || options.fixed || !options.sensitivities.empty() || options.substeps > 1 ||
+                     times_with_events || !checkpoint_path(options).empty();
   if (!fixed) options.adaptive = true;
   say(fmt::format("{}; {}{}", choice.method, choice.reason,
                   fixed ? "" : "; steps vary by their local error, --step H takes fixed ones"));
@@ -335,6 +347,9 @@ void run(const RunArguments& given, Session& session) {
   }
   require_inputs_until(entry, end);
   require_events_found(entry, options);
+  if (!options.sensitivities.empty() && !entry.events.empty())
+    throw Misuse(
+        "--sensitivities do not go with the events of the scene: when one is met is not differentiated");
   IntegratorOptions used = integrator_options(session, options.method);
   used.step = options.step.value_or(std::copysign(entry.natural_step, end - entry.scene->start.time));
   used.substeps = options.substeps;
@@ -362,6 +377,7 @@ void add_run(CLI::App& app, Session& session) {
       "  diracstep run knife_edge --step 0.05 --out knife_edge.csv\n"
       "  diracstep run kepler_e099 --method type1/gl:4 --adaptive --out comet.csv\n"
       "  diracstep run pendulum_cartesian --error 1e-8\n"
+      "  diracstep run chaplygin_sleigh --sensitivities m,a,q0\n"
       "  diracstep run kepler_e06 --order 8 --end 100 --set e=0.3 --every 10 --out orbit.csv\n"
       "  diracstep run kepler_e06 --end 1e6 --every 1000 --out k.csv --checkpoint k.checkpoint\n"
       "  diracstep run kepler_e06 --end 1e6 --every 1000 --out k.csv --resume k.checkpoint");

@@ -85,6 +85,10 @@ void add_run_arguments(CLI::App& verb, Session& session, RunArguments& options) 
                   "Times T1,T2,… to show instead of the steps, each by a step of the method from the last\n"
                   "node; the motion keeps its bits.  With --adaptive the last of them ends the run")
       ->type_name("T1,T2,…");
+  verb.add_option("--sensitivities", options.sensitivities,
+                  "Exact derivatives of the motion by parameters of the scene and by q0, v0, p0, its start:\n"
+                  "of the end in the summary, of each point in the file")
+      ->type_name("P,q0,…");
   verb.add_option("--every-time", options.every_time, "The same at the start and after every so much time")
       ->type_name("T");
   verb.add_option(
@@ -128,6 +132,10 @@ void require_sense(const RunArguments& options) {
   if (chosen_times && options.error)
     throw Misuse("--at and --every-time do not go with --error: name the method and the step that it finds");
   if (options.eps && std::isnan(*options.eps)) throw Misuse("--eps is not a number");
+  if (!options.sensitivities.empty() && (options.adaptive || options.error || chosen_times || checkpoints))
+    throw Misuse(
+        "--sensitivities are those of fixed steps to the end: --adaptive, --error, --at, --every-time, "
+        "--checkpoint and --resume exclude them");
   if (options.fixed && options.adaptive) throw Misuse("--fixed and --adaptive exclude each other");
   require_limits(options);
   require_use(options);

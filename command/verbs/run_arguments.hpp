@@ -25,6 +25,7 @@ struct RunArguments {
   std::optional<double> eps;
   std::optional<std::string> control;
   std::string at;
+  std::string sensitivities;
   std::optional<double> every_time;
   std::optional<double> error;
   bool fixed = false;

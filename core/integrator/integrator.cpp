@@ -48,7 +48,8 @@ Integrator::Integrator(PreparedScene prepared, const Registry& registry, const S
       reader_(std::make_unique<PointReader>(scene_, solvers, matrices_.full)),
       sequence_(std::make_unique<StepSequence>(
           scene_, design_step(scene_, registry, method_, options_, matrices_.full), solvers, *reader_)),
-      time_kinks_(std::make_unique<TimeKinks>(scene_->kinks, scene_->start.time, options_.step)) {
+      time_kinks_(std::make_unique<TimeKinks>(scene_->kinks, scene_->start.time, options_.step)),
+      solved_stages_(std::make_unique<std::vector<SolvedStage>>()) {
   parts_.reserve(4);
   reset(scene_->start);
 }
@@ -155,6 +156,11 @@ void Integrator::accept_step(double h, std::size_t pieces) {
   last_.retry = pieces == 1 ? Guess::last_solution : Guess::plain;
   clock_.advance(h, options_.step);
   ++work_.steps;
+}
+
+void Integrator::record_stages(bool wanted) {
+  solved_stages_->clear();
+  sequence_->record_into(wanted ? solved_stages_.get() : nullptr);
 }
 
 SolveReport Integrator::sample(Momentum momentum, Sample& sample) {

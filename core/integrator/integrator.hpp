@@ -4,6 +4,7 @@
 #include <diracstep/core/integrator/guess.hpp>
 #include <diracstep/core/integrator/integrator_options.hpp>
 #include <diracstep/core/integrator/sample.hpp>
+#include <diracstep/core/integrator/solved_stage.hpp>
 #include <diracstep/core/integrator/step_report.hpp>
 #include <diracstep/core/methods/registry.hpp>
 #include <diracstep/core/numerics/snapshot.hpp>
@@ -72,6 +73,12 @@ class Integrator {
 
   std::vector<PlanLine> plan() const;
 
+  /// From now on the systems of each step are kept as they were solved, those of the last step at a time.
+  /// The motion has the same bits with and without.
+  void record_stages(bool wanted);
+  /// Of the last step; empty before the first, and where they are not kept.
+  const std::vector<SolvedStage>& solved_stages() const { return *solved_stages_; }
+
   /// All that the next steps depend on.  After `restore`, an integrator of the same scene, method and step
   /// goes on with the same bits as the one saved.  restore() throws Misuse for a snapshot that does not fit,
   /// naming what does not, and then the integrator is as after reset().  The last step before it cannot be
@@ -107,7 +114,8 @@ class Integrator {
   std::unique_ptr<PointReader> reader_;  // the sequence refers to it, also after a move
   std::unique_ptr<StepSequence> sequence_;
   std::unique_ptr<TimeKinks> time_kinks_;
-  std::vector<Interval> parts_, pieces_;  ///< of the step
+  std::unique_ptr<std::vector<SolvedStage>> solved_stages_;  // the sequence refers to it, also after a move
+  std::vector<Interval> parts_, pieces_;                     ///< of the step
   bool met_kinks_ = false;
 
   Clock clock_;

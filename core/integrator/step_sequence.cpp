@@ -33,6 +33,7 @@ StepSequence::Outcome StepSequence::solve(std::span<const Interval> pieces, cons
                                           Work& work) {
   SolveReport total;
   const State* at = &start;
+  if (record_ != nullptr) record_->clear();
   for (const Interval& piece : pieces) {
     double t = piece.start;
     for (Stage& stage : stages_) {
@@ -41,6 +42,7 @@ StepSequence::Outcome StepSequence::solve(std::span<const Interval> pieces, cons
       const SolveReport report = part.solve(task(stage, {t, h}, *at, guess), stage.x, work);
       if (!report.ok()) return failed(report, stage, piece.size);
       total.add(report);
+      if (record_ != nullptr) record_->push_back({stage.part, {t, h}, *at, stage.x});
       end_.swap(part.end().at);
       at = &end_;
       t += h;

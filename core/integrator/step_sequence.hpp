@@ -1,5 +1,6 @@
 #pragma once
 
+#include <diracstep/core/integrator/solved_stage.hpp>
 #include <diracstep/core/integrator/step_solver.hpp>
 #include <functional>
 #include <optional>
@@ -48,6 +49,11 @@ class StepSequence {
   SolveReport impulse_ahead(Interval step, const State& start, Vector& impulse);
 
   std::size_t stages() const { return stages_.size(); }
+
+  /// Where it writes what it solves: after solve() the stages of all its pieces, in their order.  Null, as at
+  /// first: nowhere.
+  void record_into(std::vector<SolvedStage>* record) { record_ = record; }
+
   const StepSolver& part() const { return parts_.front(); }
 
   void save(Snapshot& to) const;
@@ -74,6 +80,7 @@ class StepSequence {
   std::optional<StepSolver> ahead_;  ///< the copy for impulse_ahead(), made when it is needed first
   Origin origin_ = Origin::start;
   State end_;
+  std::vector<SolvedStage>* record_ = nullptr;
 };
 
 }  // namespace diracstep

@@ -15,7 +15,13 @@ constexpr std::string_view prefix = "hidden_";  // of the names of these rows
 class RowsAlongMotions final : public ConstraintRows {
  public:
   RowsAlongMotions(const Scene& scene, bool holonomic, const Columns& directions, const Vector& units)
-      : RowsAlongMotions(scene, holonomic, in_units(directions, units), directions, pattern_of(directions)) {}
+      : RowsAlongMotions(scene, holonomic, in_units(directions, units), directions, pattern_of(directions)) {
+    motions_ = directions;
+    units_ = units;
+  }
+
+  const Columns& motions() const { return motions_; }
+  const Vector& units() const { return units_; }
 
   std::string origin(int row) const override {
     const std::string& name = names()[static_cast<std::size_t>(row)];
@@ -152,6 +158,8 @@ class RowsAlongMotions final : public ConstraintRows {
   std::vector<double> w_values_;        ///< its entries other than zero
   PatternProduct by_lagrangian_, by_force_;
   BlockPattern layout_;
+  Columns motions_;  ///< as they were given
+  Vector units_;
 };
 
 }  // namespace
@@ -165,6 +173,15 @@ std::string motion_along(const Scene& scene, const Vector& w) {
     text << scene.coordinates[static_cast<std::size_t>(i)];
   }
   return text.str();
+}
+
+std::shared_ptr<const ConstraintRows> rows_along_motions_in(const ConstraintRows& rows,
+                                                            const Scene& extended) {
+  const auto* const hidden = dynamic_cast<const RowsAlongMotions*>(&rows);
+  if (hidden == nullptr) return nullptr;
+  Columns motions = Columns::Zero(extended.dimension(), hidden->rows());
+  motions.topRows(hidden->dimension()) = hidden->motions();
+  return std::make_shared<RowsAlongMotions>(extended, hidden->holonomic(), motions, hidden->units());
 }
 
 std::shared_ptr<const ConstraintRows> rows_along_motions(const Scene& scene, bool holonomic,

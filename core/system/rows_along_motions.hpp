@@ -12,6 +12,11 @@ namespace diracstep {
 std::shared_ptr<const ConstraintRows> rows_along_motions(const Scene& scene, bool holonomic,
                                                          const Columns& directions, const Vector& units);
 
+/// The same rows in a scene that has further coordinates after those of this one, its parameters; null where
+/// `rows` are no such rows.
+std::shared_ptr<const ConstraintRows> rows_along_motions_in(const ConstraintRows& rows,
+                                                            const Scene& extended);
+
 /// "qC1-qC3": a motion in words.
 std::string motion_along(const Scene& scene, const Vector& w);
 

@@ -16,7 +16,7 @@ Node CircuitFormulas::coordinate(const std::string& branch, Place place, Role ro
 }
 
 Node CircuitFormulas::value(const FormulaText& text, const std::string& what) {
-  return parser_.formula(text, {.what = what, .time = true});
+  return parser_.formula(text, {.what = what, .time = true, .mechanics = true});
 }
 
 Node CircuitFormulas::lagrangian() {

@@ -165,6 +165,8 @@ class FormulaParser::Reader : FormulaScanner {
 
   Node parameter(std::size_t place, int id) {
     const Symbols::Parameter& parameter = symbols_.parameters[static_cast<std::size_t>(id)];
+    if (context_.mechanics && parameter.family != none)
+      return graph_.coordinate(parameter.family, none, Role::position);
     if (!parameter.array) return graph_.parameter(id);
     expect('[', "'[' and an index, for '" + parameter.name + "' is an array");
     const Node index = this->index(place);
@@ -214,7 +216,7 @@ class FormulaParser::Reader : FormulaScanner {
   Node definition(std::size_t place, const std::string& name, const FormulaText& text) {
     std::string key = name + ' ' + context_.second + (context_.positions ? 'q' : ' ') +
                       (context_.time ? 't' : ' ') + (context_.sums ? 's' : ' ') +
-                      (context_.reference ? 'r' : ' ');
+                      (context_.reference ? 'r' : ' ') + (context_.mechanics ? 'm' : ' ');
     for (const int loop : context_.loops) key += ' ' + std::to_string(loop);
     const auto found = parser_.defined_.find(key);
     if (found != parser_.defined_.end()) return found->second;

@@ -40,6 +40,7 @@ struct Symbols {
   struct Parameter {
     std::string name;
     bool array = false;
+    int family = none;  ///< of the coordinate that stands for it where the scene is differentiated by it
   };
   std::vector<Family> families;
   std::vector<Parameter> parameters;  ///< sizes first
@@ -78,6 +79,7 @@ struct Context {
   bool time = false;
   bool sums = false;
   bool reference = false;       ///< Kepler's and Jacobi's functions
+  bool mechanics = false;       ///< of the equations of motion: parameters may be coordinates
   std::vector<int> loops = {};  ///< loop variables in force
 };
 

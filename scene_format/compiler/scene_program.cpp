@@ -56,6 +56,7 @@ class SceneCompiler {
             .second = second,
             .time = true,
             .sums = true,
+            .mechanics = true,
             .loops = std::move(loops)};
   }
 
@@ -73,6 +74,31 @@ class SceneCompiler {
         fail(coordinate.place, "a coordinate is repeated over one or two loops, no more");
       symbols_.add(std::move(family));
     }
+    for (const std::string& name : program_.differentiated) add_as_coordinate(name);
+  }
+
+  void add_as_coordinate(const std::string& name) {
+    const auto stated = std::ranges::find(document_.parameters, name, &SceneDocument::Parameter::name);
+    if (stated == document_.parameters.end() || stated->array || stated->size) {
+      std::string known;
+      for (const auto& parameter : document_.parameters)
+        if (!parameter.array && !parameter.size) known += ' ' + parameter.name;
+      throw Misuse(fmt::format("scene '{}' has no parameter '{}' to be differentiated by; there are{}",
+                               document_.name, name, known.empty() ? " none" : known));
+    }
+    Symbols::Parameter& parameter = symbols_.parameters[static_cast<std::size_t>(symbols_.parameter(name))];
+    if (parameter.family != none) throw Misuse(fmt::format("the parameter '{}' is named twice", name));
+    parameter.family = static_cast<int>(symbols_.families.size());
+    symbols_.add(Symbols::Family{name, {}, false});
+  }
+
+  /// With Σ v²/2 or Σ p²/2 of the parameters that are coordinates.
+  Node with_parameters(Node energy) {
+    for (const std::string& name : program_.differentiated) {
+      const Node rate = graph_.coordinate(symbols_.family(name), none, Role::second);
+      energy = graph_.add(energy, graph_.multiply(graph_.number(0.5), graph_.power(rate, 2)));
+    }
+    return energy;
   }
 
   bool has_velocity(std::span<const Node> roots) const {
@@ -98,7 +124,8 @@ class SceneCompiler {
       const Node whole = parser_.formula(*document_.hamiltonian, mechanics("the Hamiltonian", 'p'));
       if (!has_velocity(std::span(&whole, 1)))
         fail(document_.hamiltonian->start, "the Hamiltonian contains no momentum p_…: nothing would move");
-      program_.hamiltonian = phase_function(whole, "the Hamiltonian", document_.hamiltonian->start);
+      program_.hamiltonian =
+          phase_function(with_parameters(whole), "the Hamiltonian", document_.hamiltonian->start);
     }
     if (!program_.lagrangian && !program_.hamiltonian)
       fail({},
@@ -120,7 +147,7 @@ class SceneCompiler {
                         document_.dissipation || !document_.branches.empty();
     if (!has_velocity(std::span(&whole, 1)) && !driven && !others)
       fail(place, "the Lagrangian contains no velocity v_…: nothing would move");
-    program_.lagrangian = phase_function(whole, "the Lagrangian", place);
+    program_.lagrangian = phase_function(with_parameters(whole), "the Lagrangian", place);
   }
 
   // Rows.
@@ -175,7 +202,8 @@ class SceneCompiler {
   void require_state_rate(const SceneDocument::State& state, int family, Node rate, const std::string& what) {
     if (!program_.lagrangian)
       fail(state.place, "states need a 'lagrangian': beside a Hamiltonian alone they have no velocity");
-    const int first = static_cast<int>(symbols_.families.size() - document_.states.size());
+    const int first =
+        static_cast<int>(symbols_.families.size() - document_.states.size() - program_.differentiated.size());
     bool moved = false;
     for (const Node leaf : graph_.reachable(std::span(&rate, 1))) {
       if (!is_velocity(graph_[leaf])) continue;
@@ -383,6 +411,18 @@ class SceneCompiler {
     program_.start_time = document_.start_time
                               ? parser_.formula(*document_.start_time, {.what = "the start time"})
                               : graph_.number(0.0);
+    differentiate_start();
+  }
+
+  void differentiate_start() {
+    for (const std::string& name : program_.differentiated) {
+      const Node parameter = graph_.parameter(symbols_.parameter(name));
+      std::vector<NamedValue>& derivatives = program_.start_derivatives.emplace_back(program_.start);
+      for (NamedValue& value : derivatives) value.values = graph_.derivative(value.values, parameter);
+      if (!graph_.is_number(graph_.derivative(program_.start_time, parameter), 0.0))
+        throw Misuse(
+            fmt::format("the time of the start depends on '{}', by which it is not differentiated", name));
+    }
   }
 
   void compile_guess(const FormulaText& guess) {
@@ -466,11 +506,12 @@ std::vector<const SceneFunction*> SceneProgram::functions() const {
   return all;
 }
 
-std::unique_ptr<SceneProgram> compile_scene(const std::string& file, const std::string& text,
-                                            bool as_written) {
+std::unique_ptr<SceneProgram> compile_scene(const std::string& file, const std::string& text, bool as_written,
+                                            const std::vector<std::string>& differentiated) {
   SizeLimits limits = size_limits();
   limits.graph_nodes += text.size();  // a long file may take its time, a short one of a large system may not
   auto program = std::make_unique<SceneProgram>(read_document(file, text), as_written, limits);
+  program->differentiated = differentiated;
   try {
     SceneCompiler(*program).compile();
   } catch (const FormulaGraph::TooLarge&) {

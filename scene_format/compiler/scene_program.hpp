@@ -116,6 +116,9 @@ struct SceneProgram {
   std::vector<NamedValue> start;
   std::vector<NamedValue> guesses;  ///< without values of use: the components of the start that may be moved
   bool start_by_momentum = false;
+  /// Parameters that are coordinates as well, after those of the file, and the start differentiated by each.
+  std::vector<std::string> differentiated;
+  std::vector<std::vector<NamedValue>> start_derivatives;
   Node start_time = none;
   std::vector<ReferenceProgram> references;  ///< as in the document
   std::vector<InvariantProgram> invariants;
@@ -130,8 +133,11 @@ struct SceneProgram {
   std::vector<const SceneFunction*> functions() const;
 };
 
-/// Reads, checks and differentiates a scene.  `as_written`: see FormulaGraph.  Throws SceneError.
+/// Reads, checks and differentiates a scene.  `as_written`: see FormulaGraph.  Parameters that are named in
+/// `differentiated` are coordinates in what is mechanical (sensitivities/parametric_scene.hpp), with Σ v²/2
+/// of them in L and Σ p²/2 in H.  Throws SceneError; Misuse for a name that is no single parameter.
 std::unique_ptr<SceneProgram> compile_scene(const std::string& file, const std::string& text,
-                                            bool as_written = false);
+                                            bool as_written = false,
+                                            const std::vector<std::string>& differentiated = {});
 
 }  // namespace diracstep::scene_compiler

@@ -16,10 +16,8 @@ StageMomentum::StageMomentum(std::shared_ptr<const Lagrangian> lagrangian, std::
   for (Columns* columns : {&lq_, &lv_}) columns->setZero(n_, s_);
   const int nonzeros = lagrangian_->pattern().nonzeros();
   for (Columns* blocks : {&lqq_, &lqv_, &lvv_}) blocks->setZero(nonzeros, s_);
-  if (!separable_) {
-    mirror_ = lagrangian_->pattern().transposed_positions();
-    block_.setZero(nonzeros);
-  }
+  if (!separable_) mirror_ = lagrangian_->pattern().transposed_positions();
+  block_.setZero(nonzeros);
   if (!force_) return;
   f_.setZero(n_);
   fq_.setZero(force_->pattern().nonzeros(), s_);
@@ -96,7 +94,7 @@ bool StageMomentum::jacobian_known(const NodePoints& at) {
 void StageMomentum::add_block(const NodeWeights& weights, const BlockPattern& layout, int i, int k,
                               VectorRef& values) {
   const auto size = static_cast<int>(lvv_.rows());
-  double* const block = separable_ ? lqv_.data() : block_.data();  // nobody looks at a ∂²L/∂q∂v of zero
+  double* const block = block_.data();
   combine(size, s_, &weights.stiffness(0, i * s_ + k), lqq_.data(), nullptr, block);
   if (!separable_)
     for (int e = 0; e < size; ++e)

@@ -1,0 +1,294 @@
+#include <fmt/format.h>
+
+#include <CLI/App.hpp>
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <diracstep/command/arguments.hpp>
+#include <diracstep/command/verbs.hpp>
+#include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/numerics/near_names.hpp>
+#include <diracstep/files/input_file.hpp>
+#include <diracstep/files/output_file.hpp>
+#include <diracstep/reports/json.hpp>
+#include <diracstep/reports/report.hpp>
+#include <diracstep/scene_format/parametric_scene_file.hpp>
+#include <diracstep/sensitivities/fit.hpp>
+#include <limits>
+#include <memory>
+#include <string_view>
+
+namespace diracstep::command {
+
+namespace {
+
+constexpr std::size_t most_data_bytes = 100'000'000;
+
+struct FitArguments {
+  std::string scene, data, parameters, residuals;
+  MethodChoice method;
+  std::optional<double> step;
+  std::vector<std::string> set, from, sigma;
+  double confidence = 0.95;
+  int max_evaluations = 200;
+  bool json = false;
+};
+
+std::vector<std::string_view> cells(std::string_view line) {
+  std::vector<std::string_view> parts;
+  for (std::size_t begin = 0; begin <= line.size();) {
+    const std::size_t end = std::min(line.find(',', begin), line.size());
+    std::string_view part = line.substr(begin, end - begin);
+    while (!part.empty() && (part.front() == ' ' || part.front() == '"')) part.remove_prefix(1);
+    while (!part.empty() && (part.back() == ' ' || part.back() == '"' || part.back() == '\r'))
+      part.remove_suffix(1);
+    parts.push_back(part);
+    begin = end + 1;
+  }
+  return parts;
+}
+
+/// A table with its columns named in the first line; an empty field is NaN.
+struct Table {
+  std::vector<std::string> names;
+  std::vector<std::vector<double>> rows;
+};
+
+double number(std::string_view cell, const std::string& path, std::size_t line) {
+  if (cell.empty()) return std::numeric_limits<double>::quiet_NaN();
+  double value = 0.0;
+  const auto [end, error] = std::from_chars(cell.data(), cell.data() + cell.size(), value);
+  if (error != std::errc() || end != cell.data() + cell.size())
+    throw Misuse(fmt::format("'{}', line {}: '{}' is not a number", path, line, cell));
+  return value;
+}
+
+Table read_table(const std::string& path) {
+  const std::string text = read_file(path, "the data", most_data_bytes);
+  Table table;
+  std::size_t number_of_line = 0;
+  for (std::size_t begin = 0; begin < text.size();) {
+    const std::size_t end = std::min(text.find('\n', begin), text.size());
+    const std::string_view line(text.data() + begin, end - begin);
+    begin = end + 1;
+    ++number_of_line;
+    if (line.empty() || line == "\r" || line.front() == '#') continue;
+    const auto parts = cells(line);
+    if (table.names.empty()) {
+      table.names.assign(parts.begin(), parts.end());
+      continue;
+    }
+    if (parts.size() != table.names.size())
+      throw Misuse(fmt::format("'{}', line {}: {} fields; the first line names {}", path, number_of_line,
+                               parts.size(), table.names.size()));
+    auto& row = table.rows.emplace_back();
+    for (const std::string_view part : parts) row.push_back(number(part, path, number_of_line));
+  }
+  if (table.rows.empty()) throw Misuse(fmt::format("'{}' has no lines of data", path));
+  return table;
+}
+
+/// The columns that are coordinates or velocities v_NAME; momenta, forces and the energy of a trajectory are
+/// left alone, any other name is a mistake.
+FitData data_of(const Table& table, const std::string& path, const Scene& scene, const Parameters& sigma) {
+  if (table.names.front() != "t")
+    throw Misuse(fmt::format("'{}': the first column is '{}'; expected t", path, table.names.front()));
+  std::vector<std::string> known;
+  for (const char* prefix : {"", "v_"})
+    for (const std::string& name : scene.coordinates) known.push_back(prefix + name);
+  FitData data;
+  std::vector<std::size_t> used;
+  Parameters left = sigma;
+  for (std::size_t c = 1; c < table.names.size(); ++c) {
+    const std::string& name = table.names[c];
+    const auto found = std::ranges::find(known, name);
+    if (found == known.end()) {
+      if (name == "energy" || name.starts_with("p_") || name.starts_with("lambda_")) continue;
+      throw Misuse(fmt::format("'{}': the column '{}' is no coordinate or velocity of scene '{}'{}", path,
+                               name, scene.name, did_you_mean(name, known)));
+    }
+    const auto number = static_cast<int>(found - known.begin());
+    const int n = scene.dimension();
+    const auto given = left.find(name);
+    data.columns.push_back({number % n, number >= n, given != left.end() ? given->second : 1.0});
+    if (given != left.end()) left.erase(given);
+    used.push_back(c);
+  }
+  if (used.empty())
+    throw Misuse(
+        fmt::format("'{}' has no column of a coordinate or velocity of scene '{}'", path, scene.name));
+  if (!left.empty())
+    throw Misuse(fmt::format("--sigma: '{}' is no column of '{}'", left.begin()->first, path));
+  const auto rows = static_cast<Eigen::Index>(table.rows.size());
+  data.times.resize(rows);
+  data.values.resize(rows, static_cast<Eigen::Index>(used.size()));
+  for (Eigen::Index k = 0; k < rows; ++k) {
+    const auto& row = table.rows[static_cast<std::size_t>(k)];
+    data.times[k] = row[0];
+    for (std::size_t c = 0; c < used.size(); ++c) data.values(k, static_cast<Eigen::Index>(c)) = row[used[c]];
+  }
+  return data;
+}
+
+std::string fit_text(const FitReport& report, const std::vector<std::string>& names,
+                     const FitArguments& arguments, const std::string& scene) {
+  std::string text = fmt::format("{}: {} parameters from {} measured numbers, {} motions; {}\n\n", scene,
+                                 names.size(), report.measured, report.evaluations, report.ending);
+  std::vector<std::vector<std::string>> rows{
+      {"", "value", fmt::format("+- ({:g} %)", 100.0 * arguments.confidence), "standard error"}};
+  for (std::size_t k = 0; k < names.size(); ++k) {
+    const auto i = static_cast<Eigen::Index>(k);
+    rows.push_back({names[k], fmt::format("{:.10g}", report.parameters[i]),
+                    fmt::format("{:.3g}", report.interval[i]),
+                    fmt::format("{:.3g}", std::sqrt(report.covariance(i, i)))});
+  }
+  text += aligned(rows);
+  if (names.size() > 1 && report.interval.allFinite()) {
+    std::vector<std::vector<std::string>> table{{"correlation"}};
+    table[0].insert(table[0].end(), names.begin(), names.end());
+    for (std::size_t i = 0; i < names.size(); ++i) {
+      auto& row = table.emplace_back(std::vector<std::string>{names[i]});
+      for (std::size_t j = 0; j < names.size(); ++j) {
+        const auto a = static_cast<Eigen::Index>(i), b = static_cast<Eigen::Index>(j);
+        row.push_back(fmt::format("{:.3f}", report.covariance(a, b) / std::sqrt(report.covariance(a, a) *
+                                                                                report.covariance(b, b))));
+      }
+    }
+    text += '\n' + aligned(table);
+  }
+  if (!report.interval.allFinite())
+    text += "the data do not determine these parameters: intervals are infinite\n";
+  return text +
+         fmt::format("\nstandard deviation of what is left: {:.6g} (units of sigma)\n", report.residual);
+}
+
+std::string fit_json(const FitReport& report, const std::vector<std::string>& names,
+                     const FitArguments& arguments, const std::string& scene) {
+  Json json{{"scene", scene},
+            {"converged", report.converged},
+            {"ending", report.ending},
+            {"confidence", arguments.confidence},
+            {"measured", report.measured},
+            {"motions", report.evaluations},
+            {"residual", Json(report.residual)},
+            {"parameters", Json::object()},
+            {"covariance", Json::array()}};
+  for (std::size_t k = 0; k < names.size(); ++k) {
+    const auto i = static_cast<Eigen::Index>(k);
+    add_member(json["parameters"], names[k],
+               Json{{"value", Json(report.parameters[i])}, {"interval", Json(report.interval[i])}});
+    Json row = Json::array();
+    for (Eigen::Index j = 0; j < report.covariance.cols(); ++j) row.push_back(Json(report.covariance(i, j)));
+    json["covariance"].push_back(std::move(row));
+  }
+  return to_text(json, 2) + '\n';
+}
+
+void write_residuals(const std::string& path, const FitData& data, const FitReport& report,
+                     const Scene& scene) {
+  std::string text = "t";
+  for (const FitData::Column& column : data.columns)
+    text += "," + csv_field((column.velocity ? "v_" : "") +
+                            scene.coordinates[static_cast<std::size_t>(column.coordinate)]);
+  text += '\n';
+  for (Eigen::Index k = 0; k < data.times.size(); ++k) {
+    text += fmt::format("{:.17g}", data.times[k]);
+    for (Eigen::Index c = 0; c < report.residuals.cols(); ++c)
+      text += std::isnan(report.residuals(k, c)) ? std::string(",")
+                                                 : fmt::format(",{:.17g}", report.residuals(k, c));
+    text += '\n';
+  }
+  OutputFile file(path, OutputFile::Mode::fresh);
+  file.write(text);
+  file.close();
+}
+
+void run_fit(FitArguments arguments, Session& session) {
+  if (!(arguments.confidence > 0.0 && arguments.confidence < 1.0))
+    throw Misuse(
+        fmt::format("--confidence = {:g}; a number between 0 and 1 is needed", arguments.confidence));
+  if (arguments.max_evaluations < 1)
+    throw Misuse(fmt::format("--max-motions = {}; 1 or more is needed", arguments.max_evaluations));
+  const std::vector<std::string> parameters_fitted = names("--parameters", arguments.parameters);
+  Parameters changes = parameters(arguments.set);
+  for (const auto& [name, value] : parameters(arguments.from, "--from")) {
+    if (std::ranges::find(parameters_fitted, name) == parameters_fitted.end())
+      throw Misuse(
+          fmt::format("--from: '{}' is not among the parameters that are fitted; --set fixes others", name));
+    changes[name] = value;
+  }
+  const CatalogueScene entry = make_scene(session, arguments.scene, changes);
+  Vector begin(static_cast<Eigen::Index>(parameters_fitted.size()));
+  for (std::size_t k = 0; k < parameters_fitted.size(); ++k) {
+    const auto found = entry.parameters.find(parameters_fitted[k]);
+    if (found == entry.parameters.end())
+      throw Misuse(fmt::format("--parameters: scene '{}' has no parameter '{}'", entry.scene->name,
+                               parameters_fitted[k]));
+    begin[static_cast<Eigen::Index>(k)] = found->second;
+  }
+  const Table table = read_table(arguments.data);
+  const FitData data = data_of(table, arguments.data, *entry.scene, parameters(arguments.sigma, "--sigma"));
+  take_recommendation(entry, arguments.method, arguments.step);
+  IntegratorOptions steps = integrator_options(session, arguments.method);
+  const double last = data.times[data.times.size() - 1];
+  steps.step = arguments.step.value_or(entry.natural_step);
+  if (!arguments.step) steps.step = std::copysign(steps.step, last - entry.scene->start.time);
+  const FitProblem problem{[&](const Vector& values) {
+                             Parameters all = changes;
+                             for (std::size_t k = 0; k < parameters_fitted.size(); ++k)
+                               all[parameters_fitted[k]] = values[static_cast<Eigen::Index>(k)];
+                             return parametric_scene(arguments.scene,
+                                                     diracstep::make_scene(arguments.scene, all),
+                                                     parameters_fitted, all);
+                           },
+                           session.registry,
+                           session.solvers,
+                           steps,
+                           arguments.max_evaluations,
+                           arguments.confidence};
+  const FitReport report = fit(problem, data, begin);
+  if (!arguments.residuals.empty()) write_residuals(arguments.residuals, data, report, *entry.scene);
+  print(arguments.json ? fit_json(report, parameters_fitted, arguments, entry.scene->name)
+                       : fit_text(report, parameters_fitted, arguments, entry.scene->name));
+  if (report.converged) return;
+  say(fmt::format("the fit has not converged: {}", report.ending));
+  session.exit_status = failed;
+}
+
+}  // namespace
+
+void add_fit(CLI::App& app, Session& session) {
+  CLI::App* verb = app.add_subcommand("fit", "Parameters of a scene from measured data");
+  const auto arguments = std::make_shared<FitArguments>();
+  add_solver_options(*verb, session);
+  verb->add_option("SCENE", arguments->scene, "A scene; see diracstep list scenes")->required();
+  verb->add_option("DATA", arguments->data,
+                   "CSV: t, then coordinates and velocities v_NAME; fields may be empty")
+      ->required();
+  verb->add_option("--parameters", arguments->parameters, "Parameters of the scene to be fitted")
+      ->type_name("P1,P2,…")
+      ->required();
+  verb->add_option("--from", arguments->from, "Where the search begins; without, the values of the scene")
+      ->type_name("NAME=VALUE");
+  verb->add_option("--sigma", arguments->sigma,
+                   "Standard deviation of a column, or that in relation to the others; 1 without")
+      ->type_name("NAME=VALUE");
+  verb->add_option("--confidence", arguments->confidence, "Of the intervals")->capture_default_str();
+  verb->add_option("--max-motions", arguments->max_evaluations, "Motions that the search may take")
+      ->capture_default_str();
+  verb->add_option("--residuals", arguments->residuals, "CSV file for what is left of the data")
+      ->type_name("FILE");
+  add_method_options(*verb, arguments->method);
+  verb->add_option(
+      "--step", arguments->step,
+      "Largest step; between two times so many equal ones are taken. The scene's own without it");
+  add_set_option(*verb, arguments->set);
+  verb->add_flag("--json", arguments->json, "One JSON document on standard output");
+  verb->footer(
+      "Examples:\n"
+      "  diracstep fit chaplygin_sleigh measured.csv --parameters m,a,J\n"
+      "  diracstep fit pendulum.toml swing.csv --parameters g --from g=9 --sigma angle=0.01 --json");
+  verb->callback([arguments, &session] { run_fit(*arguments, session); });
+}
+
+}  // namespace diracstep::command

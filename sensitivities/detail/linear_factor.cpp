@@ -1,0 +1,90 @@
+#include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/sensitivities/detail/linear_factor.hpp>
+#ifdef DIRACSTEP_WITH_KLU
+#include <klu.h>
+#else
+#include <Eigen/SparseLU>
+#endif
+
+namespace diracstep::sensitivity {
+
+namespace {
+
+[[noreturn]] void fail_singular() {
+  throw Error("the Jacobian of a step is singular or not finite: the motion has no derivative there");
+}
+
+}  // namespace
+
+void LinearFactor<Columns>::compute(const Columns& matrix) {
+  factors_.compute(matrix);
+  const auto pivots = factors_.matrixLU().diagonal();
+  if (!pivots.allFinite() || (pivots.array() == 0.0).any()) fail_singular();
+}
+void LinearFactor<Columns>::solve(Columns& right) const { right = factors_.solve(right); }
+void LinearFactor<Columns>::solve_transposed(Columns& right) const {
+  right = factors_.transpose().solve(right);
+}
+
+#ifdef DIRACSTEP_WITH_KLU
+
+struct LinearFactor<Sparse>::Factors {
+  Factors() { klu_defaults(&common); }
+  Factors(const Factors&) = delete;
+  Factors& operator=(const Factors&) = delete;
+  ~Factors() { clear(); }
+  void clear() {
+    klu_free_numeric(&numeric, &common);
+    klu_free_symbolic(&symbolic, &common);
+  }
+
+  mutable klu_common common{};
+  klu_symbolic* symbolic = nullptr;
+  klu_numeric* numeric = nullptr;
+  int size = 0;
+};
+
+void LinearFactor<Sparse>::compute(const Sparse& matrix) {
+  Factors& f = *factors_;
+  f.clear();
+  f.size = static_cast<int>(matrix.rows());
+  auto* const starts = const_cast<int*>(matrix.outerIndexPtr());  // KLU reads them only
+  auto* const rows = const_cast<int*>(matrix.innerIndexPtr());
+  auto* const values = const_cast<double*>(matrix.valuePtr());
+  f.symbolic = klu_analyze(f.size, starts, rows, &f.common);
+  if (f.symbolic == nullptr) fail_singular();
+  f.numeric = klu_factor(starts, rows, values, f.symbolic, &f.common);
+  if (f.numeric == nullptr || f.common.status != KLU_OK) fail_singular();
+}
+void LinearFactor<Sparse>::solve(Columns& right) const {
+  const Factors& f = *factors_;
+  klu_solve(f.symbolic, f.numeric, f.size, static_cast<int>(right.cols()), right.data(), &f.common);
+}
+void LinearFactor<Sparse>::solve_transposed(Columns& right) const {
+  const Factors& f = *factors_;
+  klu_tsolve(f.symbolic, f.numeric, f.size, static_cast<int>(right.cols()), right.data(), &f.common);
+}
+
+#else
+
+struct LinearFactor<Sparse>::Factors {
+  mutable Eigen::SparseLU<Sparse> lu;
+};
+
+void LinearFactor<Sparse>::compute(const Sparse& matrix) {
+  factors_->lu.compute(matrix);
+  if (factors_->lu.info() != Eigen::Success) fail_singular();
+}
+void LinearFactor<Sparse>::solve(Columns& right) const { right = factors_->lu.solve(right).eval(); }
+void LinearFactor<Sparse>::solve_transposed(Columns& right) const {
+  right = factors_->lu.transpose().solve(right).eval();
+}
+
+#endif
+
+LinearFactor<Sparse>::LinearFactor() : factors_(std::make_unique<Factors>()) {}
+LinearFactor<Sparse>::LinearFactor(LinearFactor&&) noexcept = default;
+LinearFactor<Sparse>& LinearFactor<Sparse>::operator=(LinearFactor&&) noexcept = default;
+LinearFactor<Sparse>::~LinearFactor() = default;
+
+}  // namespace diracstep::sensitivity

@@ -1,0 +1,254 @@
+#include <algorithm>
+#include <cmath>
+#include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/sensitivities/fit.hpp>
+#include <diracstep/sensitivities/sensitivities.hpp>
+#include <limits>
+#include <numbers>
+#include <unsupported/Eigen/NonLinearOptimization>
+
+namespace diracstep {
+
+namespace {
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+/// Residuals for parameters whose motion cannot be computed: far larger than any, so that a search turns
+/// back.
+constexpr double no_motion = 1e100;
+
+struct Motion {
+  std::string failure;               ///< empty, or why it has none
+  Columns values;                    ///< as FitData::values
+  std::vector<Columns> derivatives;  ///< of each row by the parameters, one line for each column
+};
+
+/// The motion at the times of the data.
+class MotionAt {
+ public:
+  MotionAt(const FitProblem& problem, const FitData& data) : problem_(problem), data_(data) {}
+
+  Motion operator()(const Vector& parameters) const {
+    Motion motion;
+    try {
+      compute(problem_.scene(parameters), motion);
+    } catch (const Error& error) {
+      motion.failure = error.what();
+    }
+    return motion;
+  }
+
+ private:
+  void compute(const ParametricScene& scene, Motion& motion) const {
+    Integrator integrator(scene.scene, problem_.registry, problem_.solvers, problem_.steps);
+    Sensitivities sensitivities(integrator, problem_.registry, scene);
+    Directions z = sensitivities.by_parameters();
+    const double start = integrator.time();
+    motion.values.resize(data_.values.rows(), data_.values.cols());
+    double last = start;
+    for (Eigen::Index k = 0; k < data_.times.size(); ++k) {
+      const double way = data_.times[k] - last;
+      const double count = std::max(1.0, std::ceil(std::abs(way / problem_.steps.step) * (1.0 - 1e-9)));
+      for (double i = 0.0; way != 0.0 && i < count; ++i) {
+        const StepReport report = integrator.step(way / count);
+        if (!report.ok()) return void(motion.failure = report.failure);
+        sensitivities.follow(z);
+      }
+      last = data_.times[k];
+      if (!read(integrator, sensitivities, z, k, motion)) return;
+    }
+  }
+
+  bool read(Integrator& integrator, Sensitivities& sensitivities, const Directions& z, Eigen::Index k,
+            Motion& motion) const {
+    Sample sample;
+    if (!integrator.sample(Momentum::projected, sample).ok()) {
+      motion.failure = "the velocity at t = " + to_text(integrator.time()) + " was not found";
+      return false;
+    }
+    const ReadDirections moved = sensitivities.read(z);
+    Columns& derivatives = motion.derivatives.emplace_back(data_.values.cols(), z.cols());
+    for (std::size_t c = 0; c < data_.columns.size(); ++c) {
+      const auto& [coordinate, velocity, sigma] = data_.columns[c];
+      const auto column = static_cast<Eigen::Index>(c);
+      motion.values(k, column) = (velocity ? sample.v : sample.q)[coordinate];
+      derivatives.row(column) = (velocity ? moved.v : moved.q).row(coordinate);
+    }
+    return true;
+  }
+
+  const FitProblem& problem_;
+  const FitData& data_;
+};
+
+/// What lmder asks for.
+class Residuals {
+ public:
+  Residuals(const FitProblem& problem, const FitData& data) : motion_at_(problem, data), data_(data) {
+    for (Eigen::Index k = 0; k < data.values.rows(); ++k)
+      for (Eigen::Index c = 0; c < data.values.cols(); ++c)
+        if (!std::isnan(data.values(k, c))) measured_.emplace_back(k, c);
+  }
+
+  int values() const { return static_cast<int>(measured_.size()); }
+
+  int operator()(const Vector& parameters, Vector& f) {
+    at(parameters);
+    for (int i = 0; i < values(); ++i) {
+      const auto [k, c] = measured_[static_cast<std::size_t>(i)];
+      f[i] = motion_.failure.empty() ? (motion_.values(k, c) - data_.values(k, c)) / sigma(c) : no_motion;
+      if (!std::isfinite(f[i])) f[i] = no_motion;
+    }
+    return 0;
+  }
+
+  int df(const Vector& parameters, Columns& jacobian) {
+    at(parameters);
+    if (!motion_.failure.empty()) return -1;
+    jacobian.resize(values(), parameters.size());
+    for (int i = 0; i < values(); ++i) {
+      const auto [k, c] = measured_[static_cast<std::size_t>(i)];
+      jacobian.row(i) = motion_.derivatives[static_cast<std::size_t>(k)].row(c) / sigma(c);
+    }
+    return 0;
+  }
+
+  /// The motion there, once for the residuals and their derivatives.
+  const Motion& at(const Vector& parameters) {
+    if (parameters_.size() != parameters.size() || parameters_ != parameters) {
+      motion_ = motion_at_(parameters);
+      parameters_ = parameters;
+      ++evaluations_;
+    }
+    return motion_;
+  }
+  int evaluations() const { return evaluations_; }
+
+ private:
+  double sigma(Eigen::Index c) const { return data_.columns[static_cast<std::size_t>(c)].sigma; }
+
+  MotionAt motion_at_;
+  const FitData& data_;
+  std::vector<std::pair<Eigen::Index, Eigen::Index>> measured_;
+  Vector parameters_;
+  Motion motion_;
+  int evaluations_ = 0;
+};
+
+void require_data(const FitData& data) {
+  require_size("fit: columns of data", data.values.cols(), static_cast<long>(data.columns.size()));
+  require_size("fit: rows of data", data.values.rows(), data.times.size());
+  if (!data.times.allFinite()) throw Misuse("fit: a time is not finite");
+  for (const FitData::Column& column : data.columns)
+    if (!(column.sigma > 0.0 && std::isfinite(column.sigma)))
+      throw Misuse("fit: a standard deviation is " + to_text(column.sigma) + "; a number above 0 is needed");
+}
+
+/// Times must lead on from the start in the direction of the steps.
+void require_times(const FitData& data, double start, double step) {
+  double last = start;
+  for (const double t : data.times) {
+    if ((t - last) * step < 0.0)
+      throw Misuse("fit: t = " + to_text(t) + " does not follow t = " + to_text(last));
+    last = t;
+  }
+}
+
+std::string words(Eigen::LevenbergMarquardtSpace::Status status) {
+  using namespace Eigen::LevenbergMarquardtSpace;
+  switch (status) {
+    case RelativeReductionTooSmall:
+      return "the sum of squares changes no more";
+    case RelativeErrorTooSmall:
+    case RelativeErrorAndReductionTooSmall:
+      return "the parameters change no more";
+    case CosinusTooSmall:
+    case GtolTooSmall:
+      return "the gradient is zero to round-off";
+    case FtolTooSmall:
+    case XtolTooSmall:
+      return "no smaller sum of squares can be told from round-off";
+    case TooManyFunctionEvaluation:
+      return "the evaluations allowed are used up";
+    default:
+      return "the search could not go on";
+  }
+}
+
+void measure_uncertainty(const FitProblem& problem, Residuals& residuals, FitReport& report) {
+  const auto count = report.parameters.size();
+  const auto freedom = static_cast<double>(report.measured - count);
+  Vector f(residuals.values());
+  residuals(report.parameters, f);
+  Columns jacobian;
+  report.covariance = Columns::Constant(count, count, infinity);
+  report.interval = Vector::Constant(count, infinity);
+  report.residual = freedom > 0.0 ? std::sqrt(f.squaredNorm() / freedom) : nan;
+  if (residuals.df(report.parameters, jacobian) < 0 || freedom <= 0.0) return;
+  // In units of the columns, so that it does not matter what the parameters are measured in.
+  const Vector units = jacobian.colwise().norm().transpose();
+  if (!(units.minCoeff() > 0.0)) return;
+  const Columns scaled = jacobian * units.cwiseInverse().asDiagonal();
+  Eigen::ColPivHouseholderQR<Columns> qr(scaled);
+  qr.setThreshold(1e-10);
+  if (qr.rank() < count) return;
+  const Columns inverse = (scaled.transpose() * scaled).ldlt().solve(Columns::Identity(count, count));
+  report.covariance = report.residual * report.residual * units.cwiseInverse().asDiagonal() * inverse *
+                      units.cwiseInverse().asDiagonal();
+  report.interval = student_quantile(problem.confidence, freedom) * report.covariance.diagonal().cwiseSqrt();
+}
+
+}  // namespace
+
+double student_quantile(double probability, double degrees) {
+  if (!(probability > 0.0 && probability < 1.0 && degrees > 0.0)) return nan;
+  const double log_factor = std::lgamma(0.5 * (degrees + 1.0)) - std::lgamma(0.5 * degrees) -
+                            0.5 * std::log(degrees * std::numbers::pi);
+  // With t = √ν tan φ the integrand is cos(φ)^(ν−1), smooth up to the end: Simpson's rule.
+  const auto inside = [&](double phi) {
+    constexpr int parts = 2000;
+    double sum = 1.0 + std::pow(std::cos(phi), degrees - 1.0);
+    for (int i = 1; i < parts; ++i)
+      sum += (i % 2 == 1 ? 4.0 : 2.0) * std::pow(std::cos(phi * i / parts), degrees - 1.0);
+    return 2.0 * std::exp(log_factor) * std::sqrt(degrees) * sum * phi / (3.0 * parts);
+  };
+  double low = 0.0, high = 0.5 * std::numbers::pi;
+  for (int i = 0; i < 60; ++i) {
+    const double middle = 0.5 * (low + high);
+    (inside(middle) < probability ? low : high) = middle;
+  }
+  return std::sqrt(degrees) * std::tan(0.5 * (low + high));
+}
+
+FitReport fit(const FitProblem& problem, const FitData& data, const Vector& parameters) {
+  require_data(data);
+  Residuals residuals(problem, data);
+  if (parameters.size() == 0) throw Misuse("fit: no parameters");
+  if (residuals.values() < parameters.size())
+    throw Misuse("fit: " + std::to_string(residuals.values()) + " measured numbers for " +
+                 std::to_string(parameters.size()) + " parameters");
+  require_times(data, problem.scene(parameters).scene->start.time, problem.steps.step);
+  if (const std::string failure = residuals.at(parameters).failure; !failure.empty())
+    throw Misuse("fit: the motion where the search begins: " + failure);
+  FitReport report;
+  report.parameters = parameters;
+  report.measured = residuals.values();
+  Eigen::LevenbergMarquardt<Residuals> search(residuals);
+  search.parameters.maxfev = problem.max_evaluations;
+  search.parameters.ftol = search.parameters.xtol = 1e-13;
+  const auto status = search.minimize(report.parameters);
+  report.ending = words(status);
+  report.converged = status > 0 && status != Eigen::LevenbergMarquardtSpace::TooManyFunctionEvaluation;
+  measure_uncertainty(problem, residuals, report);
+  report.evaluations = residuals.evaluations();
+  report.residuals = Columns::Constant(data.values.rows(), data.values.cols(), nan);
+  const Motion& end = residuals.at(report.parameters);
+  if (end.failure.empty())
+    for (Eigen::Index c = 0; c < data.values.cols(); ++c)
+      report.residuals.col(c) =
+          (data.values.col(c) - end.values.col(c)) / data.columns[static_cast<std::size_t>(c)].sigma;
+  return report;
+}
+
+}  // namespace diracstep
