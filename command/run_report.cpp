@@ -195,7 +195,7 @@ Json search_json(const ErrorControlReport& search) {
 
 double energy_change(const RunResult& result, const CatalogueScene& entry) {
   const auto scene = completed(entry.scene);
-  return result.end.energy - scene->energy(scene->start.time, scene->start.q, scene->start.v);
+  return result.end.energy - scene->energy(scene->start);
 }
 
 }  // namespace

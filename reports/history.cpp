@@ -110,8 +110,7 @@ class Recorder {
   Recorder(const CatalogueScene& entry, const Scene& scene, History& history)
       : entry_(entry), scene_(scene), history_(history) {
     for (const Invariant& invariant : entry.invariants) history.invariants.push_back({invariant.name, {}});
-    const Start& start = scene.start;
-    energy_ = scene.energy(start.time, start.q, start.v);
+    energy_ = scene.energy(scene.start);
   }
 
   void take(const Sample& sample) {
