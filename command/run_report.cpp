@@ -221,8 +221,10 @@ std::string run_text(const RunResult& result, const CatalogueScene& entry, const
                         end_table(result.end, *entry.scene), result.end.energy, energy_change(result, entry));
     text += invariants_text(result) + outputs_text(result) + events_text(result);
     if (std::isfinite(result.check.error_q))
-      text += fmt::format("error against the {} reference: q {:.2e}, p {:.2e}\n", entry.reference.kind,
-                          result.check.error_q, result.check.error_p);
+      text += fmt::format(
+          "error against the {} reference: q {:.2e}{}\n", entry.reference.kind, result.check.error_q,
+          std::isfinite(result.check.error_p) ? fmt::format(", p {:.2e}", result.check.error_p)
+                                              : std::string());
     if (entry.scene->rows() > 0)
       text += fmt::format("largest residual of the constraint rows: {:.2e}\n", result.check.constraint);
   }

@@ -67,7 +67,7 @@ class ErrorAlongside {
     if (closed_form_) {
       if (const auto reference = known_point(entry_, sample.time)) {
         q = distance(sample.q, reference->q);
-        p = distance(sample.p, reference->p);
+        p = reference->p.size() > 0 ? distance(sample.p, reference->p) : 0.0;
       }
     } else if (follow(steps)) {
       q = distance(sample.q, other_.q);
