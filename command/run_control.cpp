@@ -28,7 +28,8 @@ Sample start_of(const Scene& scene) {
   start.time = scene.start.time;
   start.q = scene.start.q;
   start.v = scene.start.v;
-  start.energy = scene.energy(start.time, start.q, start.v);
+  start.p = scene.start.p;
+  start.energy = scene.energy(scene.start);
   return start;
 }
 
@@ -40,7 +41,7 @@ class Run {
         keeping_(keeping),
         result_(result),
         doubt_(integrator, steps - integrator.work().steps),
-        events_(keeping.events, !integrator.scene().lagrangian),
+        events_(keeping.events, integrator.scene().by_hamiltonian()),
         every_look_(std::max(1L, steps / points_looked_at)),
         next_checkpoint_(Clock::now() + between_checkpoints),
         progress_(static_cast<double>(integrator.work().steps) / static_cast<double>(steps)) {

@@ -224,7 +224,7 @@ Json search_json(const ErrorControlReport& search) {
 
 double energy_change(const RunResult& result, const CatalogueScene& entry) {
   const auto scene = completed(entry.scene);
-  return result.end.energy - scene->energy(scene->start.time, scene->start.q, scene->start.v);
+  return result.end.energy - scene->energy(scene->start);
 }
 
 }  // namespace
@@ -251,8 +251,10 @@ std::string run_text(const RunResult& result, const CatalogueScene& entry, const
     text += invariants_text(result) + outputs_text(result) + events_text(result);
     text += sensitivities_text(result, *entry.scene);
     if (std::isfinite(result.check.error_q))
-      text += fmt::format("error against the {} reference: q {:.2e}, p {:.2e}\n", entry.reference.kind,
-                          result.check.error_q, result.check.error_p);
+      text += fmt::format(
+          "error against the {} reference: q {:.2e}{}\n", entry.reference.kind, result.check.error_q,
+          std::isfinite(result.check.error_p) ? fmt::format(", p {:.2e}", result.check.error_p)
+                                              : std::string());
     if (entry.scene->rows() > 0)
       text += fmt::format("largest residual of the constraint rows: {:.2e}\n", result.check.constraint);
   }

@@ -204,8 +204,10 @@ Scene interconnection(const std::string& name, const Scene& first, const Scene& 
   whole.constraints.insert(whole.constraints.end(), interaction.begin(), interaction.end());
   whole.lagrangian = sum(a->lagrangian, b->lagrangian);
   whole.hamiltonian = sum(a->hamiltonian, b->hamiltonian);
+  whole.lagrangian_derived = whole.lagrangian && a->by_hamiltonian() && b->by_hamiltonian();
   whole.force = sum_of_forces(*a, *b);
   whole.start = {a->start.time, joined(a->start.q, b->start.q), joined(a->start.v, b->start.v)};
+  if (whole.by_hamiltonian()) whole.start.p = joined(a->start.p, b->start.p);
   require_well_formed(whole);
   return whole;
 }

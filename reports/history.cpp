@@ -67,7 +67,7 @@ class ErrorAlongside {
     if (closed_form_) {
       if (const auto reference = known_point(entry_, sample.time)) {
         q = distance(sample.q, reference->q);
-        p = distance(sample.p, reference->p);
+        p = reference->p.size() > 0 ? distance(sample.p, reference->p) : 0.0;
       }
     } else if (follow(steps)) {
       q = distance(sample.q, other_.q);
@@ -110,8 +110,7 @@ class Recorder {
   Recorder(const CatalogueScene& entry, const Scene& scene, History& history)
       : entry_(entry), scene_(scene), history_(history) {
     for (const Invariant& invariant : entry.invariants) history.invariants.push_back({invariant.name, {}});
-    const Start& start = scene.start;
-    energy_ = scene.energy(start.time, start.q, start.v);
+    energy_ = scene.energy(scene.start);
   }
 
   void take(const Sample& sample) {

@@ -41,13 +41,13 @@ SolvedStart solved_start(const CatalogueScene& entry, const Session& session) {
   const Scene& scene = *solved.scene;
   const Start& start = scene.start;
   PointReader reader(solved.scene, session.solvers, scene.dimension() + scene.rows() <= full_up_to);
-  Vector lq(scene.dimension()), p(scene.dimension());
-  scene.lagrangian->gradient(start.time, start.q, start.v, lq, p);
+  Vector force(scene.dimension()), p(scene.dimension());
+  scene.force_and_momentum(start.time, start.q, start.v, start.p, force, p);
   SolveReport report =
       reader.read(start.time, {.q = start.q, .p = p, .v = start.v}, Momentum::projected, solved.sample);
   if (report.ok())
-    report =
-        reader.acceleration(start.time, start.q, solved.sample.v, solved.acceleration, solved.sample.lambda);
+    report = reader.acceleration(start.time, start.q, solved.sample.v, solved.sample.p, solved.acceleration,
+                                 solved.sample.lambda);
   if (!report.ok())
     throw Error(fmt::format("scene '{}': velocities, accelerations and forces of rows at the start: {}",
                             scene.name, describe(report.status)));

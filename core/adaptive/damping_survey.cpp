@@ -111,7 +111,8 @@ DampingSurvey survey_damping(const std::shared_ptr<const Scene>& scene, const Re
   if (!scene->force) survey.failure = "the scene has no force";
   if (scene->dimension() > most_coordinates)
     survey.failure = "more than " + std::to_string(most_coordinates) + " coordinates";
-  if (scene->lagrangian && !has_accelerations(*scene)) survey.failure = "L is linear in v";
+  if (!has_accelerations(*completed(scene)))
+    survey.failure = scene->lagrangian ? "L is linear in v" : "the Hamiltonian is degenerate";
   if (!survey.failure.empty()) return survey;
   const double start = scene->start.time, span = std::abs(end - start);
   const double longest = step > 0.0 ? step : span / parts_of_the_motion;

@@ -50,7 +50,7 @@ ForcePolynomial::ForcePolynomial(const Scene& scene, double error)
       n_(scene.dimension()),
       m_(scene.rows()),
       rows_(scene.constraints, scene.dimension()),
-      smooth_(!scene.force && !scene.kinks && scene.lagrangian->structure().autonomous &&
+      smooth_(!scene.force && !scene.kinks && scene.stepped_function().structure().autonomous &&
               std::ranges::all_of(scene.constraints, [](const auto& rows) { return rows->workless(); })),
       external_(Vector::Zero(n_)),
       value_(Vector::Zero(2 * n_ + m_)),
@@ -64,7 +64,8 @@ double ForcePolynomial::closest(double t) const {
 void ForcePolynomial::read(const PathCubic& path, double t, VectorRef f) {
   ++readings_;
   path.at(t, q_, v_);
-  scene_.lagrangian->gradient(t, q_, v_, f.head(n_), f.segment(n_, n_));
+  path.momentum_at(t, p_);
+  scene_.force_and_momentum(t, q_, v_, p_, f.head(n_), f.segment(n_, n_));
   if (scene_.force) {
     scene_.force->value(t, q_, v_, external_);
     f.head(n_) += external_;

@@ -46,7 +46,7 @@ class ForcePolynomial {
   ConstraintsAtPoint rows_;
   bool smooth_;
   Vector allowed_, weights_;  ///< of each component of F, and what turns it into parts of the momentum
-  Vector q_, v_, external_, local_, value_, other_;
+  Vector q_, v_, p_, external_, local_, value_, other_;
   Columns samples_;
   double span_ = 0.0, middle_ = 0.0, half_ = 1.0;  ///< of the motion, and of the last polynomial
   long readings_ = 0;

@@ -9,10 +9,9 @@ PointwiseMotion::PointwiseMotion(const Scene& scene, const SolverFactory& solver
     : full_(scene.dimension() + scene.rows() <= dense_limit),
       reader_(std::make_shared<const Scene>(scene), solvers, full_) {
   if (!has_accelerations(scene))
-    throw Misuse(
-        "scene '" + scene.name +
-        "': its Lagrangian is linear in v, so there are no accelerations to choose variable steps by; use a "
-        "fixed step");
+    throw Misuse("scene '" + scene.name + "': its " +
+                 (scene.lagrangian ? "Lagrangian is linear in v" : "Hamiltonian is degenerate") +
+                 ", so there are no accelerations to choose variable steps by; use a fixed step");
 }
 
 SolveReport PointwiseMotion::acceleration(double t, ConstVectorRef q, ConstVectorRef v, VectorRef a) {

@@ -4,6 +4,7 @@
 #include <diracstep/core/adaptive/pointwise_motion.hpp>
 #include <diracstep/core/adaptive/rate_monitor.hpp>
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/system/first_order_motions.hpp>
 #include <sstream>
 #include <utility>
 #include <vector>
@@ -25,7 +26,10 @@ Vector probing_velocity(const Vector& v) {
 
 }  // namespace
 
-bool has_accelerations(const Scene& scene) { return !scene.lagrangian->structure().y_hessian_zero; }
+bool has_accelerations(const Scene& scene) {
+  return scene.lagrangian && !scene.lagrangian->structure().y_hessian_zero &&
+         !first_order_motions(scene).exist();
+}
 
 void require_even(const Monitor& monitor, const Start& start) {
   if (!monitor.rate) return;

@@ -15,7 +15,8 @@ struct Monitor {
   bool depends_on_velocity = true;  ///< false saves finding accelerations
 };
 
-/// Whether a scene has accelerations to choose variable steps by: not where its Lagrangian is linear in v.
+/// Whether a completed scene has accelerations to choose variable steps by: not where its Lagrangian is
+/// linear in v or has motions of first order, nor where its Hamiltonian is degenerate.
 bool has_accelerations(const Scene& scene);
 
 /// Throws Misuse where the monitor is not positive and finite at the start, or not even in v there and at

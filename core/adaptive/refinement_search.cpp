@@ -226,11 +226,11 @@ std::vector<PathPoint> RefinementSearch::path_of(long refinement) {
   long left = report_.adaptive ? -1 : stretches.front().steps * refinement;
   const auto at_node = [&](const ReadNode& read, bool) {
     if (!read(Momentum::projected, point).ok()) return false;
-    path.push_back({point.time, point.q, point.v});
+    path.push_back({point.time, point.q, point.v, point.p});
     if (path.size() > 1 && --left == 0 && ++stretch < stretches.size()) {
       left = stretches[stretch].steps * refinement;
       if (stretches[stretch].begin != point.time)
-        path.push_back({stretches[stretch].begin, point.q, point.v});
+        path.push_back({stretches[stretch].begin, point.q, point.v, point.p});
     }
     return !time_is_up();
   };

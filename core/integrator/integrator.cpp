@@ -61,12 +61,13 @@ Integrator::~Integrator() = default;
 void Integrator::reset() { reset(scene_->start); }
 
 void Integrator::reset(const Start& given) {
-  const Start start = completed_start(*scene_, given);
+  Start start = completed_start(*scene_, given);
+  require_size("scene '" + scene_->name + "': the start v", start.v.size(), scene_->dimension());
+  reader_->determine(start);
   require_consistent(*scene_, start);
-  Vector lq(start.v.size()), p(start.v.size());
-  scene_->lagrangian->gradient(start.time, start.q, start.v, lq, p);
-  if (!p.allFinite())
-    throw Misuse("scene '" + scene_->name + "': the momentum ∂L/∂v is not finite at the start");
+  Vector force(start.v.size()), p(start.v.size());
+  scene_->force_and_momentum(start.time, start.q, start.v, start.p, force, p);
+  if (!p.allFinite()) throw Misuse("scene '" + scene_->name + "': the momentum is not finite at the start");
   go_on_from(start.time, start.q, p, start.v, Origin::start);
   last_.size = options_.step;
   last_.start = state_;  // of its sizes, so that no later step allocates it

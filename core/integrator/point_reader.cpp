@@ -1,4 +1,5 @@
 #include <diracstep/core/integrator/point_reader.hpp>
+#include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/numerics/lu.hpp>
 #include <utility>
 
@@ -14,7 +15,14 @@ struct PointReader::Elimination {
 
 PointReader::PointReader(std::shared_ptr<const Scene> scene, SolverFactory solvers, bool full)
     : scene_(std::move(scene)), solvers_(std::move(solvers)), full_(full) {
-  if (scene_->lagrangian->structure().phase_space()) {
+  if (scene_->by_hamiltonian()) {
+    hamiltonian_velocity_ = std::make_unique<HamiltonianVelocityProblem>(*scene_, full);
+    velocity_solver_ = solvers_(*hamiltonian_velocity_);
+  } else if (const FirstOrderMotions motions = first_order_motions(*scene_);
+             motions.exist() && (motions.u.cols() > 0 || scene_->rows() > 0 || scene_->force)) {
+    first_order_velocity_ = std::make_unique<FirstOrderVelocityProblem>(*scene_, motions);
+    velocity_solver_ = solvers_(*first_order_velocity_);
+  } else if (motions.exist()) {
     phase_space_velocity_ = std::make_unique<PhaseSpaceVelocityProblem>(*scene_, full);
     velocity_solver_ = solvers_(*phase_space_velocity_);
   } else {
@@ -54,6 +62,8 @@ bool PointReader::constant_diagonal_mass(double t, ConstVectorRef q) {
 }
 
 SolveReport PointReader::velocity(double t, ConstVectorRef q, ConstVectorRef p, Vector& v) {
+  if (hamiltonian_velocity_) return velocity_by_hamiltonian(t, q, p, v);
+  if (first_order_velocity_) return velocity_of_first_order(t, q, p, v);
   if (!phase_space_velocity_ && constant_diagonal_mass(t, q)) {
     v.setZero(p.size());
     scene_->lagrangian->gradient(t, q, v, lq_, unknowns_);
@@ -77,21 +87,80 @@ SolveReport PointReader::velocity(double t, ConstVectorRef q, ConstVectorRef p, 
   return report;
 }
 
+SolveReport PointReader::velocity_of_first_order(double t, ConstVectorRef q, ConstVectorRef p, Vector& v) {
+  const Eigen::Index n = scene_->dimension();
+  velocity_solver_->reset();
+  first_order_velocity_->begin(t, q, p);
+  unknowns_.head(n) = v;
+  unknowns_.tail(scene_->rows()).setZero();
+  const SolveReport report = velocity_solver_->solve(unknowns_);
+  velocity_solver_->reset();
+  if (report.ok()) v = unknowns_.head(n);
+  return report;
+}
+
+void PointReader::determine(Start& start) {
+  if (!first_order_velocity_) return;
+  Vector p(start.v.size());
+  scene_->lagrangian->gradient(start.time, start.q, start.v, lq_, p);
+  const SolveReport report = velocity(start.time, start.q, p, start.v);
+  if (!report.ok())
+    throw Misuse("scene '" + scene_->name +
+                 "': the velocities of its motions of first order at the start: " + describe(report.status));
+}
+
+/// Without rows every momentum is that of its velocity ∂H/∂p.
+SolveReport PointReader::velocity_by_hamiltonian(double t, ConstVectorRef q, ConstVectorRef p, Vector& v) {
+  SolveReport report;
+  if (scene_->rows() == 0) {
+    v.setZero(p.size());
+    scene_->hamiltonian->gradient(t, q, p, lq_, v);
+    projected_ = p;
+    if (!v.allFinite()) report.status = SolveStatus::not_finite;
+    return report;
+  }
+  const Eigen::Index n = scene_->dimension();
+  velocity_solver_->reset();
+  hamiltonian_velocity_->begin(t, q, p, v);
+  unknowns_.head(n) = v;
+  unknowns_.tail(scene_->rows()).setZero();
+  report = velocity_solver_->solve(unknowns_);
+  velocity_solver_->reset();
+  if (!report.ok()) return report;
+  v = unknowns_.head(n);
+  hamiltonian_velocity_->project(unknowns_, projected_);
+  return report;
+}
+
 SolveReport PointReader::acceleration(double t, ConstVectorRef q, ConstVectorRef v, Vector& a,
                                       Vector& lambda) {
-  const Eigen::Index n = scene_->dimension(), m = scene_->rows();
-  if (phase_space_velocity_) {
+  if (phase_space_velocity_ || first_order_velocity_) {
     a.resize(0);
     lambda.resize(0);
     return {};
   }
   acceleration_problem().begin(t, q, v);
-  if (!acceleration_solver_) acceleration_solver_ = solvers_(*acceleration_);
+  return solve_acceleration(*acceleration_, acceleration_solver_, a, lambda);
+}
+
+SolveReport PointReader::acceleration(double t, ConstVectorRef q, ConstVectorRef v, ConstVectorRef p,
+                                      Vector& a, Vector& lambda) {
+  if (!hamiltonian_velocity_) return acceleration(t, q, v, a, lambda);
+  if (!hamiltonian_acceleration_)
+    hamiltonian_acceleration_ = std::make_unique<HamiltonianAccelerationProblem>(*scene_, full_);
+  hamiltonian_acceleration_->begin(t, q, p, v);
+  return solve_acceleration(*hamiltonian_acceleration_, hamiltonian_acceleration_solver_, a, lambda);
+}
+
+SolveReport PointReader::solve_acceleration(NonlinearProblem& problem,
+                                            std::unique_ptr<NonlinearSolver>& solver, Vector& a,
+                                            Vector& lambda) {
+  if (!solver) solver = solvers_(problem);
   unknowns_.setZero();
-  acceleration_solver_->reset();
-  const SolveReport report = acceleration_solver_->solve(unknowns_);
-  a = unknowns_.head(n);
-  lambda = unknowns_.tail(m);
+  solver->reset();
+  const SolveReport report = solver->solve(unknowns_);
+  a = unknowns_.head(scene_->dimension());
+  lambda = unknowns_.tail(scene_->rows());
   return report;
 }
 
@@ -118,13 +187,20 @@ SolveReport PointReader::read(double t, const State& at, Momentum momentum, Samp
   SolveReport report = velocity(t, at.q, at.p, sample.v);
   if (scene_->rows() == 0)
     sample.lambda.resize(0);
+  else if (first_order_velocity_)
+    sample.lambda = unknowns_.tail(scene_->rows());
   else if (report.ok())
-    report = acceleration(t, at.q, sample.v, a_, sample.lambda);
+    report = acceleration(t, at.q, sample.v, projected_, a_, sample.lambda);
   if (!report.ok()) return report;
   sample.time = t;
   sample.q = at.q;
   sample.p = at.p;
   sample.impulse.resize(0);
+  if (hamiltonian_velocity_) {
+    sample.energy = scene_->hamiltonian->value(t, at.q, projected_);
+    if (momentum == Momentum::projected) sample.p = projected_;
+    return report;
+  }
   sample.energy = scene_->energy(t, at.q, sample.v);
   if (momentum == Momentum::projected) scene_->lagrangian->gradient(t, at.q, sample.v, lq_, sample.p);
   return report;

@@ -1,8 +1,10 @@
 #include <algorithm>
+#include <diracstep/core/integrator/point_reader.hpp>
 #include <diracstep/core/integrator/prepared_scene.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/system/consistent_start.hpp>
 #include <diracstep/core/system/contradictory_rows.hpp>
+#include <diracstep/core/system/first_order_motions.hpp>
 #include <diracstep/core/system/hidden_rows.hpp>
 #include <diracstep/core/system/redundant_rows.hpp>
 #include <span>
@@ -84,6 +86,17 @@ PreparedScene prepared(std::shared_ptr<const Scene> given, const IntegratorOptio
     names.erase(names.begin(), names.begin() + own_rows);
     result.lines.push_back(
         {"hidden rows", joined(names), "motions without momentum; these rows determine them"});
+  }
+  if (const FirstOrderMotions motions = first_order_motions(*scene);
+      motions.exist() && scene->start.v.size() == scene->dimension() &&
+      (motions.u.cols() > 0 || scene->rows() > 0 || scene->force)) {
+    require_determined(*scene, motions);
+    auto copy = std::make_shared<Scene>(*scene);
+    PointReader(scene, solvers, true).determine(copy->start);
+    scene = copy;
+    result.lines.push_back({"velocities", "of motions of first order",
+                            std::to_string(motions.w.cols()) + " of " + std::to_string(scene->dimension()) +
+                                " are no data of a motion: positions and rows determine them"});
   }
   if (options.project_start) {
     const ConsistentStart moved = project_start(*scene, scene->start, solvers);

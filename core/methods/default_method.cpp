@@ -12,9 +12,16 @@ constexpr int highest_order = 40;  // GL(20)
 
 /// Whether type1/trapezoidal needs no nonlinear solve.
 bool explicit_at_the_ends(const Scene& scene) {
+  if (scene.by_hamiltonian()) return false;
   const PhaseStructure& l = scene.lagrangian->structure();
   return scene.rows() == 0 && !scene.force && l.separable && l.y_hessian_constant && l.y_hessian_diagonal &&
          !l.y_hessian_zero;
+}
+
+/// Whether type2/euler needs no nonlinear solve.
+bool explicit_by_hamiltonian(const Scene& scene) {
+  return scene.by_hamiltonian() && scene.rows() == 0 && !scene.force &&
+         scene.hamiltonian->structure().separable;
 }
 
 int order_for(double error, int size) {
@@ -55,6 +62,9 @@ DefaultMethod default_method(const Scene& scene, const MethodRequest& request) {
   const std::string order = "order " + std::to_string(p) + ": " + reason;
   if (size > request.large && p <= composition_orders.back() && explicit_at_the_ends(scene))
     return {"type1/trapezoidal", p,
+            "explicit here: more than " + std::to_string(request.large) + " unknowns, no rows; " + order};
+  if (size > request.large && p <= composition_orders.back() && explicit_by_hamiltonian(scene))
+    return {"type2/euler", p,
             "explicit here: more than " + std::to_string(request.large) + " unknowns, no rows; " + order};
   return {"type1/gl:" + std::to_string(p / 2), p, order};
 }

@@ -41,6 +41,8 @@ struct DefaultMethod {
 ///                                      no error is asked for: rows inside the step know no such rule
 ///   more than `large` unknowns, no     type1/trapezoidal, explicit there, composed to p: a fifth of the time
 ///   rows, no force, L separable        of GL(3) on Toda lattices of 200 and 1000 sites
+///   the same of a scene given by a      type2/euler with its adjoint, explicit there, composed to p
+///   separable Hamiltonian alone
 ///   all others                         GL(p/2)
 ///
 /// Through KLU GL(3) takes less time than compositions of the midpoint step on lattices and on chains of 16

@@ -2,6 +2,8 @@
 #include <diracstep/core/methods/method.hpp>
 #include <diracstep/core/methods/quadrature.hpp>
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/steps/gauss_lobatto/first_order_step.hpp>
+#include <diracstep/core/steps/gauss_lobatto/hamiltonian_step.hpp>
 #include <diracstep/core/steps/gauss_lobatto/phase_space_step.hpp>
 #include <diracstep/core/steps/gauss_lobatto/step.hpp>
 #include <diracstep/core/steps/gauss_lobatto/tableau.hpp>
@@ -13,9 +15,15 @@ namespace diracstep {
 
 namespace {
 
-/// Whether a phase-space Lagrangian asks for a step of its own.
-bool needs_phase_space_step(const Scene& scene, const StepChoices& choices) {
-  return scene.lagrangian->structure().phase_space() && !choices.force_degenerate;
+/// The motions of first order that ask for a step of their own.
+FirstOrderMotions own_motions(const Scene& scene, const StepChoices& choices) {
+  return choices.force_degenerate ? FirstOrderMotions{} : first_order_motions(scene);
+}
+
+std::unique_ptr<StepProblem> step_of_first_order(int s, const Scene& scene, const FirstOrderMotions& motions,
+                                                 bool dense) {
+  const bool alone = scene.rows() == 0 && !scene.force && scene.lagrangian->structure().phase_space();
+  return alone ? phase_space_step(s, scene, dense) : first_order_step(s, scene, motions);
 }
 
 bool asks_for_own_rule(const StepChoices& choices, const StepRule& own) {
@@ -32,9 +40,11 @@ ConstraintRule applied_rule(const StepChoices& choices, const StepRule& own) {
 
 StepFactory gauss_lobatto_factory(const std::string& name, int s) {
   return [name, s](const Scene& scene, const StepChoices& choices) {
-    if (needs_phase_space_step(scene, choices)) return phase_space_step(s, scene, choices.dense);
+    if (const FirstOrderMotions motions = own_motions(scene, choices); motions.exist())
+      return step_of_first_order(s, scene, motions, choices.dense);
     if (!asks_for_own_rule(choices, StepRule::midpoint))
       throw Misuse("method '" + name + "' has its own nodes for the constraint; no other rule applies");
+    if (scene.by_hamiltonian()) return hamiltonian_step(s, scene, choices.dense);
     return gauss_lobatto_step(s, scene, choices.dense);
   };
 }
@@ -46,9 +56,9 @@ std::string prefix_of(GeneratingType type) { return "type" + std::to_string(stat
 Method method_of(MethodInfo info, GeneratingFunctionFactory generating_function) {
   const auto make_step = [name = info.name, own = info.constraint_rule, generating_function](
                              const Scene& scene, const StepChoices& choices) {
-    if (needs_phase_space_step(scene, choices))
-      throw Misuse("scene '" + scene.name + "': its Lagrangian is linear in v, where '" + name +
-                   "' is unstable or leaves p = ∂L/∂v; use type1/midpoint or typeN/gl:S");
+    if (own_motions(scene, choices).exist())
+      throw Misuse("scene '" + scene.name + "': its Lagrangian is linear in v or in some of them, where '" +
+                   name + "' is unstable or leaves p = ∂L/∂v; use type1/midpoint or typeN/gl:S");
     return dirac_step(generating_function(scene), scene, applied_rule(choices, own), choices.dense);
   };
   return {std::move(info), make_step, std::move(generating_function)};
@@ -72,7 +82,7 @@ Method gauss_lobatto_method(GeneratingType type, int s) {
       .solved_as = first ? "solved for its stage velocities"
                          : "the same step as type1/gl:" + stages + ", solved for its stage velocities"};
   return {std::move(info), gauss_lobatto_factory(name, s),
-          [s, type](const Scene& scene) { return gauss_lobatto_function(type, s, scene.lagrangian); }};
+          [s, type](const Scene& scene) { return gauss_lobatto_function(type, s, lagrangian_of(scene)); }};
 }
 
 Method radau_method(int s) {
@@ -107,13 +117,12 @@ Method midpoint_method() {
                   .stages = 1,
                   .solved_as = "the same step as GL(1), solved for its velocity"};
   Method method = method_of(std::move(info), [](const Scene& scene) {
-    return quadrature_lagrangian(scene.lagrangian, StepRule::midpoint);
+    return quadrature_lagrangian(lagrangian_of(scene), StepRule::midpoint);
   });
   method.make_step = [stated = method.make_step, as_gl1 = gauss_lobatto_factory(method.info.name, 1)](
                          const Scene& scene, const StepChoices& choices) {
     const bool own_rule = asks_for_own_rule(choices, StepRule::midpoint);
-    return own_rule || needs_phase_space_step(scene, choices) ? as_gl1(scene, choices)
-                                                              : stated(scene, choices);
+    return own_rule || own_motions(scene, choices).exist() ? as_gl1(scene, choices) : stated(scene, choices);
   };
   return method;
 }

@@ -42,8 +42,8 @@ struct StepChoices {
   bool force_degenerate = false;            ///< also where the method is known to be unstable
 };
 
-/// Makes the generating function of a method for a scene that has a Lagrangian; throws Misuse where the scene
-/// lacks what the method needs.
+/// Makes the generating function of a method for a scene that was completed; throws Misuse where the scene
+/// lacks what the method needs, as a degenerate Hamiltonian lacks a Lagrangian.
 using GeneratingFunctionFactory = std::function<std::unique_ptr<GeneratingFunction>(const Scene&)>;
 
 /// Makes the step of a method for such a scene.  Throws Misuse for another rule where the rows of the method

@@ -21,7 +21,7 @@ void add_quadrature(Registry& registry, StepRule rule, int order, std::string su
                     std::string adjoint = {}) {
   registry.add({std::string("type1/") + name(rule), GeneratingType::one, order, order == 2, rule,
                 std::move(summary), std::move(adjoint), 0, true},
-               [rule](const Scene& scene) { return quadrature_lagrangian(scene.lagrangian, rule); });
+               [rule](const Scene& scene) { return quadrature_lagrangian(lagrangian_of(scene), rule); });
 }
 
 /// "typeN/word(inner)" taken apart.

@@ -14,7 +14,7 @@ constexpr long points_for_a_mean = 32;
 }  // namespace
 
 bool keeps_energy(const Scene& scene) {
-  return !scene.force && scene.lagrangian->structure().autonomous &&
+  return !scene.force && scene.stepped_function().structure().autonomous &&
          std::ranges::all_of(scene.constraints, [](const auto& rows) { return rows->workless(); });
 }
 
@@ -31,7 +31,7 @@ void EnergyCheck::see(const Sample& point) {
   if (start_position_.size() == 0) {
     start_energy_ = point.energy;
     start_position_ = point.q;
-    rest_.see(point.time, point.q, point.v);
+    rest_.see(point);
     last_time_ = point.time;
   }
   longest_time_ = std::max(longest_time_, std::abs(point.time - last_time_));
@@ -51,7 +51,7 @@ void EnergyCheck::see(const Sample& point) {
 }
 
 void EnergyCheck::add_at_play(const Sample& point) {
-  scene_.lagrangian->gradient(point.time, point.q, point.v, force_, momentum_);
+  scene_.force_and_momentum(point.time, point.q, point.v, point.p, force_, momentum_);
   const double kinetic = 0.5 * std::abs(momentum_.dot(point.v)),
                work = std::abs(force_.dot(point.q - start_position_));
   double here = 0.0;
@@ -70,7 +70,7 @@ bool EnergyCheck::too_large(double at_play) const {
 std::string EnergyCheck::denied(const Sample& point, double error, double position_size,
                                 double momentum_size) {
   if (!keeps_energy_ || start_position_.size() == 0) return {};
-  scene_.lagrangian->gradient(point.time, point.q, point.v, force_, momentum_);
+  scene_.force_and_momentum(point.time, point.q, point.v, point.p, force_, momentum_);
   const double terms = momentum_size * point.v.cwiseAbs().sum() + position_size * force_.cwiseAbs().sum();
   const double rounding = at_rest * std::max({std::abs(start_energy_), std::abs(point.energy), terms});
   const double change = std::abs(point.energy - start_energy_);

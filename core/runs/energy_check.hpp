@@ -6,9 +6,9 @@
 
 namespace diracstep {
 
-/// Whether the formulas show that the energy is a constant of the scene's motion: no force, no time in L
+/// Whether the formulas show that the energy is a constant of the scene's motion: no force, no time in L or H
 /// (PhaseStructure::autonomous), and rows that do no work (ConstraintRows::workless).  False where that is
-/// not known.  Needs a scene with a Lagrangian, as Integrator::scene() is.
+/// not known.  Needs a completed scene, as Integrator::scene() is.
 bool keeps_energy(const Scene& scene);
 
 /// Follows the energy along a run, to say when its points are not to be believed: the scene keeps its energy,
@@ -27,7 +27,7 @@ bool keeps_energy(const Scene& scene);
 /// kept on a wrong path.
 class EnergyCheck {
  public:
-  /// The scene, one with a Lagrangian, must outlive this.  Where the method damps what is too fast for its
+  /// The scene, a completed one, must outlive this.  Where the method damps what is too fast for its
   /// steps, the line says of lost energy that it is the method's doing and not the scene's.
   explicit EnergyCheck(const Scene& scene, bool damped = false);
 

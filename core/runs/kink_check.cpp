@@ -23,7 +23,7 @@ KinkCheck::KinkCheck(const Integrator& integrator, double end)
   for (Vector* column : {&force_, &between_, &beside_, &change_, &momentum_, &own_})
     column->setZero(scene_.dimension());
   read(integrator, to_);
-  force_at(to_.time, to_.q, to_.v, force_);
+  force_at(to_.time, to_.q, to_.v, to_.p, force_);
   switches_.setZero(kinks_->count());
   kinks_->evaluate(to_.time, to_.q, to_.v, switches_);
   changes_.setConstant(kinks_->count(), HUGE_VAL);
@@ -49,10 +49,11 @@ void KinkCheck::read(const Integrator& integrator, PathPoint& point) const {
   point.time = integrator.time();
   point.q = integrator.position();
   point.v = integrator.velocity_estimate();
+  point.p = integrator.momentum();
 }
 
-void KinkCheck::force_at(double t, const Vector& q, const Vector& v, Vector& force) {
-  scene_.lagrangian->gradient(t, q, v, force, momentum_);
+void KinkCheck::force_at(double t, const Vector& q, const Vector& v, const Vector& p, Vector& force) {
+  scene_.force_and_momentum(t, q, v, p, force, momentum_);
   if (!scene_.force) return;
   scene_.force->value(t, q, v, own_);
   force += own_;
@@ -67,7 +68,8 @@ double KinkCheck::missed(const std::vector<KinkCrossing>& cuts, const PathCubic&
     for (const auto& [place, weight] : gauss_points) {
       const double t = begin + place * (end - begin), s = (t - path.begin()) / h;
       path.at(t, q_, v_);
-      force_at(t, q_, v_, between_);
+      path.momentum_at(t, p_);
+      force_at(t, q_, v_, p_, between_);
       between_ -= (1.0 - s) * force_before_ + s * force_;
       beside_ += weight * between_.cwiseAbs();
     }
@@ -82,7 +84,7 @@ void KinkCheck::look(const Integrator& integrator) {
   std::swap(from_, to_);
   force_before_ = force_;
   read(integrator, to_);
-  force_at(to_.time, to_.q, to_.v, force_);
+  force_at(to_.time, to_.q, to_.v, to_.p, force_);
   largest_momentum_ = std::max(largest_momentum_, max_norm(integrator.momentum()));
   const PathCubic path{from_, to_};
   const double h = path.end() - path.begin();

@@ -39,7 +39,7 @@ class KinkCheck {
   void look(const Integrator& integrator);
   void read(const Integrator& integrator, PathPoint& point) const;
   bool may_cross();
-  void force_at(double t, const Vector& q, const Vector& v, Vector& force);
+  void force_at(double t, const Vector& q, const Vector& v, const Vector& p, Vector& force);
   double missed(const std::vector<KinkCrossing>& cuts, const PathCubic& path);
 
   const Scene& scene_;
@@ -47,7 +47,7 @@ class KinkCheck {
   KinkCrossings crossings_;
   PathPoint from_, to_;
   Vector switches_, switches_before_, changes_;  ///< of each switching function, and in the step before
-  Vector force_, force_before_, change_, between_, beside_, momentum_, own_, q_, v_;
+  Vector force_, force_before_, change_, between_, beside_, momentum_, own_, q_, v_, p_;
   double sum_ = 0.0, sum_of_instants_ = 0.0, largest_momentum_ = 0.0, first_time_ = 0.0;
   long jumps_ = 0;
   int first_ = -1;

@@ -71,15 +71,16 @@ void NodeCheck::add_force(const Sample& node, Vector& force, Vector& terms, Vect
   const Eigen::Index n = scene_.dimension();
   Vector momentum(n);
   force.resize(n);
-  scene_.lagrangian->gradient(node.time, node.q, node.v, force, momentum);
+  scene_.force_and_momentum(node.time, node.q, node.v, node.p, force, momentum);
   terms = force.cwiseAbs();
-  const SparsityPattern& pattern = scene_.lagrangian->pattern();
-  Vector qq(pattern.nonzeros()), qv(pattern.nonzeros()), vv(pattern.nonzeros());
-  scene_.lagrangian->hessian(node.time, node.q, node.v, qq, qv, vv);
-  qv = qv.cwiseAbs();
+  const SparsityPattern& pattern = scene_.stepped_function().pattern();
+  const Vector& y = scene_.by_hamiltonian() ? node.p : node.v;
+  Vector qq(pattern.nonzeros()), qy(pattern.nonzeros()), yy(pattern.nonzeros());
+  scene_.stepped_function().hessian(node.time, node.q, y, qq, qy, yy);
+  qy = qy.cwiseAbs();
   qq = qq.cwiseAbs();
   cancelling.setZero(n);
-  pattern.multiply_add(qv.data(), node.v.cwiseAbs().eval().data(), cancelling.data());
+  pattern.multiply_add(qy.data(), y.cwiseAbs().eval().data(), cancelling.data());
   pattern.multiply_add(qq.data(), node.q.cwiseAbs().eval().data(), cancelling.data());
   if (scene_.force) {
     scene_.force->value(node.time, node.q, node.v, momentum);

@@ -19,7 +19,7 @@ namespace diracstep {
 class NodeCheck {
  public:
   /// For a run of about so many steps; 0 where that is not known: windows then come less and less often.  The
-  /// scene, one with a Lagrangian, must outlive this.
+  /// scene, a completed one, must outlive this.
   NodeCheck(const Scene& scene, long steps);
 
   /// Whether the node after so many steps, counted by the caller, is to be shown; nodes are asked for in

@@ -17,6 +17,7 @@ constexpr std::array<GaussPoint, 3> gauss_points{
 struct PathPoint {
   double time;
   Vector q, v;
+  Vector p = {};  ///< looked at where the scene is given by a Hamiltonian alone
 };
 
 /// The cubic with the positions and velocities of two points.
@@ -30,6 +31,11 @@ struct PathCubic {
     q = (1.0 + 2.0 * s) * r * r * from.q + s * r * r * h * from.v + s * s * (1.0 + 2.0 * r) * to.q -
         s * s * r * h * to.v;
     v = 6.0 * s * r / h * (to.q - from.q) + r * (1.0 - 3.0 * s) * from.v + s * (3.0 * s - 2.0) * to.v;
+  }
+  /// Momenta in between, on a straight line.
+  void momentum_at(double t, Vector& p) const {
+    p = from.p;
+    if (p.size() > 0) p += (t - begin()) / (end() - begin()) * (to.p - from.p);
   }
 };
 

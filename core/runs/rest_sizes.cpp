@@ -6,22 +6,26 @@ namespace diracstep {
 
 RestSizes::RestSizes(const Scene& scene)
     : scene_(scene), force_(Vector::Zero(scene.dimension())), momentum_(force_), own_(force_) {
-  for (Vector* block : {&qq_, &qv_, &vv_}) block->setZero(scene.lagrangian->pattern().nonzeros());
+  for (Vector* block : {&qq_, &qy_, &yy_}) block->setZero(scene.stepped_function().pattern().nonzeros());
 }
 
-void RestSizes::see(double t, const Vector& q, const Vector& v) {
-  scene_.lagrangian->gradient(t, q, v, force_, momentum_);
+void RestSizes::see(const Sample& point) {
+  const double t = point.time;
+  scene_.force_and_momentum(t, point.q, point.v, point.p, force_, momentum_);
   if (scene_.force) {
-    scene_.force->value(t, q, v, own_);
+    scene_.force->value(t, point.q, point.v, own_);
     force_ = force_.cwiseAbs() + own_.cwiseAbs();
   }
-  scene_.lagrangian->hessian(t, q, v, qq_, qv_, vv_);
+  const bool by_momentum = scene_.by_hamiltonian();
+  const PhaseFunction& function = scene_.stepped_function();
+  function.hessian(t, point.q, by_momentum ? point.p : point.v, qq_, qy_, yy_);
   speed_ = energy_ = 0.0;
-  scene_.lagrangian->pattern().for_each([&](Eigen::Index k, int i, int j) {
-    const double mass = std::abs(vv_[k]), force = std::abs(force_[i]);
-    if (i != j || !(mass > 0.0) || !std::isfinite(force / mass)) return;
-    speed_ = std::max(speed_, force / mass);
-    energy_ += force * force / mass;
+  function.pattern().for_each([&](Eigen::Index k, int i, int j) {
+    const double entry = std::abs(yy_[k]), force = std::abs(force_[i]);
+    const double per_mass = by_momentum ? entry : 1.0 / entry;
+    if (i != j || !(entry > 0.0) || !std::isfinite(force * per_mass)) return;
+    speed_ = std::max(speed_, force * per_mass);
+    energy_ += force * force * per_mass;
   });
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cmath>
+#include <diracstep/core/integrator/sample.hpp>
 #include <diracstep/core/system/scene.hpp>
 
 namespace diracstep {
@@ -9,11 +10,12 @@ namespace diracstep {
 /// round-off of this, also where its coordinates are zero.
 class RestSizes {
  public:
-  /// The scene, one with a Lagrangian, must outlive this.
+  /// The scene, a completed one, must outlive this.
   explicit RestSizes(const Scene& scene);
 
-  /// Reads the forces ∂L/∂q + f and the masses ∂²L/∂v_i² at a point.
-  void see(double t, const Vector& q, const Vector& v);
+  /// Reads the forces ∂L/∂q + f and the masses ∂²L/∂v_i² at a point; −∂H/∂q + f and 1/m = ∂²H/∂p_i² where the
+  /// scene is given by a Hamiltonian alone.
+  void see(const Sample& point);
   /// max h |F_i|/m_i over the coordinates with a mass.
   double speed(double h) const { return std::abs(h) * speed_; }
   /// Σ (h F_i)²/m_i
@@ -21,7 +23,7 @@ class RestSizes {
 
  private:
   const Scene& scene_;
-  Vector force_, momentum_, own_, qq_, qv_, vv_;
+  Vector force_, momentum_, own_, qq_, qy_, yy_;
   double speed_ = 0.0, energy_ = 0.0;
 };
 

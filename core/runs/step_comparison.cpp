@@ -40,7 +40,7 @@ void StepComparison::add(const Sample& start, double h, const Sample& whole, con
   ++steps_;
   longest_way_ = std::max({longest_way_, std::abs(h) * max_norm(start.v), max_norm(whole.q - start.q),
                            max_norm(parts.q - start.q)});
-  rest_.see(start.time, start.q, start.v);
+  rest_.see(start);
   const double rounding = at_rest * std::max(max_norm(start.q), std::abs(h) * rest_.speed(h));
   const double difference = max_norm(whole.q - parts.q) / std::max(longest_way_, rounding);
   if (difference > 0.0 && !(difference <= worst_)) {

@@ -41,7 +41,7 @@ class ImplicitStep final : public StepProblem {
     last_x_.setZero(size());
     for (Vector* column : {&q1_, &increment_, &sizes_, &largest_, &as_largest_}) column->setZero(n_);
     row_scales_ = RowScales(size());
-    quadratic_ = scene.lagrangian->structure().quadratic && !scene.force;
+    quadratic_ = scene.stepped_function().structure().quadratic && !scene.force;
     by_increment_ = s_->type() == GeneratingType::one && s_->take_increments();
     terms_.setZero(s_->columns());
     multipliers_.setZero(m_);

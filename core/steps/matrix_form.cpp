@@ -24,7 +24,7 @@ double filled_part(const Scene& scene) {
       entries.emplace_back(column, first_row + row, -1.0);
     }
   };
-  add(scene.lagrangian->pattern(), 0);
+  add(scene.stepped_function().pattern(), 0);
   if (scene.force) add(scene.force->pattern(), 0);
   add(ConstraintDistribution(scene.constraints, n).pattern(), n);
   for (int i = 0; i < size; ++i) entries.emplace_back(i, i, 4.0 * size);

@@ -5,6 +5,7 @@
 #include <diracstep/core/numerics/row_scales.hpp>
 #include <diracstep/core/system/consistent_start.hpp>
 #include <diracstep/core/system/constraint_distribution.hpp>
+#include <diracstep/core/system/hamiltonian_point.hpp>
 #include <diracstep/core/system/hidden_rows.hpp>
 #include <diracstep/core/system/redundant_rows.hpp>
 #include <diracstep/core/system/saddle_point.hpp>
@@ -239,11 +240,24 @@ ConsistentStart project_start(const Scene& given, const Start& given_start, cons
   auto there = std::make_shared<Scene>(scene);
   there->start = result.start;
   const bool redundant = independent(there, {})->rows() < scene.rows();
+  if (scene.by_hamiltonian() && (!held(guesses.v).empty() || redundant))
+    throw Misuse("scene '" + scene.name +
+                 "': its start is given by momenta, which are projected all together onto independent rows");
   if (!held(guesses.v).empty() || redundant) {
     auto moved = std::make_shared<Scene>(*complete);  // what carries no momentum is set anew at this position
     moved->start.q = result.start.q;
     result.start.v = with_hidden_rows(moved)->start.v;
     result.start.v = nearest_velocity(scene, result.start, guesses.v);
+  } else if (scene.by_hamiltonian()) {
+    Vector x = Vector::Zero(n + scene.rows());
+    HamiltonianVelocityProblem problem(scene, true);
+    problem.begin(start.time, result.start.q, start.p, start.v);
+    x.head(n) = start.v;
+    const SolveReport report = solvers(problem)->solve(x);
+    if (!report.ok())
+      throw_not_found(scene, "no nearest momentum whose velocity is in the distribution", report);
+    result.start.v = x.head(n);
+    problem.project(x, result.start.p);
   } else {
     Vector lq(n), p(n), x = Vector::Zero(n + scene.rows());
     scene.lagrangian->gradient(start.time, result.start.q, start.v, lq, p);

@@ -122,7 +122,7 @@ std::shared_ptr<const Scene> with_start_and_hidden_rows(const Scene& scene, cons
   require_full_size(scene);
   auto copy = std::make_shared<Scene>(scene);
   copy->start = start;
-  return with_hidden_rows(completed(std::move(copy)));
+  return with_hidden_rows(with_lagrangian(*copy));
 }
 
 Vector least_multipliers(const Columns& one_forms, const Vector& forces) {

@@ -1,10 +1,10 @@
 #include <Eigen/LU>
-#include <Eigen/SparseCholesky>
 #include <algorithm>
 #include <cmath>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/core/system/constraint_distribution.hpp>
+#include <diracstep/core/system/first_order_motions.hpp>
 #include <diracstep/core/system/hidden_rows.hpp>
 #include <diracstep/core/system/lagrangian_derivatives.hpp>
 #include <diracstep/core/system/rows_along_motions.hpp>
@@ -51,24 +51,6 @@ struct FullDerivatives {
   Columns lqq, lqv, lvv, fq, fv;
   Vector lvt;
 };
-
-/// Whether ∂²L/∂v² at the start is positive definite whatever the units of the coordinates: the cheap test
-/// that nearly every scene passes.
-bool positive_definite(const Lagrangian& lagrangian, const Start& start) {
-  const SparsityPattern& pattern = lagrangian.pattern();
-  LagrangianDerivatives l(lagrangian);
-  l.take_second(lagrangian, start.time, start.q, start.v);
-  const int n = pattern.rows();
-  const Eigen::Map<const Eigen::SparseMatrix<double>> mass(
-      n, n, pattern.nonzeros(), pattern.column_starts().data(), pattern.row_indices().data(), l.vv.data());
-  Vector size(n);
-  for (int i = 0; i < n; ++i) size[i] = mass.coeff(i, i);
-  if (!(size.minCoeff() > 0.0)) return false;
-  size = size.cwiseSqrt().cwiseInverse();
-  const Eigen::SparseMatrix<double> scaled = size.asDiagonal() * mass * size.asDiagonal();
-  const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factors(scaled);
-  return factors.info() == Eigen::Success && factors.vectorD().minCoeff() > 1e-12;
-}
 
 /// A basis of the kernel, without a column where there is none.
 Columns kernel(const Columns& matrix) {
@@ -197,6 +179,7 @@ Vector largest_of_rows(const Columns& matrix) {
 }  // namespace
 
 ConstraintBlocks hidden_rows(const Scene& scene) {
+  if (scene.by_hamiltonian() || first_order_motions(scene).exist()) return {};
   const Start& start = scene.start;
   const bool sized = start.q.size() == scene.storage_size() && start.v.size() == scene.dimension();
   if (!sized || !start.q.allFinite() || !start.v.allFinite()) return {};  // told by require_consistent

@@ -21,8 +21,9 @@ namespace diracstep {
 /// Second derivatives of the position rows hold third derivatives of L and are left out: they are zero for
 /// linear capacitors, and elsewhere change nothing but the acceleration along W.
 ///
-/// Empty where ∂²L/∂v² is regular on Δ_Q at the start or near it, and for phase-space Lagrangians, which have
-/// a step of their own.  Throws Misuse where such a motion is determined by nothing, or by more than is
+/// Empty where ∂²L/∂v² is regular on Δ_Q at the start or near it, for motions of first order
+/// (first_order_motions.hpp), which have a step of their own, and for scenes given by a Hamiltonian alone,
+/// which hide nothing.  Throws Misuse where such a motion is determined by nothing, or by more than is
 /// described here, or where W is not constant, and names it.
 ConstraintBlocks hidden_rows(const Scene& scene);
 

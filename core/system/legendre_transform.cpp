@@ -7,6 +7,8 @@ namespace diracstep {
 
 namespace {
 
+constexpr int largest_full_hessian = 1500;  // coordinates that are looked through for a singular Hessian
+
 /// g(x, z) = y·z − f(x, y) at z = ∂f/∂y.  With F the second derivatives of f at (x, y):
 ///   g_x = −F_x,   g_z = y,   g_zz = F_yy⁻¹,   g_xz = −F_xy F_yy⁻¹,   g_xx = −F_xx + F_xy F_yy⁻¹ F_yx
 template <class Base, class From>
@@ -102,8 +104,22 @@ std::shared_ptr<const Lagrangian> lagrangian_from(std::shared_ptr<const Hamilton
                                                   ConstVectorRef q, ConstVectorRef p) {
   require_regular(*hamiltonian, t, q, p,
                   "the Hamiltonian is degenerate (its Hessian in p is singular at the start), so it has no "
-                  "Lagrangian; use type2/euler or type3/euler");
+                  "Lagrangian; give its start by momenta and step it as it is");
   return std::make_shared<const Transform<Lagrangian, Hamiltonian>>(std::move(hamiltonian));
+}
+
+Columns directions_linear_in_p(const Hamiltonian& hamiltonian, double t, ConstVectorRef q, ConstVectorRef p) {
+  const SparsityPattern& pattern = hamiltonian.pattern();
+  const int n = hamiltonian.dimension();
+  if (n > largest_full_hessian) return Columns(n, 0);
+  Vector hqq(pattern.nonzeros()), hqp = hqq, hpp = hqq;
+  hamiltonian.hessian(t, q, p, hqq, hqp, hpp);
+  if (!hpp.allFinite()) return Columns(n, 0);
+  const Eigen::FullPivLU<Columns> lu(pattern.full(hpp));
+  if (lu.isInvertible()) return Columns(n, 0);
+  Columns kernel = lu.kernel();
+  for (Eigen::Index k = 0; k < kernel.cols(); ++k) kernel.col(k) /= kernel.col(k).lpNorm<Eigen::Infinity>();
+  return (kernel.array().abs() < 1e-12).select(0.0, kernel);
 }
 
 }  // namespace diracstep

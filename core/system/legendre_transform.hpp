@@ -16,4 +16,8 @@ std::shared_ptr<const Hamiltonian> hamiltonian_from(std::shared_ptr<const Lagran
 std::shared_ptr<const Lagrangian> lagrangian_from(std::shared_ptr<const Hamiltonian> hamiltonian, double t,
                                                   ConstVectorRef q, ConstVectorRef p);
 
+/// A basis of ker ∂²H/∂p² at a point, each direction scaled to a largest entry of 1; without a column where
+/// that is regular, and where it is not finite.
+Columns directions_linear_in_p(const Hamiltonian& hamiltonian, double t, ConstVectorRef q, ConstVectorRef p);
+
 }  // namespace diracstep

@@ -1,8 +1,10 @@
 #include <cmath>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/system/legendre_transform.hpp>
+#include <diracstep/core/system/rows_along_motions.hpp>
 #include <diracstep/core/system/scene.hpp>
 #include <sstream>
+#include <utility>
 
 namespace diracstep {
 
@@ -38,6 +40,23 @@ std::vector<std::string> Scene::row_names() const {
   return names;
 }
 
+const PhaseFunction& Scene::stepped_function() const {
+  if (by_hamiltonian()) return *hamiltonian;
+  return *lagrangian;
+}
+
+double Scene::energy(const Start& at) const {
+  return by_hamiltonian() ? hamiltonian->value(at.time, at.q, at.p) : energy(at.time, at.q, at.v);
+}
+
+void Scene::force_and_momentum(double t, ConstVectorRef q, ConstVectorRef v, ConstVectorRef p, VectorRef lq,
+                               VectorRef momentum) const {
+  if (!by_hamiltonian()) return lagrangian->gradient(t, q, v, lq, momentum);
+  hamiltonian->gradient(t, q, p, lq, momentum);
+  lq = -lq;
+  momentum = p;
+}
+
 double Scene::energy(double t, ConstVectorRef q, ConstVectorRef v) const {
   Vector lq(v.size()), lv(v.size());
   lagrangian->gradient(t, q, v, lq, lv);
@@ -65,7 +84,33 @@ void require_well_formed(const Scene& scene) {
       throw Misuse(prefix + "a tolerance of a coordinate is a finite number of 0 or more");
 }
 
+namespace {
+
+/// (p, v = ∂H/∂p) of a scene given by a Hamiltonian alone.
+Start completed_by_hamiltonian(const Scene& scene, Start start) {
+  const std::string of_scene = "scene '" + scene.name + "': ";
+  Vector unused(scene.dimension());
+  if (start.p.size() == 0) {
+    if (start.v.size() == 0) return start;  // told by who needs a start
+    require_size(of_scene + "the start q", start.q.size(), scene.storage_size());
+    require_size(of_scene + "the start v", start.v.size(), scene.dimension());
+    const auto l = scene.lagrangian ? scene.lagrangian
+                                    : lagrangian_from(scene.hamiltonian, start.time, start.q, start.v);
+    start.p.setZero(scene.dimension());
+    l->gradient(start.time, start.q, start.v, unused, start.p);
+    return start;
+  }
+  require_size(of_scene + "the start q", start.q.size(), scene.storage_size());
+  require_size(of_scene + "the start p", start.p.size(), scene.dimension());
+  start.v.setZero(scene.dimension());
+  scene.hamiltonian->gradient(start.time, start.q, start.p, unused, start.v);
+  return start;
+}
+
+}  // namespace
+
 Start completed_start(const Scene& scene, Start start) {
+  if (scene.by_hamiltonian()) return completed_by_hamiltonian(scene, std::move(start));
   if (start.v.size() > 0) return start;
   if (scene.lagrangian && scene.lagrangian->structure().y_hessian_zero) {
     start.v = Vector::Zero(scene.dimension());
@@ -88,17 +133,43 @@ std::shared_ptr<const Scene> completed(std::shared_ptr<const Scene> scene) {
   if (!scene) throw Misuse("no scene was given");
   require_well_formed(*scene);
   const Start start = completed_start(*scene, scene->start);
-  if (scene->lagrangian && start.v.size() == scene->start.v.size()) return scene;
-  auto complete = std::make_shared<Scene>(*scene);
-  complete->start = start;
-  if (!scene->lagrangian) {
-    const std::string prefix = "scene '" + scene->name + "': ";
-    const Vector& p = scene->start.v.size() == 0 ? start.p : start.v;  // regularity is tested there
-    require_size(prefix + "the start q", start.q.size(), scene->storage_size());
-    require_size(prefix + "the start v", p.size(), scene->dimension());
-    complete->lagrangian = lagrangian_from(scene->hamiltonian, start.time, start.q, p);
-  }
-  return complete;
+  const bool complete = start.v.size() == scene->start.v.size() && start.p.size() == scene->start.p.size();
+  if (scene->lagrangian && complete) return scene;
+  auto copy = std::make_shared<Scene>(*scene);
+  copy->start = start;
+  if (scene->lagrangian) return copy;
+  const std::string prefix = "scene '" + scene->name + "': ";
+  require_size(prefix + "the start q", start.q.size(), scene->storage_size());
+  require_size(prefix + "the start p", start.p.size(), scene->dimension());
+  copy->lagrangian_derived =
+      directions_linear_in_p(*scene->hamiltonian, start.time, start.q, start.p).cols() == 0;
+  if (copy->lagrangian_derived)
+    copy->lagrangian = lagrangian_from(scene->hamiltonian, start.time, start.q, start.p);
+  return copy;
+}
+
+std::shared_ptr<const Lagrangian> lagrangian_of(const Scene& scene) {
+  if (scene.lagrangian) return scene.lagrangian;
+  const Start start = completed_start(scene, scene.start);
+  const Columns directions = directions_linear_in_p(*scene.hamiltonian, start.time, start.q, start.p);
+  if (directions.cols() == 0) return lagrangian_from(scene.hamiltonian, start.time, start.q, start.p);
+  std::string along;
+  for (Eigen::Index k = 0; k < directions.cols(); ++k)
+    along += (k == 0 ? "'" : ", '") + motion_along(scene, directions.col(k)) + "'";
+  throw Misuse("scene '" + scene.name +
+               "': the Hamiltonian is degenerate: at the start ∂²H/∂p² is singular " +
+               "along the momenta of " + along +
+               ", so it has no Lagrangian, which this needs; typeN/gl:S, type1/midpoint, type2/euler and "
+               "type3/euler step it as it is");
+}
+
+std::shared_ptr<const Scene> with_lagrangian(const Scene& scene) {
+  const auto complete = completed(std::make_shared<const Scene>(scene));
+  if (!complete->by_hamiltonian()) return complete;
+  auto copy = std::make_shared<Scene>(*complete);
+  copy->lagrangian = lagrangian_of(*complete);
+  copy->lagrangian_derived = false;
+  return copy;
 }
 
 std::shared_ptr<const Hamiltonian> hamiltonian_of(const Scene& scene) {

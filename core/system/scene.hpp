@@ -18,7 +18,7 @@ struct Start {
   double time = 0.0;
   Vector q;       ///< Scene::storage_size() numbers
   Vector v;       ///< Scene::dimension() numbers, like p
-  Vector p = {};  ///< used where v is empty
+  Vector p = {};  ///< used where v is empty, and always where the scene is given by a Hamiltonian alone
 };
 
 /// A continuous system: (L, Δ_Q) or (H, Δ_Q), or both, and a start.
@@ -27,11 +27,16 @@ struct Start {
 ///   q̇ = ∂H/∂p ∈ Δ_Q(q),            ṗ + ∂H/∂q − f ∈ Δ°_Q(q)      Leok and Ohsawa (4.11)
 ///
 /// with an external force f beyond the paper.
+///
+/// A Hamiltonian alone needs no Lagrangian: it may be degenerate, as H = p0 q1 − p1 q0 or that of point
+/// vortices is, and ∂²H/∂p² need not be invertible; what the rows ask of it is that A ∂²H/∂p² Aᵀ is.
 struct Scene {
   std::string name;
   std::vector<std::string> coordinates;
   std::shared_ptr<const Lagrangian> lagrangian;
   std::shared_ptr<const Hamiltonian> hamiltonian;
+  /// The Lagrangian is no datum: completed() derived it from the Hamiltonian.
+  bool lagrangian_derived = false;
   ConstraintBlocks constraints;
   std::shared_ptr<const Force> force;  ///< null where there is none
   Start start;
@@ -53,8 +58,19 @@ struct Scene {
   int rows() const { return row_count(constraints); }
   std::vector<std::string> row_names() const;
 
+  /// Given by a Hamiltonian alone: steps are taken and points are read by H, and momenta are data.
+  bool by_hamiltonian() const { return hamiltonian && (!lagrangian || lagrangian_derived); }
+  /// What is stepped: H(t,q,p) of such a scene, L(t,q,v) of others.
+  const PhaseFunction& stepped_function() const;
+
   /// v·∂L/∂v − L.
   double energy(double t, ConstVectorRef q, ConstVectorRef v) const;
+  /// The energy at a start that is complete: H(q,p) where the scene is given by a Hamiltonian alone.
+  double energy(const Start& at) const;
+
+  /// ∂L/∂q and ∂L/∂v at a point of a motion: −∂H/∂q and p where the scene is given by a Hamiltonian alone.
+  void force_and_momentum(double t, ConstVectorRef q, ConstVectorRef v, ConstVectorRef p, VectorRef lq,
+                          VectorRef momentum) const;
 };
 
 /// Throws Misuse where sizes disagree or a part is missing.
@@ -62,13 +78,23 @@ void require_well_formed(const Scene& scene);
 
 /// The start with its velocity: itself where v is given; else v = ∂H/∂p with the scene's Hamiltonian or that
 /// of its Lagrangian, and v = 0 where the Lagrangian is linear in v, so that the motion has but one velocity
-/// at each q.  Everything that takes a Start completes it by this.  Throws Misuse for q or p of the wrong
-/// size, and where the Lagrangian is degenerate in another way.
+/// at each q.  Of a scene given by a Hamiltonian alone p and v = ∂H/∂p, with p from v where v alone is given.
+/// Everything that takes a Start completes it by this.  Throws Misuse for q, v or p of the wrong size, and
+/// where the function that is to be inverted is degenerate.
 Start completed_start(const Scene& scene, Start start);
 
-/// The scene itself if it has a Lagrangian and a starting velocity; else a copy with both derived from its
-/// Hamiltonian.  Throws Misuse where it is not well formed or the Hamiltonian is degenerate.
+/// The scene itself if it has a Lagrangian and a starting velocity; else a copy with its start complete, and
+/// with the Lagrangian of its Hamiltonian where that is regular in p at the start.  Throws Misuse where it is
+/// not well formed.
 std::shared_ptr<const Scene> completed(std::shared_ptr<const Scene> scene);
+
+/// The Lagrangian of a scene that was completed.  Throws Misuse where there is none, since the Hamiltonian is
+/// degenerate, with the momenta along which it is linear.
+std::shared_ptr<const Lagrangian> lagrangian_of(const Scene& scene);
+
+/// A completed copy that is stepped and read by its Lagrangian, or by the one of its Hamiltonian.  Throws
+/// Misuse as lagrangian_of() does.
+std::shared_ptr<const Scene> with_lagrangian(const Scene& scene);
 
 /// The scene's Hamiltonian, or the one derived from its Lagrangian.  Throws Misuse where that is degenerate.
 std::shared_ptr<const Hamiltonian> hamiltonian_of(const Scene& scene);

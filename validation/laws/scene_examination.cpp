@@ -102,6 +102,8 @@ constexpr const char* reading_of_velocities = "velocities from momenta";
 
 std::string why_velocities(const Integrator& integrator) {
   const Scene& scene = integrator.scene();
+  if (scene.by_hamiltonian())
+    return scene.rows() == 0 ? "v = ∂H/∂p: nothing is inverted" : "A ∂²H/∂p² Aᵀ is regular";
   if (scene.lagrangian->structure().phase_space())
     return "L is linear in v: the velocity follows from the position, not from the momentum";
   if (scene.lagrangian->structure().y_hessian_zero) return "L holds no v: the rows determine the velocity";
@@ -165,6 +167,8 @@ std::vector<std::string> advise(const CatalogueScene& entry, const Examination& 
       scene.lagrangian ? scene.lagrangian->structure() : scene.hamiltonian->structure();
   if (structure.quadratic && scene.constraints.empty() && !scene.force)
     advice.emplace_back("linear: every step has the same Jacobian");
+  else if (structure.separable && scene.by_hamiltonian() && scene.constraints.empty() && !scene.force)
+    advice.emplace_back("separable: type2/euler is explicit and cheap where nothing is stiff");
   else if (structure.separable && structure.y_hessian_constant && scene.constraints.empty() && !scene.force)
     advice.emplace_back("separable: type1/trapezoidal is explicit and cheap where nothing is stiff");
   const DefaultMethod choice = default_method(scene, {.order = entry.recommended.order});

@@ -157,7 +157,7 @@ class ExplicitIntegration {
 }  // namespace
 
 ReferenceRun integrate_explicitly(const Scene& given, double t_end, const ReferenceOptions& options) {
-  const auto scene = with_hidden_rows(completed(std::make_shared<const Scene>(given)));
+  const auto scene = with_hidden_rows(with_lagrangian(given));
   require_reference("ARKODE", *scene, t_end, options);
   return ExplicitIntegration(*scene, options).run(t_end);
 }

@@ -369,7 +369,7 @@ class IdaIntegration {
 }  // namespace
 
 std::vector<DaeFormulation> formulations_of(const Scene& given) {
-  const auto scene = with_hidden_rows(completed(std::make_shared<const Scene>(given)));
+  const auto scene = with_hidden_rows(with_lagrangian(given));
   if (scene->rows() == 0) return {DaeFormulation::rates};
   const bool holonomic =
       std::ranges::any_of(scene->constraints, [](const auto& rows) { return rows->holonomic(); });
@@ -378,7 +378,7 @@ std::vector<DaeFormulation> formulations_of(const Scene& given) {
 }
 
 ReferenceRun integrate_with_ida(const Scene& given, double t_end, const ReferenceOptions& options) {
-  const auto scene = with_hidden_rows(completed(std::make_shared<const Scene>(given)));
+  const auto scene = with_hidden_rows(with_lagrangian(given));
   require_reference("IDA", *scene, t_end, options);
   return IdaIntegration(*scene, options).run(t_end);
 }

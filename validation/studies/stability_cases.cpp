@@ -22,9 +22,7 @@ CatalogueScene changed(CatalogueScene entry, Change change) {
   return entry;
 }
 
-double start_energy(const Scene& scene) {
-  return scene.energy(scene.start.time, scene.start.q, scene.start.v);
-}
+double start_energy(const Scene& scene) { return scene.energy(scene.start); }
 
 Watch energy_watch(const std::shared_ptr<const Scene>& scene, double scale) {
   return {.name = "energy",
@@ -272,7 +270,7 @@ std::vector<StabilityCase> stability_cases(bool full) {
 }
 
 StabilityCase stability_case(const CatalogueScene& entry) {
-  const auto scene = completed(entry.scene);
+  const auto scene = with_lagrangian(*entry.scene);
   StabilityCase that{.group = scene->name, .value = 1.0, .name = scene->name, .scene = entry};
   that.step = entry.natural_step;
   that.t_end = entry.t_end;

@@ -60,7 +60,8 @@ struct ReferenceEnd {
   std::string how;
   double self_error = StudyRow::none;
   std::string missing;  ///< empty, or why there is no reference
-  Vector q, p;
+  Vector q;
+  Vector p;  ///< empty where velocities do not determine it: H is degenerate
 
   /// The larger of the relative errors in q and p.
   double distance(const Sample& end) const;

@@ -19,6 +19,8 @@ namespace diracstep {
 /// over 1e6 steps of 0.1: in one gauge the energy stays in its band, in another it drifts linearly, with
 /// GL(3) to 4.8e-7, and the midpoint step is lost.
 ///
+/// With rows or forces the order would drop to s or s + 1: first_order_step() takes those.
+///
 /// Throws Misuse unless L is known to be linear in v, has no rows and no force, and 1 ≤ s ≤ 20; and where the
 /// two-form dθ is singular at the start, with the coordinates whose velocities nothing determines.
 std::unique_ptr<StepProblem> phase_space_step(int s, const Scene& scene, bool dense);

@@ -132,7 +132,7 @@ class GaussLobattoStep final : public StepProblem {
       if (m_ > 0) rows_.front().set_gauss_known(true);
       return;
     }
-    sums_.momentum_rows(points_, momentum_, p0_, impulses_, f);
+    sums_.momentum_rows(points_, stage_columns(), p0_, f);
     for (StageRows& rows : rows_) rows.residual(points_, x, f);
   }
 
@@ -158,7 +158,7 @@ class GaussLobattoStep final : public StepProblem {
 
   void finish(ConstVectorRef x, StepEnd& end) override {
     evaluate(x);
-    sums_.end(points_, momentum_, p0_, impulses_, x, end);
+    sums_.end(points_, stage_columns(), p0_, x, end);
     end.at.v = (end.at.q - points_.lobatto.col(0)) / step_size();
     // The impulse at q0 is that part of λ_0 which enters there.
     end.impulse = points_.weights.table.lobatto_b[0] * x.segment(n_ * s_, m_);
@@ -172,6 +172,8 @@ class GaussLobattoStep final : public StepProblem {
     evaluated_ = true;
     if (m_ > 0) rows_.front().set_gauss_known(true);
   }
+
+  StageColumns stage_columns() const { return {momentum_.momenta(), momentum_.forces(), impulses_}; }
 
   StageArrays arrays() {
     StageArrays arrays{};

@@ -34,43 +34,43 @@ void StepSums::move(StagePoints& points, ConstVectorRef x) {
   });
 }
 
-void StepSums::momentum_rows(const StagePoints& points, const StageMomentum& momentum, const Vector& p0,
-                             const Columns& impulses, VectorRef& f) {
+void StepSums::momentum_rows(const StagePoints& points, const StageColumns& stages, const Vector& p0,
+                             VectorRef& f) {
   if (compensated_) {
     for (int i = 0; i < s_; ++i)
-      compensated_->momentum_row(i, points.step.size, momentum.momenta().col(i), p0, momentum.forces(),
-                                 impulses, f.segment(n_ * i, n_));
+      compensated_->momentum_row(i, points.step.size, stages.momenta.col(i), p0, stages.forces,
+                                 stages.impulses, f.segment(n_ * i, n_));
     return;
   }
   if (sum_ == nullptr) {
     for (int i = 0; i < s_; ++i)
-      long_momentum_row(points, momentum, p0, impulses, i, f.data() + static_cast<long>(n_) * i);
+      long_momentum_row(points, stages, p0, i, f.data() + static_cast<long>(n_) * i);
     return;
   }
   double* const rows = f.data();
-  const double* lv = momentum.momenta().data();
+  const double* lv = stages.momenta.data();
   for (int i = 0; i < s_; ++i)
     for (int k = 0; k < n_; ++k) rows[n_ * i + k] = *lv++ - p0[k];
-  sum_(momentum.forces().data(), points.weights.force.data(), rows, n_, rows);
-  if (m_ > 0) sum_(impulses.data(), points.weights.impulse.data(), rows, n_, rows);
+  sum_(stages.forces.data(), points.weights.force.data(), rows, n_, rows);
+  if (m_ > 0) sum_(stages.impulses.data(), points.weights.impulse.data(), rows, n_, rows);
 }
 
-void StepSums::long_momentum_row(const StagePoints& points, const StageMomentum& momentum, const Vector& p0,
-                                 const Columns& impulses, int i, double* row) const {
-  const auto lv = momentum.momenta().col(i);
+void StepSums::long_momentum_row(const StagePoints& points, const StageColumns& stages, const Vector& p0,
+                                 int i, double* row) const {
+  const auto lv = stages.momenta.col(i);
   const StageWeights& weights = points.weights;
   for_each_piece(n_, [&](int first, int rows) {
     for (int k = first; k < first + rows; ++k) row[k] = lv[k] - p0[k];
-    combine_piece(first, rows, n_, s_, &weights.force(0, i), momentum.forces().data(), row, row);
-    if (m_ > 0) combine_piece(first, rows, n_, s_, &weights.impulse(0, i), impulses.data(), row, row);
+    combine_piece(first, rows, n_, s_, &weights.force(0, i), stages.forces.data(), row, row);
+    if (m_ > 0) combine_piece(first, rows, n_, s_, &weights.impulse(0, i), stages.impulses.data(), row, row);
   });
 }
 
-void StepSums::end(const StagePoints& points, const StageMomentum& momentum, const Vector& p0,
-                   const Columns& impulses, ConstVectorRef x, StepEnd& end) {
+void StepSums::end(const StagePoints& points, const StageColumns& stages, const Vector& p0, ConstVectorRef x,
+                   StepEnd& end) {
   const auto q0 = points.lobatto.col(0);
   if (compensated_)
-    return compensated_->end(points.step.size, q0, p0, velocities(x), momentum.forces(), impulses, end);
+    return compensated_->end(points.step.size, q0, p0, velocities(x), stages.forces, stages.impulses, end);
   const StageWeights& weights = points.weights;
   end.at.q.resize(n_);
   end.at.p.resize(n_);
@@ -79,8 +79,9 @@ void StepSums::end(const StagePoints& points, const StageMomentum& momentum, con
   for_each_piece(n_, [&](int first, int rows) {
     if (m_ == 0)  // nothing else looks there
       combine_piece(first, rows, n_, s_, &weights.lobatto(0, s_), x.data(), q0.data(), end.at.q.data());
-    combine_piece(first, rows, n_, s_, weights.end_force.data(), momentum.forces().data(), p0.data(), p1);
-    if (m_ > 0) combine_piece(first, rows, n_, s_, weights.table.lobatto_b.data(), impulses.data(), p1, p1);
+    combine_piece(first, rows, n_, s_, weights.end_force.data(), stages.forces.data(), p0.data(), p1);
+    if (m_ > 0)
+      combine_piece(first, rows, n_, s_, weights.table.lobatto_b.data(), stages.impulses.data(), p1, p1);
   });
 }
 

@@ -11,6 +11,7 @@
 #include <diracstep/core/steps/gauss_lobatto/tableau.hpp>
 #include <diracstep/core/steps/radau/rows.hpp>
 #include <diracstep/core/steps/radau/step.hpp>
+#include <diracstep/core/system/first_order_motions.hpp>
 #include <diracstep/core/system/length_of_rows.hpp>
 
 namespace diracstep {
@@ -245,11 +246,12 @@ const double* RadauStep::scales_of_unsolved_rows(ConstVectorRef f, double level)
 }  // namespace
 
 std::unique_ptr<StepProblem> radau_step(int s, const Scene& scene, bool dense) {
-  if (scene.lagrangian->structure().phase_space()) {
-    if (scene.rows() > 0 || scene.force)
-      throw Misuse("scene '" + scene.name +
-                   "': rows and forces on a Lagrangian that is linear in v are not supported");
-    require_regular_two_form(scene);
+  if (!scene.lagrangian) (void)lagrangian_of(scene);  // throws
+  if (const FirstOrderMotions motions = first_order_motions(scene); motions.exist()) {
+    if (scene.rows() == 0 && !scene.force && motions.u.cols() == 0)
+      require_regular_two_form(scene);
+    else
+      require_determined(scene, motions);
   }
   return std::make_unique<RadauStep>(s, scene, dense);
 }

@@ -30,8 +30,8 @@ namespace diracstep {
 ///
 /// The impulse at q0 is zero: p0 is the momentum of a velocity of the distribution.
 ///
-/// Throws Misuse unless 1 ≤ s ≤ 5, and for rows or a force on a Lagrangian that is linear in v, or a two-form
-/// dθ that is singular at the start of one.
+/// Throws Misuse unless 1 ≤ s ≤ 5, where there is no Lagrangian, and for a two-form dθ, or equations of
+/// motions of first order (first_order_motions.hpp), that do not determine velocities at the start.
 std::unique_ptr<StepProblem> radau_step(int s, const Scene& scene, bool dense);
 
 }  // namespace diracstep

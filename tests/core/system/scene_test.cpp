@@ -185,13 +185,24 @@ TEST(Scene, MomentumStartOffTheDistributionIsRefused) {
   expect_refused(scene, [](Scene& s) { s.start.p[0] = 0.0; }, {"row 'slope'", "A v + b = -0.75"});
 }
 
-TEST(Scene, DegenerateHamiltonianIsRefused) {
-  expect_refused(hamiltonian_scene(),
-                 [](Scene& s) {
-                   s.hamiltonian =
-                       hamiltonian<2>([](const auto& q, const auto& p) { return p[0] * p[0] + q[1]; });
-                 },
-                 {"the Hamiltonian is degenerate"});
+TEST(Scene, DegenerateHamiltonianHasNoLagrangian) {
+  Scene scene = hamiltonian_scene();
+  scene.hamiltonian = hamiltonian<2>([](const auto& q, const auto& p) { return p[0] * p[0] + q[1] * p[1]; });
+  const auto complete = completed(std::make_shared<const Scene>(scene));
+  EXPECT_EQ(complete->lagrangian, nullptr);
+  EXPECT_LT((complete->start.v - Vector{{1.0, 1.0}}).norm(), 1e-15);
+  EXPECT_TRUE(complete->by_hamiltonian());
+  testing::expect_misuse([&] { (void)lagrangian_of(*complete); },
+                         {"'from H'", "degenerate", "along the momenta of 'y'"});
+}
+
+TEST(Scene, RegularHamiltonianGetsItsLagrangianButIsSteppedByItself) {
+  const auto complete = completed(std::make_shared<const Scene>(hamiltonian_scene()));
+  EXPECT_TRUE(complete->by_hamiltonian());
+  EXPECT_EQ(&complete->stepped_function(), complete->hamiltonian.get());
+  EXPECT_FALSE(with_lagrangian(*complete)->by_hamiltonian());
+  EXPECT_NEAR(complete->energy(complete->start), complete->energy(0.0, complete->start.q, complete->start.v),
+              1e-13);
 }
 
 }  // namespace

@@ -29,7 +29,8 @@ TEST_P(OwnScenes, MeetTheirClosedForms) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Examples, OwnScenes,
-                         ::testing::Values("trammel", "coin_on_incline", "rlc_circuit", "vortex_ring"),
+                         ::testing::Values("trammel", "coin_on_incline", "rlc_circuit", "vortex_ring",
+                                           "relativistic_charge", "canonical_vortices", "turning_skate"),
                          [](const auto& of) { return of.param; });
 
 /// Every key of the format stands in the schema for editors, and no other.

@@ -1,0 +1,249 @@
+#include <Eigen/LU>
+#include <Eigen/QR>
+#include <Eigen/SparseCholesky>
+#include <algorithm>
+#include <cmath>
+#include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/numerics/scales.hpp>
+#include <diracstep/core/system/first_order_motions.hpp>
+#include <diracstep/core/system/rows_along_motions.hpp>
+#include <utility>
+
+namespace diracstep {
+
+namespace {
+
+constexpr int most_coordinates_of_first_order = 1500;  // matrices are full
+
+Columns kernel_of(const Columns& matrix) {
+  Eigen::FullPivLU<Columns> lu;
+  lu.setThreshold(1e-13);
+  lu.compute(matrix);
+  return lu.dimensionOfKernel() == 0 ? Columns(matrix.cols(), 0) : Columns(lu.kernel());
+}
+
+Columns stack(const Columns& upper, const Columns& lower) {
+  Columns both(upper.rows() + lower.rows(), upper.cols());
+  both << upper, lower;
+  return both;
+}
+
+/// ∂²L/∂v² and ∂²L/∂v∂q, and the rows, at the start and at a point near it that shares no special position.
+struct AtTwoPoints {
+  explicit AtTwoPoints(const Scene& scene) {
+    const Lagrangian& lagrangian = *scene.lagrangian;
+    const Start& start = scene.start;
+    LagrangianDerivatives l(lagrangian);
+    Vector q = start.q, v = start.v;
+    double t = start.time;
+    for (const int k : {0, 1}) {
+      l.take_second(lagrangian, t, q, v);
+      ConstraintsAtPoint rows(scene.constraints, scene.dimension());
+      rows.evaluate(t, q);
+      const Columns mass_here = lagrangian.pattern().full(l.vv),
+                    by_q_here = lagrangian.pattern().full(l.qv).transpose(),
+                    rows_here = rows.pattern().full(rows.coefficients());
+      mass = k == 0 ? mass_here : stack(mass, mass_here);
+      by_q = k == 0 ? by_q_here : stack(by_q, by_q_here);
+      one_forms = k == 0 ? rows_here : stack(one_forms, rows_here);
+      t += 0.37;
+      for (Eigen::Index i = 0; i < q.size(); ++i) {
+        q[i] += 1e-2 * size_or_one(max_norm(start.q)) * std::sin(1.0 + 1.7 * static_cast<double>(i));
+        v[i] += 0.3 * size_or_one(max_norm(start.v)) * std::cos(0.3 + 2.3 * static_cast<double>(i));
+      }
+    }
+  }
+  bool finite() const { return mass.allFinite() && by_q.allFinite() && one_forms.allFinite(); }
+
+  Columns mass, by_q, one_forms;
+};
+
+}  // namespace
+
+bool positive_definite(const Lagrangian& lagrangian, const Start& start) {
+  const SparsityPattern& pattern = lagrangian.pattern();
+  LagrangianDerivatives l(lagrangian);
+  l.take_second(lagrangian, start.time, start.q, start.v);
+  const int n = pattern.rows();
+  const Eigen::Map<const Eigen::SparseMatrix<double>> mass(
+      n, n, pattern.nonzeros(), pattern.column_starts().data(), pattern.row_indices().data(), l.vv.data());
+  Vector size(n);
+  for (int i = 0; i < n; ++i) size[i] = mass.coeff(i, i);
+  if (!(size.minCoeff() > 0.0)) return false;
+  size = size.cwiseSqrt().cwiseInverse();
+  const Eigen::SparseMatrix<double> scaled = size.asDiagonal() * mass * size.asDiagonal();
+  const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factors(scaled);
+  return factors.info() == Eigen::Success && factors.vectorD().minCoeff() > 1e-12;
+}
+
+FirstOrderMotions first_order_motions(const Scene& scene) {
+  const int n = scene.dimension();
+  if (scene.by_hamiltonian()) return {};
+  const PhaseStructure& structure = scene.lagrangian->structure();
+  if (structure.phase_space()) return {Columns::Identity(n, n), Columns(n, 0)};
+  const Start& start = scene.start;
+  const bool sized = start.q.size() == scene.storage_size() && start.v.size() == n;
+  if (structure.separable || n > most_coordinates_of_first_order || !sized || !start.q.allFinite() ||
+      !start.v.allFinite() || positive_definite(*scene.lagrangian, start))
+    return {};
+  const AtTwoPoints at(scene);
+  if (!at.finite()) return {};
+  const Columns w = kernel_of(at.mass), free = kernel_of(stack(at.mass, at.one_forms));
+  if (free.cols() == 0) return {};
+  const Columns reached = at.by_q.topRows(n).transpose() * free;  // momenta along `free` by positions
+  if (max_norm(reached) <= 1e-12 * size_or_one(max_norm(at.by_q))) return {};
+  const Eigen::HouseholderQR<Columns> qr(w);
+  const Columns q = qr.householderQ() * Columns::Identity(n, n);
+  return {w, q.rightCols(n - w.cols())};
+}
+
+FirstOrderPoint::FirstOrderPoint(const Scene& scene, FirstOrderMotions motions)
+    : scene_(scene),
+      motions_(std::move(motions)),
+      constraints_(scene.constraints, scene.dimension()),
+      l_(*scene.lagrangian),
+      f_(Vector::Zero(scene.dimension())),
+      rate_(f_),
+      row_residual_(Vector::Zero(scene.rows())) {}
+
+void FirstOrderPoint::evaluate(double t, ConstVectorRef q, ConstVectorRef v, ConstVectorRef lambda) {
+  t_ = t;
+  q_ = q;
+  v_ = v;
+  lambda_ = lambda;
+  l_.take_first(*scene_.lagrangian, t, q, v);
+  l_.take_second(*scene_.lagrangian, t, q, v);
+  scene_.lagrangian->gradient_rate(t, q, v, rate_);
+  scene_.lagrangian->pattern().transposed_multiply_add(l_.qv.data(), v_.data(), rate_.data());
+  force_ = l_.q;
+  if (scene_.force) {
+    scene_.force->value(t, q, v, f_);
+    force_ += f_;
+  }
+  if (scene_.rows() == 0) return;
+  constraints_.evaluate(t, q);
+  constraints_.add_annihilator(lambda, force_);
+  constraints_.velocity_residual(v, row_residual_);
+}
+
+void FirstOrderPoint::differentiate() {
+  const Lagrangian& lagrangian = *scene_.lagrangian;
+  const SparsityPattern& pattern = lagrangian.pattern();
+  mass_ = pattern.full(l_.vv);
+  by_q_ = pattern.full(l_.qv).transpose();
+  force_by_q_ = pattern.full(l_.qq);
+  force_by_v_ = pattern.full(l_.qv);
+  rate_by_q_.setZero(mass_.rows(), mass_.cols());
+  if (!lagrangian.structure().quadratic) {
+    const double width = 1e-5 * size_or_one(max_norm(q_)) / size_or_one(max_norm(v_));
+    LagrangianDerivatives before(lagrangian), after(lagrangian);
+    before.take_second(lagrangian, t_ - width, q_ - width * v_, v_);
+    after.take_second(lagrangian, t_ + width, q_ + width * v_, v_);
+    rate_by_q_ = pattern.full((after.qv - before.qv) / (2.0 * width)).transpose();
+  }
+  if (scene_.force) {
+    const SparsityPattern& of_force = scene_.force->pattern();
+    Vector fq(of_force.nonzeros()), fv = fq;
+    scene_.force->derivatives(t_, q_, v_, fq, fv);
+    force_by_q_ += of_force.full(fq);
+    force_by_v_ += of_force.full(fv);
+  }
+  a_ = constraints_.pattern().full(constraints_.coefficients());
+  Vector derivative(constraints_.pattern().nonzeros());
+  constraints_.distribution().derivative(t_, q_, v_, 1.0, derivative);
+  row_by_q_ = constraints_.pattern().full(derivative);
+  Eigen::Index row = 0;
+  for (const auto& block : scene_.constraints) {
+    Vector curvature(block->curvature_pattern().nonzeros());
+    block->annihilator_derivative(t_, q_, lambda_.segment(row, block->rows()), curvature);
+    force_by_q_ += block->curvature_pattern().full(curvature);
+    row += block->rows();
+  }
+}
+
+FirstOrderVelocityProblem::FirstOrderVelocityProblem(const Scene& scene, const FirstOrderMotions& motions)
+    : n_(scene.dimension()),
+      m_(scene.rows()),
+      point_(scene, motions),
+      pattern_(SparsityPattern::dense(n_ + m_, n_ + m_)) {
+  const auto inert = static_cast<int>(motions.u.cols());
+  if (inert > 0) blocks_.push_back({"momentum", inert});
+  blocks_.push_back({"force", n_ - inert});
+  if (m_ > 0) blocks_.push_back({"velocity", m_});
+}
+
+void FirstOrderVelocityProblem::begin(double t, ConstVectorRef q, ConstVectorRef p) {
+  t_ = t;
+  q_ = q;
+  p_ = p;
+  for (ResidualBlock& block : blocks_) block.scale = smallest_scale;
+}
+
+void FirstOrderVelocityProblem::residual(ConstVectorRef x, VectorRef f) {
+  point_.evaluate(t_, q_, x.head(n_), x.tail(m_));
+  const auto& [w, u] = point_.motions();
+  f.head(u.cols()) = u.transpose() * (point_.momentum() - p_);
+  f.segment(u.cols(), w.cols()) = w.transpose() * (point_.momentum_rate() - point_.force());
+  f.tail(m_) = point_.row_residual();
+  std::size_t b = 0;
+  const auto raise = [&](double terms) {
+    blocks_[b].scale = std::max(blocks_[b].scale, scale_of(terms));
+    ++b;
+  };
+  if (u.cols() > 0) raise(std::max(max_norm(p_), max_norm(point_.momentum())));
+  raise(std::max(max_norm(point_.momentum_rate()), max_norm(point_.force())));
+  if (m_ > 0) raise(max_norm(x.head(n_)));
+}
+
+void FirstOrderVelocityProblem::jacobian(ConstVectorRef x, VectorRef values) {
+  point_.evaluate(t_, q_, x.head(n_), x.tail(m_));
+  point_.differentiate();
+  const auto& [w, u] = point_.motions();
+  const Eigen::Index inert = u.cols();
+  auto j = values.reshaped(n_ + m_, n_ + m_);
+  j.setZero();
+  j.topLeftCorner(inert, n_) = u.transpose() * point_.mass();
+  j.block(inert, 0, w.cols(), n_) = w.transpose() * (point_.momentum_by_q() - point_.force_by_v());
+  j.block(inert, n_, w.cols(), m_) = -w.transpose() * point_.rows().transpose();
+  j.bottomLeftCorner(m_, n_) = point_.rows();
+}
+
+void require_determined(const Scene& scene, const FirstOrderMotions& motions) {
+  const int n = scene.dimension(), m = scene.rows();
+  const Start& start = scene.start;
+  if (start.q.size() != scene.storage_size() || start.v.size() != n) return;  // told by require_consistent
+  if (n + m > most_coordinates_of_first_order)
+    throw Misuse(
+        "scene '" + scene.name + "': rows and forces on motions of first order take full matrices, and " +
+        "it has more than " + std::to_string(most_coordinates_of_first_order) + " coordinates and rows");
+  FirstOrderVelocityProblem problem(scene, motions);
+  Vector x = Vector::Zero(n + m), values((n + m) * (n + m));
+  x.head(n) = start.v;
+  problem.begin(start.time, start.q, Vector::Zero(n));
+  problem.jacobian(x, values);
+  if (!values.allFinite()) return;  // the step says so itself
+  Columns matrix = values.reshaped(n + m, n + m);
+  for (Eigen::Index r = 0; r < matrix.rows(); ++r)
+    matrix.row(r) /= size_or_one(max_norm(matrix.row(r).transpose()));
+  const Columns open = kernel_of(matrix);
+  if (open.cols() == 0) return;
+  std::string velocities, forces;
+  for (Eigen::Index k = 0; k < open.cols(); ++k) {
+    Vector direction = open.col(k) / max_norm(open.col(k));
+    direction = (direction.array().abs() < 1e-10).select(0.0, direction);
+    const std::string along = motion_along(scene, direction.head(n));
+    if (!along.empty()) velocities += (velocities.empty() ? "'" : ", '") + along + "'";
+    for (int r = 0; r < m; ++r)
+      if (direction[n + r] != 0.0) forces += (forces.empty() ? "" : ", ") + row_label(scene.constraints, r);
+  }
+  std::string what = velocities.empty() ? "" : "the velocity along " + velocities;
+  if (!forces.empty()) what += (what.empty() ? "" : ", ") + std::string("the force of ") + forces;
+  throw Misuse("scene '" + scene.name +
+               "': its Lagrangian has motions of first order, whose equations together with the rows do not "
+               "determine at the start: " +
+               what +
+               "; rows are kept where they restrict velocities that these equations leave open, and of a "
+               "Hamiltonian (hamiltonian = …) also where they restrict positions alone");
+}
+
+}  // namespace diracstep

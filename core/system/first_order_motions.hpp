@@ -1,0 +1,97 @@
+#pragma once
+
+#include <diracstep/core/numerics/nonlinear_solver.hpp>
+#include <diracstep/core/system/constraint_distribution.hpp>
+#include <diracstep/core/system/lagrangian_derivatives.hpp>
+#include <diracstep/core/system/scene.hpp>
+#include <vector>
+
+namespace diracstep {
+
+/// The motions of first order of a Lagrangian: the columns of W span the constant kernel of ∂²L/∂v², and
+/// their momenta Wᵀ ∂L/∂v depend on positions, so that their equations of motion
+///
+///   Wᵀ[(∂²L/∂v∂q) v + ∂²L/∂v∂t − ∂L/∂q − f − AᵀΛ] = 0
+///
+/// hold velocities and no accelerations.  W = 1 for phase-space Lagrangians θ(t,q)·v − H(t,q), where they
+/// read (Dθ − Dθᵀ) v = −∇H − ∂θ/∂t + f + AᵀΛ; L = v_x²/2 + z v_y − V has y and z of first and x of second
+/// order. The columns of U span what is orthogonal to W: motions with inertia.
+struct FirstOrderMotions {
+  Columns w, u;
+
+  bool exist() const { return w.cols() > 0; }
+};
+
+/// Whether ∂²L/∂v² at the start is positive definite whatever the units of the coordinates: the cheap test that
+/// nearly every scene passes.
+bool positive_definite(const Lagrangian& lagrangian, const Start& start);
+
+/// None of these where all motions have inertia, and where momenta along W are constant, as in circuits,
+/// which hidden_rows.hpp deals with.
+FirstOrderMotions first_order_motions(const Scene& scene);
+
+/// A scene with motions of first order at one point: the derivatives of L, f and the rows there, as full
+/// matrices, and the equations that determine velocities and forces of rows,
+///
+///   Uᵀ(∂L/∂v − p) = 0,   Wᵀ[(∂²L/∂v∂q) v + ∂²L/∂v∂t − ∂L/∂q − f − AᵀΛ] = 0,   A v + b = 0.
+class FirstOrderPoint {
+ public:
+  FirstOrderPoint(const Scene& scene, FirstOrderMotions motions);
+
+  void evaluate(double t, ConstVectorRef q, ConstVectorRef v, ConstVectorRef lambda);
+  /// Second derivatives, after evaluate() at the same point.
+  void differentiate();
+
+  const Vector& momentum() const { return l_.v; }               ///< ∂L/∂v
+  const Vector& force() const { return force_; }                ///< ∂L/∂q + f + AᵀΛ
+  const Vector& momentum_rate() const { return rate_; }         ///< (∂²L/∂v∂q) v + ∂²L/∂v∂t
+  const Vector& row_residual() const { return row_residual_; }  ///< A v + b
+  const Columns& mass() const { return mass_; }                 ///< ∂²L/∂v²
+  const Columns& momentum_by_q() const { return by_q_; }        ///< ∂²L/∂v∂q
+  const Columns& rate_by_q() const {
+    return rate_by_q_;
+  }  ///< ∂ momentum_rate()/∂q; by a difference of second
+     ///< derivatives along the motion, where L is not quadratic
+  const Columns& force_by_q() const { return force_by_q_; }
+  const Columns& force_by_v() const { return force_by_v_; }
+  const Columns& rows() const { return a_; }             ///< A
+  const Columns& row_by_q() const { return row_by_q_; }  ///< ∂(A v + b)/∂q
+  const FirstOrderMotions& motions() const { return motions_; }
+
+ private:
+  const Scene& scene_;
+  FirstOrderMotions motions_;
+  ConstraintsAtPoint constraints_;
+  double t_ = 0.0;
+  LagrangianDerivatives l_;
+  Vector q_, v_, lambda_, f_, force_, rate_, row_residual_;
+  Columns mass_, by_q_, rate_by_q_, force_by_q_, force_by_v_, a_, row_by_q_;
+};
+
+/// Unknowns (v, Λ): the equations of FirstOrderPoint at given t, q, p.
+class FirstOrderVelocityProblem final : public NonlinearProblem {
+ public:
+  FirstOrderVelocityProblem(const Scene& scene, const FirstOrderMotions& motions);
+
+  int size() const override { return n_ + m_; }
+  const SparsityPattern& pattern() const override { return pattern_; }
+  std::span<const ResidualBlock> blocks() const override { return blocks_; }
+
+  void begin(double t, ConstVectorRef q, ConstVectorRef p);
+  void residual(ConstVectorRef x, VectorRef f) override;
+  void jacobian(ConstVectorRef x, VectorRef values) override;
+
+ private:
+  int n_, m_;
+  FirstOrderPoint point_;
+  SparsityPattern pattern_;
+  std::vector<ResidualBlock> blocks_;
+  double t_ = 0.0;
+  Vector q_, p_;
+};
+
+/// Throws Misuse where these equations do not determine (v, Λ) at the start, with the velocities and the
+/// forces of rows that they leave open.
+void require_determined(const Scene& scene, const FirstOrderMotions& motions);
+
+}  // namespace diracstep

@@ -1,0 +1,344 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <diracstep/constraints/holonomic.hpp>
+#include <diracstep/constraints/pfaffian.hpp>
+
+#include "differences.hpp"
+#include "extrapolation.hpp"
+#include "methods.hpp"
+#include "misuse.hpp"
+#include "stepping.hpp"
+
+namespace diracstep {
+namespace {
+
+using testing::distance;
+using testing::gl;
+using testing::LongMatrix;
+using testing::LongReal;
+using testing::LongVector;
+using testing::samples_of;
+
+template <class T>
+using Three = std::array<T, 3>;
+
+/// A scene and where its motion is at t = 1 by the reference: positions, and forces of the rows.
+struct Case {
+  std::shared_ptr<const Scene> scene;
+  Vector q, lambda;
+};
+
+/// Parts of L = θ(t,q)·v − H(q), whose two-form has rank 2 in three coordinates, and a force.
+struct OneForm {
+  template <class T>
+  Three<T> operator()(const Three<T>& q, const T& t) const {
+    using std::sin;
+    const auto& [x, y, z] = q;
+    return {-0.5 * y * (1.0 + 0.3 * x * x) + 0.2 * sin(z) * x + 0.1 * sin(t) * y, 0.5 * x + 0.1 * x * y * z,
+            0.3 * x * y + 0.1 * z * z};
+  }
+};
+struct Energy {
+  template <class T>
+  T operator()(const Three<T>& q) const {
+    using std::cos;
+    const auto& [x, y, z] = q;
+    return 0.5 * (x * x + 1.3 * y * y) + 0.2 * x * x * x * x + 0.3 * cos(z) * x + 0.4 * z * z;
+  }
+};
+struct Damping {
+  template <class T>
+  Three<T> operator()(const Three<T>& q, const Three<T>& v, const T& t) const {
+    using std::cos;
+    return {-0.1 * v[0] + 0.05 * q[1], -0.2 * v[1] * (1.0 + q[0]), -0.1 * v[2] + 0.1 * cos(t)};
+  }
+};
+struct NoForce {
+  template <class T>
+  Three<T> operator()(const Three<T>&, const Three<T>&, const T&) const {
+    return {T(0.0), T(0.0), T(0.0)};
+  }
+};
+
+/// Rows: A and b, and φ where they are holonomic.
+struct Moving {
+  static constexpr bool holonomic = false;
+  template <class T>
+  Three<T> form(const Three<T>& q, const T&) const {
+    using std::sin;
+    return {0.3 * q[1], 0.2 * sin(q[0] + q[2]), T(1.0)};
+  }
+  template <class T>
+  T offset(const Three<T>& q, const T& t) const {
+    using std::cos;
+    return -0.4 * cos(2.0 * t) + 0.1 * q[0];
+  }
+};
+struct Still {
+  static constexpr bool holonomic = false;
+  template <class T>
+  Three<T> form(const Three<T>& q, const T&) const {
+    return {0.2 * q[2], T(0.1), 1.0 + 0.1 * q[0] * q[0]};
+  }
+  template <class T>
+  T offset(const Three<T>&, const T&) const {
+    return T(0.0);
+  }
+};
+struct Surface {
+  static constexpr bool holonomic = true;
+  template <class T>
+  T position(const Three<T>& q, const T& t) const {
+    using std::sin;
+    return q[2] + 0.3 * q[0] * q[0] - 0.2 * sin(q[1]) - 0.5 * sin(t) - 0.3;
+  }
+  template <class T>
+  Three<T> form(const Three<T>& q, const T&) const {
+    using std::cos;
+    return {0.6 * q[0], -0.2 * cos(q[1]), T(1.0)};
+  }
+  template <class T>
+  T offset(const Three<T>&, const T& t) const {
+    using std::cos;
+    return -0.5 * cos(t);
+  }
+};
+struct Bowl {
+  static constexpr bool holonomic = true;
+  template <class T>
+  T position(const Three<T>& q, const T&) const {
+    return q[2] - 0.2 * q[0] * q[0] - 0.3 * q[1] * q[1] + 0.1 * q[2] * q[2];
+  }
+  template <class T>
+  Three<T> form(const Three<T>& q, const T&) const {
+    return {-0.4 * q[0], -0.6 * q[1], 1.0 + 0.2 * q[2]};
+  }
+  template <class T>
+  T offset(const Three<T>&, const T&) const {
+    return T(0.0);
+  }
+};
+
+Three<LongReal> three(const LongVector& q) { return {q[0], q[1], q[2]}; }
+LongVector column_of(const Three<LongReal>& q) { return LongVector{{q[0], q[1], q[2]}}; }
+
+/// (v, Λ) of (Dθ − Dθᵀ) v = −∇H − ∂θ/∂t + f + AᵀΛ, A v + b = 0.
+template <class Rows, class Push>
+LongVector reduced(LongReal t, const LongVector& q) {
+  const auto theta = [](const LongVector& at) {
+    return column_of(OneForm()(Three<LongReal>{at[0], at[1], at[2]}, at[3]));
+  };
+  LongVector qt(4);
+  qt << q, t;
+  const LongMatrix d = testing::long_jacobian(theta, qt);
+  const LongMatrix gradient = testing::long_jacobian(
+      [](const LongVector& at) { return LongVector::Constant(1, Energy()(three(at))); }, q);
+  const auto push = [&](const LongVector& v) { return column_of(Push()(three(q), three(v), t)); };
+  const LongVector rest = push(LongVector::Zero(3)), form = column_of(Rows().form(three(q), t));
+  LongMatrix system = LongMatrix::Zero(4, 4);
+  system.topLeftCorner(3, 3) = d.leftCols(3) - d.leftCols(3).transpose();
+  for (int j = 0; j < 3; ++j) system.col(j).head(3) -= push(LongVector::Unit(3, j)) - rest;
+  system.topRightCorner(3, 1) = -form;
+  system.bottomLeftCorner(1, 3) = form.transpose();
+  LongVector right(4);
+  right << -gradient.transpose() - d.col(3) + rest, -Rows().offset(three(q), t);
+  return system.fullPivLu().solve(right);
+}
+
+template <class Rows, class Push>
+Case phase_space_case(const std::string& name) {
+  Scene scene;
+  scene.name = name;
+  scene.coordinates = {"x", "y", "z"};
+  scene.lagrangian = lagrangian<3>([]<class T>(const Three<T>& q, const Three<T>& v, const T& t) {
+    const Three<T> theta = OneForm()(q, t);
+    return theta[0] * v[0] + theta[1] * v[1] + theta[2] * v[2] - Energy()(q);
+  });
+  if constexpr (Rows::holonomic)
+    scene.constraints = {holonomic<3, 1>(
+        []<class T>(const Three<T>& q, const T& t) { return std::array<T, 1>{Rows().position(q, t)}; },
+        {"row"})};
+  else
+    scene.constraints = {affine<3, 1>(
+        []<class T>(const Three<T>& q, const T& t) { return std::array<Three<T>, 1>{Rows().form(q, t)}; },
+        []<class T>(const Three<T>& q, const T& t) { return std::array<T, 1>{Rows().offset(q, t)}; },
+        {"row"})};
+  scene.force = force<3>(Push());
+  scene.start.q = Vector{{0.7, 0.4, 0.0}};
+  if constexpr (Rows::holonomic)
+    for (int k = 0; k < 60; ++k)
+      scene.start.q[2] -= Rows().position(Three<double>{0.7, 0.4, scene.start.q[2]}, 0.0);
+  const LongVector end = testing::extrapolated(
+      [](LongReal t, const LongVector& q) { return LongVector(reduced<Rows, Push>(t, q).head(3)); },
+      scene.start.q.cast<LongReal>(), 1.0L);
+  const LongVector last = reduced<Rows, Push>(1.0L, end);
+  return {std::make_shared<const Scene>(scene), end.cast<double>(), last.tail(1).cast<double>()};
+}
+
+/// L = v_x²/2 + z v_y − V: x of second order, y and z of first.
+template <class T>
+T mixed_potential(const T& x, const T& y, const T& z) {
+  return 0.5 * x * x + 0.4 * y * y + 0.5 * z * z + 0.3 * x * y + 0.2 * x * x * z;
+}
+
+Case mixed_order() {
+  Scene scene;
+  scene.name = "mixed order";
+  scene.coordinates = {"x", "y", "z"};
+  scene.lagrangian = lagrangian<3>([](const auto& q, const auto& v) {
+    return 0.5 * v[0] * v[0] + q[2] * v[1] - mixed_potential(q[0], q[1], q[2]);
+  });
+  scene.start = {0.0, Vector{{0.5, 0.3, -0.2}}, Vector{{0.4, 0.0, 0.0}}};
+  const LongVector end = testing::extrapolated(
+      [](LongReal, const LongVector& s) {
+        const LongReal x = s[0], y = s[1], z = s[2];
+        return LongVector{{s[3], z + 0.2L * x * x, -0.8L * y - 0.3L * x, -x - 0.3L * y - 0.4L * x * z}};
+      },
+      LongVector{{0.5L, 0.3L, -0.2L, 0.4L}}, 1.0L);
+  return {std::make_shared<const Scene>(scene), end.head(3).cast<double>(), {}};
+}
+
+/// L = (1 + y²/5) v_x²/2 + (z + 3x²/10 + sin t/5) v_y − V with damping and a clock w, v_w = 1 + x/2, that
+/// pushes x.
+Case mixed_order_with_row() {
+  Scene scene;
+  scene.name = "mixed order with a row";
+  scene.coordinates = {"x", "y", "z", "w"};
+  scene.lagrangian =
+      lagrangian<4>([]<class T>(const std::array<T, 4>& q, const std::array<T, 4>& v, const T& t) {
+        using std::cos, std::sin;
+        return 0.5 * (1.0 + 0.2 * q[1] * q[1]) * v[0] * v[0] +
+               (q[2] + 0.3 * q[0] * q[0] + 0.2 * sin(t)) * v[1] - mixed_potential(q[0], q[1], q[2]) +
+               0.1 * q[0] * sin(q[3]);
+      });
+  scene.constraints = {affine<4, 1>(
+      []<class T>(const std::array<T, 4>&) {
+        return std::array<std::array<T, 4>, 1>{{{T(0.0), T(0.0), T(0.0), T(1.0)}}};
+      },
+      []<class T>(const std::array<T, 4>& q) { return std::array<T, 1>{-1.0 - 0.5 * q[0]}; }, {"clock"})};
+  scene.force = force<4>([]<class T>(const std::array<T, 4>&, const std::array<T, 4>& v) {
+    return std::array<T, 4>{-0.3 * v[0], -0.2 * v[1], -0.1 * v[2], T(0.0)};
+  });
+  scene.start = {0.0, Vector{{0.5, 0.3, -0.2, 0.1}}, Vector{{0.4, 0.0, 0.0, 1.25}}};
+  // State (x, y, z, w, p_x); of y and z: ż + 0.6 x u + cos t/5 = 0.2 y u² − V_y − 0.2 ẏ, 0 = ẏ − V_z − 0.1 ż.
+  const LongVector end = testing::extrapolated(
+      [](LongReal t, const LongVector& s) {
+        const LongReal x = s[0], y = s[1], z = s[2], u = s[4] / (1 + 0.2L * y * y);
+        const LongReal by_y = 0.2L * y * u * u - (0.8L * y + 0.3L * x) - 0.6L * x * u - 0.2L * std::cos(t),
+                       by_z = z + 0.2L * x * x;
+        // ż + 0.2 ẏ = by_y,  ẏ − 0.1 ż = by_z
+        const LongReal rate_z = (by_y - 0.2L * by_z) / 1.02L, rate_y = by_z + 0.1L * rate_z;
+        const LongReal push =
+            0.6L * x * rate_y - x - 0.3L * y - 0.4L * x * z + 0.1L * std::sin(s[3]) - 0.3L * u;
+        return LongVector{{u, rate_y, rate_z, 1 + 0.5L * x, push}};
+      },
+      LongVector{{0.5L, 0.3L, -0.2L, 0.1L, 0.4L * (1 + 0.2L * 0.09L)}}, 1.0L);
+  const double x = static_cast<double>(end[0]), w = static_cast<double>(end[3]);
+  return {std::make_shared<const Scene>(scene), end.head(4).cast<double>(), Vector{{-0.1 * x * std::cos(w)}}};
+}
+
+const std::vector<Case>& every_case() {
+  static const std::vector<Case> cases{phase_space_case<Moving, Damping>("nonholonomic, forced"),
+                                       phase_space_case<Still, NoForce>("nonholonomic"),
+                                       phase_space_case<Surface, Damping>("holonomic, forced"),
+                                       phase_space_case<Bowl, NoForce>("holonomic"),
+                                       mixed_order(),
+                                       mixed_order_with_row()};
+  return cases;
+}
+
+Sample end_of_case(const Case& that, const std::string& method, long steps) {
+  return samples_of(that.scene, {.method = method, .step = 1.0 / static_cast<double>(steps)}, steps,
+                    Momentum::projected, Registry::with_built_ins(), steps)
+      .back();
+}
+
+double error_of(const Case& that, const std::string& method, long steps) {
+  const Sample end = end_of_case(that, method, steps);
+  const double error = distance(end.q, that.q);
+  return that.lambda.size() == 0 ? error : std::max(error, distance(end.lambda, that.lambda));
+}
+
+TEST(FirstOrderStep, OrderIsTwiceTheStagesInPositionsAndForcesOfRows) {
+  for (const Case& that : every_case())
+    for (const auto& [s, steps] : {std::pair{1, 40L}, {2, 10L}, {3, 6L}}) {
+      const double first = error_of(that, gl(s), steps), second = error_of(that, gl(s), 2 * steps);
+      EXPECT_GT(second, 1e-13) << that.scene->name << ": at round-off, nothing is measured";
+      EXPECT_NEAR(std::log2(first / second), 2.0 * s, 0.4)
+          << that.scene->name << " s = " << s << " errors " << first << " " << second;
+    }
+}
+
+TEST(FirstOrderStep, RadauHasItsOrder) {
+  for (const Case& that : every_case()) {
+    const double first = error_of(that, "damped/radau:2", 20), second = error_of(that, "damped/radau:2", 40);
+    EXPECT_NEAR(std::log2(first / second), 3.0, 0.5)
+        << that.scene->name << " errors " << first << " " << second;
+  }
+}
+
+TEST(FirstOrderStep, JacobianAgreesWithDifferences) {
+  for (const Case& that : every_case())
+    for (const int s : {1, 2}) {
+      const auto scene = completed(that.scene);
+      const Eigen::Index n = scene->dimension();
+      const auto problem = Registry::with_built_ins().method(gl(s)).make_step(*scene, {true});
+      Vector p(n), lq(n), x(problem->size());
+      scene->lagrangian->gradient(0.0, scene->start.q, scene->start.v, lq, p);
+      problem->begin({0.0, 0.2}, {scene->start.q, p, scene->start.v}, {});
+      problem->guess(scene->start.v, x);
+      x += 0.1 * Vector::LinSpaced(x.size(), -1.0, 1.3);
+      EXPECT_LT(testing::jacobian_error(*problem, x), 1e-7) << scene->name << " s = " << s;
+    }
+}
+
+TEST(FirstOrderStep, KeepsRowsAndPrimaryConstraint) {
+  for (const Case& that : every_case()) {
+    const auto samples = samples_of(that.scene, {.method = gl(2), .step = 0.05}, 200);
+    Vector lq(that.scene->dimension()), p(lq.size());
+    for (const Sample& at : samples) {
+      that.scene->lagrangian->gradient(at.time, at.q, at.v, lq, p);
+      EXPECT_LT(distance(at.p, p), 1e-12) << that.scene->name;
+      for (const auto& rows : that.scene->constraints) {
+        if (!rows->holonomic()) continue;
+        Vector phi(1);
+        rows->position(at.time, at.q, phi);
+        EXPECT_LT(std::abs(phi[0]), 1e-13) << that.scene->name;
+      }
+    }
+  }
+}
+
+TEST(FirstOrderStep, IsSelfAdjoint) {
+  for (const Case& that : every_case())
+    for (const int s : {1, 2, 3}) {
+      const Sample there = samples_of(that.scene, {.method = gl(s), .step = 0.1}, 1).back();
+      auto back = std::make_shared<Scene>(*that.scene);
+      back->start = {there.time, there.q, there.v};
+      const Sample again = samples_of(back, {.method = gl(s), .step = -0.1}, 1).back();
+      EXPECT_LT(distance(again.q, that.scene->start.q), 1e-13) << that.scene->name << " s = " << s;
+    }
+}
+
+TEST(FirstOrderStep, WhatIsNotDeterminedIsRefusedWithItsDirection) {
+  Scene scene;  // a pendulum in (x, y, px, py): its row restricts positions whose rates are momenta
+  scene.name = "pendulum";
+  scene.coordinates = {"x", "y", "px", "py"};
+  scene.lagrangian = lagrangian<4>([](const auto& q, const auto& v) {
+    return q[2] * v[0] + q[3] * v[1] - 0.5 * (q[2] * q[2] + q[3] * q[3]) - q[1];
+  });
+  scene.constraints = {holonomic<4, 1>(
+      []<class T>(const std::array<T, 4>& q) { return std::array<T, 1>{q[0] * q[0] + q[1] * q[1] - 1.0}; },
+      {"rod"})};
+  scene.start = {0.0, Vector{{1.0, 0.0, 0.0, 0.0}}, Vector::Zero(4)};
+  testing::expect_misuse(
+      [&] {
+        const Integrator taken(std::make_shared<const Scene>(scene), Registry::with_built_ins(), kinsol(),
+                               {.method = gl(2), .step = 0.1});
+      },
+      {"'pendulum'", "the velocity along 'px'", "the force of row 'rod'", "hamiltonian"});
+}
+
+}  // namespace
+}  // namespace diracstep
