@@ -15,6 +15,7 @@ namespace diracstep {
 namespace {
 
 constexpr int largest_full_matrix = 1500;
+constexpr int several = 10;               // motions: from there on the rows along them are to be sparse
 constexpr double zero_tolerance = 1e-12;  // of an entry, in relation to the terms of its row
 
 /// What round-off leaves of a zero pivot, in relation to the largest: a mass ratio of 1e-13 is no degeneracy.
@@ -84,6 +85,26 @@ Columns kernel(const Columns& matrix) {
     if (basis(first, j) < 0.0) basis.col(j) *= -1.0;  // names begin without a sign
   }
   return (basis.array().abs() < zero_tolerance).select(0.0, basis);
+}
+
+/// The same space by columns with fewer entries, as loops of a circuit around one mesh each: a column is
+/// replaced by its sum with another, or its difference, while that has fewer.
+Columns fewer_entries(Columns basis) {
+  const auto entries = [](const Vector& column) { return (column.array() != 0.0).count(); };
+  for (bool changed = true; changed;) {
+    changed = false;
+    for (Eigen::Index i = basis.cols() - 1; i >= 0; --i)
+      for (Eigen::Index j = basis.cols() - 1; j >= 0; --j)
+        for (const double sign : {1.0, -1.0}) {
+          if (i == j) continue;
+          Vector sum = basis.col(i) + sign * basis.col(j);
+          sum = (sum.array().abs() < zero_tolerance).select(0.0, sum);
+          if (entries(sum) == 0 || entries(sum) >= entries(basis.col(i))) continue;
+          basis.col(i) = sum / max_norm(sum);
+          changed = true;
+        }
+  }
+  return basis;
 }
 
 Columns row_matrix(const Scene& scene, const Point& at) {
@@ -175,6 +196,7 @@ Columns directions(const Scene& scene, const Point& start, const FullDerivatives
   Columns both(here.rows() + elsewhere.rows(), here.cols());
   both << here, elsewhere;
   Columns constant = kernel(both);
+  if (constant.cols() > several) constant = fewer_entries(std::move(constant));
   if (kernel(elsewhere).cols() > constant.cols())
     refuse(scene, w,
            "elsewhere another motion does: a direction without momentum that moves is not supported");

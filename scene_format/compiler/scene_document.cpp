@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <diracstep/scene_format/compiler/circuit_reader.hpp>
 #include <diracstep/scene_format/compiler/scene_document.hpp>
 #include <diracstep/scene_format/compiler/size_limits.hpp>
 #include <diracstep/scene_format/compiler/table_reader.hpp>
@@ -38,7 +39,8 @@ class DocumentReader : TableReader {
                 "hamiltonian", "dissipation", "coordinates", "sizes",    "parameters",     "definitions",
                 "rows",        "force",       "start",       "span",     "reference",      "invariants",
                 "recommended", "inductor",    "capacitor",   "resistor", "source_voltage", "mutual",
-                "redundant",   "outputs",     "states",      "inputs",   "events"});
+                "redundant",   "outputs",     "states",      "inputs",   "events",         "source_current",
+                "diode",       "switch",      "transformer", "gyrator",  "opamp"});
     read_head(root);
     read_parameters(root, "sizes", true);
     read_parameters(root, "parameters", false);
@@ -165,43 +167,9 @@ class DocumentReader : TableReader {
     }
   }
 
-  /// Branches become coordinates qNAME, the charge that has passed from the first node to the second.
   void read_circuit(const toml::table& root) {
-    for (const char* kind : {"inductor", "capacitor", "resistor", "source_voltage"})
-      for (const toml::table* branch : tables(root, kind)) read_branch(*branch, kind);
-    std::ranges::stable_sort(document_.branches, [](const auto& a, const auto& b) {
-      return std::pair(a.place.line, a.place.column) < std::pair(b.place.line, b.place.column);
-    });
-    for (const auto& branch : document_.branches)
-      add_coordinate({"q" + branch.name,
-                      "C",
-                      "charge through " + branch.kind + ' ' + branch.name,
-                      {},
-                      false,
-                      branch.place});
-    for (const toml::table* mutual : tables(root, "mutual")) {
-      check_keys(*mutual, "[[mutual]]", {"between", "value"});
-      const auto [first, second] = two_names(*mutual, "between");
-      document_.mutuals.push_back(
-          {first, second, required_formula(*mutual, "value", "[[mutual]]"), place_of(mutual->source())});
-    }
-  }
-
-  void read_branch(const toml::table& branch, const std::string& kind) {
-    const std::string what = "[[" + kind + "]]";
-    check_keys(branch, what, {"name", "nodes", "value"});
-    const auto [from, to] = two_names(branch, "nodes");
-    if (from == to) fail(place_of(branch.source()), what + " joins a node to itself");
-    document_.branches.push_back({kind, required_string(branch, "name", what), from, to,
-                                  required_formula(branch, "value", what), place_of(branch.source())});
-  }
-
-  std::pair<std::string, std::string> two_names(const toml::table& table, const char* key) const {
-    const toml::node* node = table.get(key);
-    const toml::array* array = node == nullptr ? nullptr : node->as_array();
-    if (array == nullptr || array->size() != 2 || !(*array)[0].is_string() || !(*array)[1].is_string())
-      fail(place_of(table.source()), fmt::format("expected {} = [\"a\", \"b\"]", key));
-    return {(*array)[0].as_string()->get(), (*array)[1].as_string()->get()};
+    for (SceneDocument::Coordinate& coordinate : CircuitReader(*this, document_).read(root))
+      add_coordinate(std::move(coordinate));
   }
 
   std::vector<double> list(const toml::table& table, const char* key, const std::string& what,

@@ -30,6 +30,7 @@ class SceneCompiler {
 
   void compile() {
     declare();
+    circuit_.declare();
     compile_energies();
     compile_rows();
     compile_force();
@@ -139,8 +140,8 @@ class SceneCompiler {
       rows.push_back({{row.name, loops, row.equation.start},
                       parser_.equation(row.equation, mechanics(what, 'v', loops))});
     }
-    for (const auto& [name, node] : circuit_.current_laws())
-      rows.push_back({{"node_" + name, {}, {}, "Kirchhoff's current law at node '" + name + "'"}, node});
+    for (CircuitFormulas::Row& row : circuit_.rows())
+      rows.push_back({{row.name, row.loops, row.place, row.origin}, row.node});
     for (const auto& state : document_.states) rows.push_back(state_row(state));
     std::vector<bool> order;  // which kinds there are, by first appearance
     for (const Row& row : rows) {
@@ -175,13 +176,12 @@ class SceneCompiler {
   void require_state_rate(const SceneDocument::State& state, int family, Node rate, const std::string& what) {
     if (!program_.lagrangian)
       fail(state.place, "states need a 'lagrangian': beside a Hamiltonian alone they have no velocity");
-    const int first = static_cast<int>(symbols_.families.size() - document_.states.size());
     bool moved = false;
     for (const Node leaf : graph_.reachable(std::span(&rate, 1))) {
       if (!is_velocity(graph_[leaf])) continue;
       moved = true;
       const std::string& name = symbols_.families[static_cast<std::size_t>(graph_[leaf].a)].name;
-      if (graph_[leaf].a >= first)
+      if (std::ranges::find(document_.states, name, &SceneDocument::State::name) != document_.states.end())
         fail(state.rate.start, fmt::format("{} holds v_{}, the rate of a state: states that feed on rates of "
                                            "states are not supported; write that rate out",
                                            what, name));
@@ -271,6 +271,11 @@ class SceneCompiler {
     SceneFunction function{FunctionKind::force};
     Piece single;
     for (const auto& entry : document_.force) add_force(function, single, entry);
+    for (const auto& [family, loops, force, place, what] : circuit_.forces()) {
+      const Node target = graph_.coordinate(
+          family, own_index(symbols_.families[static_cast<std::size_t>(family)]), Role::position);
+      add_force_terms(function, single, terms_.of(force, loops, what, place), target);
+    }
     add_dissipation(function, single);
     if (!single.outputs.empty()) builder_.add_force(function, std::move(single));
     if (!function.pieces.empty()) program_.force = std::move(function);
@@ -447,7 +452,7 @@ class SceneCompiler {
   }
 
   SceneProgram& program_;
-  const SceneDocument& document_;
+  SceneDocument& document_;
   FormulaGraph& graph_;
   Symbols& symbols_;
   FormulaParser parser_;
