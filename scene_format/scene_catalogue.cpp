@@ -45,7 +45,7 @@ void set_tolerances(CatalogueScene& entry, const Parameters& tolerances) {
 }
 
 CatalogueScene make_scene(const std::string& name, const Parameters& changes) {
-  if (name.ends_with(".toml")) return scene_from_file(name, changes);
+  if (is_scene_file(name)) return scene_from_file(name, changes);
   std::string known;
   for (const ShippedScene& scene : shipped_scenes()) {
     if (scene.name == name)
@@ -54,7 +54,7 @@ CatalogueScene make_scene(const std::string& name, const Parameters& changes) {
     known += std::string(" ") + scene.name;
   }
   throw Misuse("unknown scene '" + name + "'" + did_you_mean(name, scene_names()) + "; the scenes are" +
-               known + "; or give the path of a file NAME.toml");
+               known + "; or give the path of a file NAME.toml or NAME.cir");
 }
 
 }  // namespace diracstep

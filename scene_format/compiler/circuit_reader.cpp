@@ -69,6 +69,23 @@ SceneDocument::NodeName node_name(const std::string& file, const FormulaText& te
       FormulaText{text.text.substr(bracket + 1, text.text.size() - bracket - 2), text.place(bracket + 1)}};
 }
 
+void guess_currents(SceneDocument& document) {
+  const bool given = std::ranges::any_of(document.branches, [](const auto& branch) {
+    return branch.kind == "source_current" || coordinates_of(branch).size() > 1;
+  });
+  if (!given || document.project) return;
+  const auto stated = [&](const std::string& name) {
+    return std::ranges::any_of(document.start, [&](const auto& entry) { return entry.key.text == name; }) ||
+           std::ranges::any_of(document.guesses, [&](const auto& guess) { return guess.text == name; });
+  };
+  for (const auto& branch : document.branches)
+    for (const auto& coordinate : coordinates_of(branch)) {
+      const std::string velocity = "v_" + coordinate.name;
+      if (branch.kind != "inductor" && !stated(velocity))
+        document.guesses.push_back({velocity, branch.place});
+    }
+}
+
 std::vector<SceneDocument::Coordinate> CircuitReader::read(const toml::table& root) {
   for (const ElementKeys& element : element_keys())
     for (const toml::table* branch : tables_.tables(root, element.kind)) read_branch(*branch, element.kind);

@@ -16,6 +16,10 @@ std::vector<SceneDocument::Coordinate> coordinates_of(const SceneDocument::Branc
 /// "n" or "n[k-1]", at a place of the file.  Throws SceneError.
 SceneDocument::NodeName node_name(const std::string& file, const FormulaText& text);
 
+/// Where currents are given by elements, the start of those that nothing stores is to be found: they become
+/// guesses, but for those of inductors and those that the start gives.
+void guess_currents(SceneDocument& document);
+
 /// Reads the elements of a circuit from the tables of a scene file.
 class CircuitReader {
  public:

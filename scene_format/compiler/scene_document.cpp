@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <diracstep/scene_format/compiler/circuit_reader.hpp>
+#include <diracstep/scene_format/compiler/netlist_reader.hpp>
 #include <diracstep/scene_format/compiler/scene_document.hpp>
 #include <diracstep/scene_format/compiler/size_limits.hpp>
 #include <diracstep/scene_format/compiler/table_reader.hpp>
@@ -61,6 +62,8 @@ class DocumentReader : TableReader {
     read_outputs(root);
     read_events(root);
     read_recommended(root);
+    guess_currents(document_);
+    guess_extensions();
     return std::move(document_);
   }
 
@@ -240,14 +243,28 @@ class DocumentReader : TableReader {
 
   void read_rows(const toml::table& root) {
     for (const toml::table* row : tables(root, "rows")) {
-      check_keys(*row, "[[rows]]", {"name", "equation", "for"});
+      check_keys(*row, "[[rows]]", {"name", "equation", "for", "compliance"});
       const Place place = place_of(row->source());
       const std::string name = string(*row, "name", fmt::format("row{}", document_.rows.size() + 1));
       if (!is_name(name)) fail(place, fmt::format("'{}' is no name for a row", name));
       if (!row_names_.insert(name).second) fail(place, fmt::format("two rows are named '{}'", name));
-      document_.rows.push_back(
-          {name, required_formula(*row, "equation", "[[rows]]"), optional_formula(*row, "for"), place});
+      document_.rows.push_back({name, required_formula(*row, "equation", "[[rows]]"),
+                                optional_formula(*row, "for"), place, optional_formula(*row, "compliance")});
+      if (document_.rows.back().compliance) add_extension(document_.rows.back());
     }
+  }
+
+  /// The coordinate of a compliant row, whose start follows from the others'.
+  void add_extension(const SceneDocument::Row& row) {
+    add_coordinate({row.extension(), "", "extension of row " + row.name, row.loops, false, row.place});
+    extensions_.push_back(row.extension());
+  }
+
+  void guess_extensions() {
+    if (document_.project) return;
+    for (const std::string& name : extensions_)
+      for (const std::string& guess : {name, "v_" + name})
+        document_.guesses.push_back({guess, document_.rows.front().place});
   }
 
   void read_start(const toml::table& root) {
@@ -387,6 +404,7 @@ class DocumentReader : TableReader {
 
   SceneDocument document_;
   std::set<std::string> names_, row_names_;
+  std::vector<std::string> extensions_;
 };
 
 /// The position after a quoted text that begins at `at`, or after three quotes and all up to the next three.
@@ -437,6 +455,11 @@ SceneDocument read_document(const std::string& file, const std::string& text) {
   if (const int line = line_of_long_key(text, limits.key_parts); line > 0)
     throw SceneError(file, {line, 1},
                      fmt::format("nested too deep: a key of more than {} parts", limits.key_parts));
+  if (file.ends_with(".cir")) {
+    SceneDocument document = read_netlist(file, text);
+    guess_currents(document);
+    return document;
+  }
   try {
     const toml::table root = toml::parse(std::string_view(text), std::string_view(file));
     return DocumentReader(file, text).read(root);

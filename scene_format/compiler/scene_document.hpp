@@ -42,6 +42,8 @@ struct SceneDocument {
     FormulaText equation;
     std::optional<FormulaText> loops;
     Place place;
+    std::optional<FormulaText> compliance = {};                    ///< of a spring in place of the row
+    std::string extension() const { return "extension_" + name; }  ///< its coordinate then
   };
   /// "x = …", "v_x = […]": a value, or one for each element of a repeated coordinate.
   struct Entry {
@@ -138,7 +140,7 @@ struct SceneDocument {
   std::vector<Row> rows;
   std::vector<Input> inputs;
   std::vector<Event> events;
-  std::vector<State> states;  ///< the last of the coordinates, in this order
+  std::vector<State> states;  ///< coordinates as well
   std::vector<Entry> force, start;
   std::optional<FormulaText> start_time;
   bool project = false;

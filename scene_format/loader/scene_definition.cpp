@@ -64,7 +64,8 @@ std::vector<std::pair<std::string, std::string>> scene_definition(const SceneDoc
     all.add("input " + input.name, fmt::format("{} {:.17g} at {:.17g}", static_cast<int>(input.kind),
                                                fmt::join(input.values, ", "), fmt::join(input.times, ", ")));
   for (const auto& row : document.rows)
-    all.add("row " + row.name, formula(row.equation) + (row.loops ? " for " + formula(*row.loops) : ""));
+    all.add("row " + row.name, formula(row.equation) + (row.loops ? " for " + formula(*row.loops) : "") +
+                                   (row.compliance ? " compliance " + formula(*row.compliance) : ""));
   for (const auto& state : document.states) all.add("rate of " + state.name, formula(state.rate));
   for (const auto& entry : document.force) all.add("force on", entry);
   for (const auto& branch : document.branches) {
