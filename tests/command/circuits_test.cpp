@@ -208,7 +208,7 @@ TEST_F(Circuits, NonlinearResistorsAndCapacitors) {
   EXPECT_NEAR(value(charge, "u"), q + 3.0 * q * q * q, 1e-8);
 }
 
-std::string rectifier(const std::string& diode, const std::string& inductor = "") {
+std::string half_wave(const std::string& diode) {
   return element("source_voltage", "V", "ground", "a", "value = \"5*sin(2*pi*50*t)\"") +
          element("resistor", "Rs", "a", "b", "value = 10") + element("diode", "D", "b", "k", diode) +
          inductor + element("capacitor", "C", "k", "ground", "value = 1e-4") +
@@ -219,12 +219,12 @@ std::string rectifier(const std::string& diode, const std::string& inductor = ""
 /// References: Radau of SciPy 1.10 at rtol 1e-9 on the two equations of the diode's and the capacitor's
 /// voltage.
 TEST_F(Circuits, DiodesWithoutInductorsAreDampedByDefault) {
-  const Json smooth = json(scene("exponential", rectifier("saturation = 1e-14")));
+  const Json smooth = json(scene("exponential", half_wave("saturation = 1e-14")));
   EXPECT_EQ(smooth["method"], "damped/radau:3");
   EXPECT_NEAR(value(smooth["outputs"], "out"), 3.0285173884, 3e-6);
   EXPECT_NEAR(value(smooth["outputs"], "d"), -3.0285174047, 3e-6);
   const Json pieces =
-      json(scene("linear", rectifier("on = 0.1\noff = 1e6\nthreshold = 0.6\ncapacitance = 1e-9")));
+      json(scene("linear", half_wave("on = 0.1\noff = 1e6\nthreshold = 0.6\ncapacitance = 1e-9")));
   EXPECT_EQ(pieces["method"], "damped/radau:3");
   EXPECT_NEAR(value(pieces["outputs"], "out"), 3.1224665532, 3e-6);
 }
