@@ -290,6 +290,34 @@ TEST_F(Circuits, ANetlistOfControlledSources) {
   EXPECT_NEAR(value(out, "V(c)"), 2.0 * std::exp(-1.0), 1e-5);
 }
 
+TEST_F(Circuits, WhatIsWrongInACircuitIsToldWithItsLine) {
+  const auto refused = [&](const std::string& text, int line, const std::vector<std::string>& words) {
+    std::vector<std::string> all = words;
+    all.push_back("wrong.toml:" + std::to_string(line) + ':');
+    expect_misuse("run " + scene("wrong", text + span(1.0, 0.1)), all);
+  };
+  const std::string r = element("resistor", "R", "a", "ground", "value = 1");  // lines 2 to 5
+  refused(element("capacitor", "C", "a", "ground", ""), 2, {"needs 'value', or 'energy'"});
+  refused(element("resistor", "R", "a", "ground", "value = 1\nvoltage = \"i\""), 2, {"not several of these"});
+  refused(element("diode", "D", "a", "ground", "on = 1"), 2, {"'saturation', or 'on' and 'off'"});
+  refused(element("resistor", "R", "a", "ground", "value = 1\nOhm = 2"), 6, {"unknown key 'Ohm'"});
+  refused(element("resistor", "R", "a", "a", "value = 1"), 2, {"joins a node to itself"});
+  refused(r + "[outputs]\nu = \"V(b)\"\n", 7, {"no node 'b'"});
+  refused(r + "[outputs]\nu = \"I(S)\"\n", 7, {"no branch 'S'"});
+  refused(r + "[outputs]\nu = \"I(R[2])\"\n", 7, {"'R' has no index"});
+  refused(element("inductor", "L", "a", "ground", "value = \"V(a)\""), 5, {"V(…) may not stand in 'value'"});
+  refused(element("inductor", "L", "a", "m", "value = 1") +
+              element("inductor", "M", "m", "ground", "value = 1") + "[outputs]\nu = \"V(m)\"\n",
+          11, {"no voltage between 'm' and 'ground'", "lambda_node_"});
+  refused(element("resistor", "R", "n[2*k]", "ground", "for = \"k = 1..3\"\nvalue = 1"), 4,
+          {"2*k", "expected the loop variable"});
+  refused(element("resistor", "R", "n[k]", "n[k+1]", "for = \"k = 1..3\"\nvalue = 1"), 2, {"ground"});
+  refused(element("resistor", "R", "n[k]", "ground", "for = \"k = 1..3\"\nvalue = 1") +
+              element("resistor", "S", "n", "ground", "value = 1"),
+          7, {"'n' is repeated elsewhere"});
+  refused(r + "[[mutual]]\nbetween = [\"R\", \"R\"]\nvalue = 1\n", 6, {"two single inductors", "resistor R"});
+}
+
 TEST_F(Circuits, WhatANetlistDoesNotKnowIsRefusedByItsLine) {
   const std::string head = "title\nV1 a 0 SIN(0 1 1k)\nR1 a 0 1k\n", tail = ".tran 1u 1m\n";
   expect_refused(head + "Q1 a b 0 QX\n" + tail, 4, {"unknown element 'Q1'", "R, L, C"});

@@ -114,7 +114,7 @@ DefaultMethod method_of_a_run(const CatalogueScene& entry, const Registry& regis
                               const SolverFactory& solvers) {
   const Recommendation& advice = entry.recommended;
   if (advice.method != automatic_method) return {advice.method, advice.order, ""};
-  DefaultMethod choice = default_method(*entry.scene, {.order = advice.order});
+  DefaultMethod choice = default_method(*completed(entry.scene), {.order = advice.order});
   try {
     const DefaultMethod of_motion = default_method_of_motion(entry.scene, registry, solvers, entry.t_end,
                                                              advice.step, {}, {.order = advice.order});
