@@ -325,6 +325,14 @@ TEST_F(DampedCommand, FeketesPointsHaveTheirPublishedEnd) {
   EXPECT_LT(damped["steps"].get<long>(), 1000);  // the step grows to 200 as the points come to rest
 }
 
+/// Ten thousand steps of order 2 met 1e-6 before.
+TEST_F(DampedCommand, TheFlyballGovernorTakesFewStepsByDefault) {
+  const Json run = json("run flyball_governor");
+  EXPECT_EQ(run["method"], "damped/radau:3");
+  EXPECT_LT(run["steps"].get<long>(), 100);
+  EXPECT_LT(run["error_q"].get<double>(), 1e-8);
+}
+
 TEST_F(DampedCommand, VariableStepsNeedNothingButTheMethod) {
   const Json run = json("run flyball_governor --method damped/radau:4 --adaptive --eps 1e-8");
   EXPECT_LT(run["error_q"].get<double>(), 1e-7);
