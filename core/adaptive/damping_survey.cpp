@@ -17,6 +17,7 @@ constexpr const char* surveying_method = "damped/radau:3";
 constexpr double surveying_error = 1e-3;
 constexpr long damping_steps = 150;
 constexpr int most_coordinates = 60;
+constexpr double grown_by = 1.5;
 constexpr double damping_probe = 1e-6;  // in units of the sizes
 constexpr double least_size = 1e-6;     // of the largest position or velocity
 constexpr double parts_of_the_motion = 50.0;
@@ -123,9 +124,11 @@ class MasslessMotion {
   double of_all_modes(const Sample& at) {
     const Columns basis = tangent_space(at);
     double largest = 0.0;
+    Vector here = at.v;
+    if (!reader_.velocity(at.time, at.q, at.p, here).ok()) return std::nan("");
     for (const double side : {damping_probe, -damping_probe}) {
       Columns image(basis.rows(), basis.cols());
-      for (Eigen::Index k = 0; k < basis.cols(); ++k) image.col(k) = change(at, basis.col(k), side);
+      for (Eigen::Index k = 0; k < basis.cols(); ++k) image.col(k) = change(at, here, basis.col(k), side);
       if (!image.allFinite()) return std::nan("");
       const Eigen::EigenSolver<Columns> solver(basis.transpose() * image, false);
       if (solver.info() != Eigen::Success) return std::nan("");
@@ -136,15 +139,17 @@ class MasslessMotion {
 
   /// By power iterations: for many coordinates.
   double of_the_fastest_mode(const Sample& at) {
-    constexpr int iterations = 12;
+    constexpr int iterations = 6;  // the mode of the node before is a good start
     if (mode_.size() == 0) {
       mode_.resize(scene_.dimension());
       for (Eigen::Index i = 0; i < mode_.size(); ++i) mode_[i] = std::sin(1.0 + 1.7 * static_cast<double>(i));
     }
     double rate = 0.0;
+    Vector here = at.v;
+    if (!reader_.velocity(at.time, at.q, at.p, here).ok()) return std::nan("");
     for (int k = 0; k < iterations; ++k) {
       mode_.normalize();
-      const Vector image = change(at, mode_, damping_probe);
+      const Vector image = change(at, here, mode_, damping_probe);
       if (!image.allFinite() || !(image.norm() > 0.0)) return std::nan("");
       rate = -mode_.dot(image);
       mode_ = image;
@@ -165,12 +170,11 @@ class MasslessMotion {
            Columns::Identity(kernel.rows(), kernel.cols());
   }
 
-  /// δv/side in units, for δq = side · direction.
-  Vector change(const Sample& at, const Vector& direction, double side) {
-    Vector here = at.v, there = at.v;
-    const bool ok = reader_.velocity(at.time, at.q, at.p, here).ok() &&
-                    reader_.velocity(at.time, at.q + side * direction.cwiseProduct(units_), at.p, there).ok();
-    if (!ok) return Vector::Constant(here.size(), std::nan(""));
+  /// δv/side in units, for δq = side · direction, where v is `here` without it.
+  Vector change(const Sample& at, const Vector& here, const Vector& direction, double side) {
+    Vector there = here;
+    if (!reader_.velocity(at.time, at.q + side * direction.cwiseProduct(units_), at.p, there).ok())
+      return Vector::Constant(here.size(), std::nan(""));
     return (there - here).cwiseQuotient(units_) / side;
   }
 
@@ -213,10 +217,14 @@ DampingSurvey survey_damping(const std::shared_ptr<const Scene>& scene, const Re
   else
     massless.emplace(moved, solvers);
   Sample node;
+  double rate = 0.0, measured_at = 0.0;
   for (long k = 0; k < damping_steps && std::abs(integrator.time() - start) < span; ++k) {
     if (!integrator.sample(Momentum::projected, node).ok()) break;
-    const double rate = motion ? motion->decay_rate(node) : massless->decay_rate(node);
     const double h = std::min(std::abs(integrator.next_size()), longest);
+    if (moved.dimension() <= most_coordinates || h > grown_by * measured_at) {
+      rate = motion ? motion->decay_rate(node) : massless->decay_rate(node);
+      measured_at = h;  // many coordinates: only where steps have grown, on which the product depends
+    }
     survey.covered = std::abs(node.time - start);
     survey.rate = std::max(survey.rate, rate);
     if (rate * h > survey.product) {

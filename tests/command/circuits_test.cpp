@@ -211,7 +211,7 @@ TEST_F(Circuits, NonlinearResistorsAndCapacitors) {
 std::string half_wave(const std::string& diode) {
   return element("source_voltage", "V", "ground", "a", "value = \"5*sin(2*pi*50*t)\"") +
          element("resistor", "Rs", "a", "b", "value = 10") + element("diode", "D", "b", "k", diode) +
-         inductor + element("capacitor", "C", "k", "ground", "value = 1e-4") +
+         element("capacitor", "C", "k", "ground", "value = 1e-4") +
          element("resistor", "R", "k", "ground", "value = 500") +
          "[outputs]\nout = \"V(k)\"\nd = \"V(b, k)\"\ni = \"I(D)\"\n" + span(0.1, 1e-4);
 }
