@@ -71,7 +71,7 @@ double step_from(const diracstep_model& model, const diracstep_options& options,
   double step = options.step;
   if (step == 0.0)
     step = std::copysign(recommended(model, options) ? entry.recommended.step : entry.natural_step, forward);
-  if (options.eps > 0.0) return std::copysign(step, forward);
+  if (steps_vary(options)) return std::copysign(step, forward);
   return options.ends != 0 ? fit_steps(start, options.end, step).step : step;
 }
 

@@ -131,7 +131,8 @@ typedef struct diracstep_options {
   int compensated_sums; /* 1: sums of a step in extended precision */
   int pushed;           /* 1: diracstep_push will be used */
   double eps; /* above 0: steps vary, so many radians each, 0.2 is usual; with damped/radau:S by their
-                 local error, 1e-6 is usual */
+                 local error, 1e-6 is usual.  NaN: steps vary, by what is usual for the method, which is then
+                 damped/radau:3 where none is named and the motion is damped strongly */
   const char *control;  /* "integrating", "in-step", "irreversible"; NULL: the first */
   double smallest_step; /* of steps that vary, without sign; 0: 1e-9 of the time to the end */
   long max_steps;       /* of steps that vary: the next one fails; 0: ten million */

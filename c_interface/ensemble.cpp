@@ -46,7 +46,7 @@ void run(const diracstep_model& model, const diracstep_options& options, const d
          diracstep_points& ends, diracstep_table* failures) {
   const CatalogueScene& entry = entry_of(model);
   require_room_for_all(ensemble, ends);
-  if (options.eps > 0.0 || options.pushed != 0)
+  if (steps_vary(options) || options.pushed != 0)
     throw Misuse("ensembles need steps of fixed size, and no push");
   IntegratorOptions stepping = stepping_from(model, options);
   const double start = start_of_all(model, ensemble);

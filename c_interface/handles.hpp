@@ -2,6 +2,7 @@
 
 #include <diracstep/c_interface/diracstep.h>
 
+#include <cmath>
 #include <diracstep/core/adaptive/adaptive_integrator.hpp>
 #include <diracstep/core/integrator/integrator.hpp>
 #include <diracstep/core/numerics/errors.hpp>
@@ -90,6 +91,10 @@ SolverFactory solvers_from(const diracstep_options& options);
 IntegratorOptions stepping_from(const diracstep_model& model, const diracstep_options& options);
 StepControl control_from(const diracstep_options& options);
 /// Where the motion ends, and the step that leads there from the scene's start or another, with its sign.
+/// Whether the options ask for steps of varying size.
+inline bool steps_vary(const diracstep_options& options) {
+  return options.eps > 0.0 || std::isnan(options.eps);
+}
 double end_from(const diracstep_model& model, const diracstep_options& options);
 double step_from(const diracstep_model& model, const diracstep_options& options);
 double step_from(const diracstep_model& model, const diracstep_options& options, double start);

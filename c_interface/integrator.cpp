@@ -45,7 +45,8 @@ std::vector<PlanLine> notes_of(const diracstep_model& model, const diracstep_opt
   return notes;
 }
 
-/// The method where none is named, for steps of fixed size; a force that its owner changes is not known yet.
+/// The method where none is named, and where eps is not given in radians, which say how a reversible step is
+/// to vary; a force that its owner changes is not known yet.
 void choose_method(const diracstep_model& model, const diracstep_options& options,
                    IntegratorOptions& stepping) {
   if (stepping.method != automatic_method || options.eps > 0.0 || options.pushed != 0) return;
@@ -69,7 +70,7 @@ std::unique_ptr<diracstep_integrator> make(const diracstep_model& model, const d
   stepping.step = step_from(model, options);
   choose_method(model, options, stepping);
   using Stepper = std::variant<Integrator, AdaptiveIntegrator>;
-  Stepper stepper = options.eps > 0.0
+  Stepper stepper = steps_vary(options)
                         ? Stepper(varying(model, scene, stepping, options))
                         : Stepper(Integrator(scene, model.registry, solvers_from(options), stepping));
   auto handle = std::make_unique<diracstep_integrator>(diracstep_integrator{

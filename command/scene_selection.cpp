@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <diracstep/command/scene_selection.hpp>
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/scene_format/scene_file.hpp>
 
 namespace diracstep::command {
 
@@ -30,7 +31,7 @@ std::vector<CatalogueScene> of_pattern(const Session& session, const std::string
 std::vector<CatalogueScene> scenes_meant(const Session& session, const std::string& word,
                                          const Parameters& changes) {
   const auto known = scene_names(session);
-  if (std::ranges::find(known, word) != known.end() || word.ends_with(".toml"))
+  if (std::ranges::find(known, word) != known.end() || is_scene_file(word))
     return {make_scene(session, word, changes)};
   if (word.find_first_of("*?") != std::string::npos) return of_pattern(session, word, changes);
   std::vector<CatalogueScene> scenes;

@@ -51,7 +51,7 @@ namespace {
 
 /// The text of a scene by its name or the path of its file.
 std::string text_of_scene(const std::string& name) {
-  if (name.ends_with(".toml"))
+  if (is_scene_file(name))
     return read_file(name, "the scene file", scene_compiler::size_limits().file_bytes);
   std::string known;
   for (const ShippedScene& scene : shipped_scenes()) {
@@ -59,7 +59,7 @@ std::string text_of_scene(const std::string& name) {
     known += std::string(" ") + scene.name;
   }
   throw Misuse("unknown scene '" + name + "'" + did_you_mean(name, scene_names()) + "; the scenes are" +
-               known + "; or give the path of a file NAME.toml");
+               known + "; or give the path of a file NAME.toml or NAME.cir");
 }
 
 }  // namespace

@@ -2,10 +2,15 @@
 
 #include <diracstep/scene_format/scene_catalogue.hpp>
 #include <string>
+#include <string_view>
 
 namespace diracstep {
 
-/// A scene from the text of a scene file (docs/scene_format.md); `file` names it in messages.
+/// Whether a name is the path of a file: a scene file NAME.toml or a netlist NAME.cir.
+inline bool is_scene_file(std::string_view name) { return name.ends_with(".toml") || name.ends_with(".cir"); }
+
+/// A scene from the text of a scene file (docs/scene_format.md), or of a netlist (docs/circuits.md) where
+/// `file`, which names it in messages, ends with .cir.
 CatalogueScene scene_from_text(const std::string& file, const std::string& text,
                                const Parameters& changes = {});
 

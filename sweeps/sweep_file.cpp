@@ -7,6 +7,7 @@
 #include <diracstep/files/input_file.hpp>
 #include <diracstep/scene_format/compiler/size_limits.hpp>
 #include <diracstep/scene_format/compiler/table_reader.hpp>
+#include <diracstep/scene_format/scene_file.hpp>
 #include <diracstep/sweeps/random_numbers.hpp>
 #include <diracstep/sweeps/sweep.hpp>
 #include <filesystem>
@@ -86,7 +87,7 @@ class SweepReader : TableReader {
 
   void read_run(const toml::table& root) {
     const std::string scene = required_string(root, "scene", "a sweep");
-    sweep_.scene = scene.ends_with(".toml") ? beside(scene) : scene;
+    sweep_.scene = is_scene_file(scene) ? beside(scene) : scene;
     sweep_.method = string(root, "method", "auto");
     sweep_.order = static_cast<int>(whole(root, "order", 0, 40));
     if (root.contains("rule")) sweep_.rule = string(root, "rule");

@@ -11,6 +11,7 @@
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/reports/json.hpp>
 #include <diracstep/reports/report.hpp>
+#include <diracstep/scene_format/scene_file.hpp>
 #include <diracstep/validation/laws/count_allocations.hpp>
 #include <diracstep/validation/laws/method_check.hpp>
 #include <diracstep/validation/laws/scene_examination.hpp>
@@ -34,7 +35,7 @@ struct Wanted {
 
 bool is_method(const std::string& name) {
   const bool typed = name.size() > 6 && name.starts_with("type") && name[5] == '/';
-  return (typed || name.starts_with("damped/")) && !name.ends_with(".toml");
+  return (typed || name.starts_with("damped/")) && !is_scene_file(name);
 }
 
 /// The names given; without any all that the plugins bring, and without plugins every method.

@@ -5,6 +5,7 @@
 #include <diracstep/command/verbs/run_arguments.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/files/paths.hpp>
+#include <diracstep/scene_format/scene_file.hpp>
 
 namespace diracstep::command {
 
@@ -157,7 +158,7 @@ void require_sense(const RunArguments& options) {
 
 void require_files(const RunArguments& options, const Session& session) {
   std::vector<NamedPath> inputs, outputs;
-  if (options.scene.ends_with(".toml")) inputs.push_back({"the scene", options.scene});
+  if (is_scene_file(options.scene)) inputs.push_back({"the scene", options.scene});
   for (const Plugin& plugin : session.plugins) inputs.push_back({"the plugin", plugin.path()});
   if (!options.out.empty() && options.out != standard_output) outputs.push_back({"--out", options.out});
   if (const std::string checkpoint = checkpoint_path(options); !checkpoint.empty())

@@ -19,6 +19,7 @@
 #include <diracstep/reports/study_comparison.hpp>
 #include <diracstep/reports/study_page.hpp>
 #include <diracstep/reports/study_plot.hpp>
+#include <diracstep/scene_format/scene_file.hpp>
 #include <diracstep/solvers/sundials_build.hpp>
 #include <filesystem>
 #include <limits>
@@ -344,7 +345,7 @@ std::string earlier_study(const std::string& path) {
 void require_files(const StudyArguments& options, const Session& session) {
   std::vector<NamedPath> inputs;
   for (const std::string& scene : options.scenes)
-    if (scene.ends_with(".toml")) inputs.push_back({"the scene", scene});
+    if (is_scene_file(scene)) inputs.push_back({"the scene", scene});
   for (const Plugin& plugin : session.plugins) inputs.push_back({"the plugin", plugin.path()});
   if (!options.compare.empty()) inputs.push_back({"--compare", options.compare});
   if (!options.table.empty()) require_outputs({{"--table", options.table}}, inputs);

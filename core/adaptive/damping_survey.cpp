@@ -5,6 +5,7 @@
 #include <diracstep/core/adaptive/damping_survey.hpp>
 #include <diracstep/core/adaptive/pointwise_motion.hpp>
 #include <diracstep/core/adaptive/rate_monitor.hpp>
+#include <diracstep/core/integrator/point_reader.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/numerics/scales.hpp>
 
@@ -16,6 +17,7 @@ constexpr const char* surveying_method = "damped/radau:3";
 constexpr double surveying_error = 1e-3;
 constexpr long damping_steps = 150;
 constexpr int most_coordinates = 60;
+constexpr double grown_by = 1.5;
 constexpr double damping_probe = 1e-6;  // in units of the sizes
 constexpr double least_size = 1e-6;     // of the largest position or velocity
 constexpr double parts_of_the_motion = 50.0;
@@ -102,17 +104,104 @@ class LinearisedMotion {
   Vector sizes_, units_;
 };
 
+/// A motion without mass, whose velocity is a function v(t, q): linearised about its points, δq̇ = ∂v/∂q δq.
+class MasslessMotion {
+ public:
+  MasslessMotion(const Scene& scene, const SolverFactory& solvers)
+      : scene_(scene),
+        reader_(std::make_shared<const Scene>(scene), solvers, scene.dimension() <= most_coordinates),
+        sizes_(Vector::Zero(scene.dimension())) {}
+
+  /// The largest decay rate at a point; NaN where there is no velocity.
+  double decay_rate(const Sample& at) {
+    sizes_ = sizes_.cwiseMax(at.q.cwiseAbs());
+    const double largest = max_norm(sizes_);
+    units_ = sizes_.cwiseMax(largest > 0.0 ? least_size * largest : 1.0);
+    return scene_.dimension() <= most_coordinates ? of_all_modes(at) : of_the_fastest_mode(at);
+  }
+
+ private:
+  double of_all_modes(const Sample& at) {
+    const Columns basis = tangent_space(at);
+    double largest = 0.0;
+    Vector here = at.v;
+    if (!reader_.velocity(at.time, at.q, at.p, here).ok()) return std::nan("");
+    for (const double side : {damping_probe, -damping_probe}) {
+      Columns image(basis.rows(), basis.cols());
+      for (Eigen::Index k = 0; k < basis.cols(); ++k) image.col(k) = change(at, here, basis.col(k), side);
+      if (!image.allFinite()) return std::nan("");
+      const Eigen::EigenSolver<Columns> solver(basis.transpose() * image, false);
+      if (solver.info() != Eigen::Success) return std::nan("");
+      for (const auto& value : solver.eigenvalues()) largest = std::max(largest, -value.real());
+    }
+    return largest;
+  }
+
+  /// By power iterations: for many coordinates.
+  double of_the_fastest_mode(const Sample& at) {
+    constexpr int iterations = 6;  // the mode of the node before is a good start
+    if (mode_.size() == 0) {
+      mode_.resize(scene_.dimension());
+      for (Eigen::Index i = 0; i < mode_.size(); ++i) mode_[i] = std::sin(1.0 + 1.7 * static_cast<double>(i));
+    }
+    double rate = 0.0;
+    Vector here = at.v;
+    if (!reader_.velocity(at.time, at.q, at.p, here).ok()) return std::nan("");
+    for (int k = 0; k < iterations; ++k) {
+      mode_.normalize();
+      const Vector image = change(at, here, mode_, damping_probe);
+      if (!image.allFinite() || !(image.norm() > 0.0)) return std::nan("");
+      rate = -mode_.dot(image);
+      mode_ = image;
+    }
+    return rate;
+  }
+
+  /// A basis of the δq that keep φ = 0, in units and orthonormal.
+  Columns tangent_space(const Sample& at) const {
+    const Eigen::Index n = scene_.dimension();
+    ConstraintsAtPoint positions(only_holonomic(scene_.constraints), scene_.dimension());
+    if (positions.rows() == 0) return Columns::Identity(n, n);
+    positions.evaluate(at.time, at.q);
+    Columns all = positions.pattern().full(positions.coefficients()) * units_.asDiagonal();
+    for (Eigen::Index r = 0; r < all.rows(); ++r) all.row(r) /= size_or_one(max_norm(all.row(r).transpose()));
+    const Columns kernel = Eigen::FullPivLU<Columns>(all).kernel();
+    return Eigen::HouseholderQR<Columns>(kernel).householderQ() *
+           Columns::Identity(kernel.rows(), kernel.cols());
+  }
+
+  /// δv/side in units, for δq = side · direction, where v is `here` without it.
+  Vector change(const Sample& at, const Vector& here, const Vector& direction, double side) {
+    Vector there = here;
+    if (!reader_.velocity(at.time, at.q + side * direction.cwiseProduct(units_), at.p, there).ok())
+      return Vector::Constant(here.size(), std::nan(""));
+    return (there - here).cwiseQuotient(units_) / side;
+  }
+
+  const Scene& scene_;
+  PointReader reader_;
+  Vector sizes_, units_, mode_;
+};
+
+/// Why nothing is measured; empty where it is.
+std::string not_surveyed(const Scene& scene) {
+  if (!scene.lagrangian) return "the Hamiltonian is degenerate";
+  const PhaseStructure& structure = scene.lagrangian->structure();
+  if (structure.phase_space()) return "L is linear in v";
+  if (structure.y_hessian_zero) return scene.rows() > 0 ? "" : "nothing has mass";
+  if (!scene.force) return "the scene has no force";
+  if (scene.dimension() > most_coordinates)
+    return "more than " + std::to_string(most_coordinates) + " coordinates";
+  return "";
+}
+
 }  // namespace
 
 DampingSurvey survey_damping(const std::shared_ptr<const Scene>& scene, const Registry& registry,
                              const SolverFactory& solvers, double end, double step,
                              const IntegratorOptions& given) {
   DampingSurvey survey;
-  if (!scene->force) survey.failure = "the scene has no force";
-  if (scene->dimension() > most_coordinates)
-    survey.failure = "more than " + std::to_string(most_coordinates) + " coordinates";
-  if (!has_accelerations(*completed(scene)))
-    survey.failure = scene->lagrangian ? "L is linear in v" : "the Hamiltonian is degenerate";
+  survey.failure = not_surveyed(*completed(scene));
   if (!survey.failure.empty()) return survey;
   const double start = scene->start.time, span = std::abs(end - start);
   const double longest = step > 0.0 ? step : span / parts_of_the_motion;
@@ -121,12 +210,22 @@ DampingSurvey survey_damping(const std::shared_ptr<const Scene>& scene, const Re
   options.order = 0;
   options.step = std::copysign(longest, end - start);
   AdaptiveIntegrator integrator(scene, registry, solvers, options, {.eps = surveying_error, .end = end});
-  LinearisedMotion motion(integrator.integrator().scene(), solvers);
+  const Scene& moved = integrator.integrator().scene();  // with its hidden rows
+  std::optional<LinearisedMotion> motion;
+  std::optional<MasslessMotion> massless;
+  if (has_accelerations(moved))
+    motion.emplace(moved, solvers);
+  else
+    massless.emplace(moved, solvers);
   Sample node;
+  double rate = 0.0, measured_at = 0.0;
   for (long k = 0; k < damping_steps && std::abs(integrator.time() - start) < span; ++k) {
     if (!integrator.sample(Momentum::projected, node).ok()) break;
-    const double rate = motion.decay_rate(node);
     const double h = std::min(std::abs(integrator.next_size()), longest);
+    if (moved.dimension() <= most_coordinates || h > grown_by * measured_at) {
+      rate = motion ? motion->decay_rate(node) : massless->decay_rate(node);
+      measured_at = h;  // many coordinates: only where steps have grown, on which the product depends
+    }
     survey.covered = std::abs(node.time - start);
     survey.rate = std::max(survey.rate, rate);
     if (rate * h > survey.product) {
@@ -146,7 +245,7 @@ DefaultMethod default_method_of_motion(const std::shared_ptr<const Scene>& given
                                        const IntegratorOptions& options, const MethodRequest& request) {
   const auto scene = completed(given);
   const bool free = request.order == 0 && !request.rule && !options.compensated_sums;
-  if (free && !(request.error > 0.0 && request.error < smallest_error) && scene->force) {
+  if (free && !(request.error > 0.0 && request.error < smallest_error)) {
     const DampingSurvey survey = survey_damping(scene, registry, solvers, end, step, options);
     if (survey.strong())
       return {surveying_method, 0,

@@ -28,11 +28,13 @@ struct DampingSurvey {
 ///
 ///   δq̇ = δv,   δv̇ = ∂a/∂q δq + ∂a/∂v δv,
 ///
-/// by differences of the acceleration a to both sides: a diode conducts on one.  It is compared with the step
-/// of the coarse run there, at most `step`, without sign, or a fiftieth of the motion where that is 0.
+/// by differences of the acceleration a to both sides: a diode conducts on one.  Where nothing has mass and
+/// rows, hidden ones among them, make the velocity a function v(t, q), it is that of δq̇ = ∂v/∂q δq, for more
+/// than 60 coordinates the eigenvalue of largest size, by power iterations.  It is compared with the step of
+/// the coarse run there, at most `step`, without sign, or a fiftieth of the motion where that is 0.
 ///
-/// Nothing is measured where the scene has no force, since nothing but a force damps; for a Lagrangian linear
-/// in v; and for more than 60 coordinates.  Throws Misuse as AdaptiveIntegrator does.
+/// Nothing is measured for a phase-space Lagrangian, and, where there is mass, without a force, since nothing
+/// but a force damps there, and for more than 60 coordinates.  Throws Misuse as AdaptiveIntegrator does.
 DampingSurvey survey_damping(const std::shared_ptr<const Scene>& scene, const Registry& registry,
                              const SolverFactory& solvers, double end, double step,
                              const IntegratorOptions& options = {});

@@ -108,8 +108,14 @@ void NodeCheck::look_for_rest() {
     all += h * terms;
     noise += at_rest * (h * cancelling + nodes_[k].p.cwiseAbs());
   }
+  // What has no momentum at all is in balance to round-off of the largest forces on such coordinates.
+  const auto momentum_less = [&](Eigen::Index i) { return changes[i] == 0.0 && nodes_.back().p[i] == 0.0; };
+  double balancing = 0.0;
+  for (Eigen::Index i = 0; i < n; ++i)
+    if (momentum_less(i)) balancing = std::max(balancing, all[i]);
   for (Eigen::Index i = 0; i < n && text_.empty(); ++i) {
     if (!(impulses[i] > smallest * all[i]) || !(impulses[i] > noise[i])) continue;
+    if (momentum_less(i) && !(impulses[i] > at_rest * balancing)) continue;
     if (!(changes[i] < frozen * impulses[i])) continue;
     std::ostringstream text;
     text << "near t = " << nodes_.back().time << " the momentum of "

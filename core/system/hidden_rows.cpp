@@ -15,6 +15,7 @@ namespace diracstep {
 namespace {
 
 constexpr int largest_full_matrix = 1500;
+constexpr int several = 10;               // motions: from there on the rows along them are to be sparse
 constexpr double zero_tolerance = 1e-12;  // of an entry, in relation to the terms of its row
 
 /// What round-off leaves of a zero pivot, in relation to the largest: a mass ratio of 1e-13 is no degeneracy.
@@ -66,6 +67,52 @@ Columns kernel(const Columns& matrix) {
     if (basis(first, j) < 0.0) basis.col(j) *= -1.0;  // names begin without a sign
   }
   return (basis.array().abs() < zero_tolerance).select(0.0, basis);
+}
+
+long entries_of(const Vector& column) { return (column.array() != 0.0).count(); }
+
+/// The sum of column i and another, or their difference, with fewest entries; empty where none has fewer than
+/// column i.  Those with about as many come first: a sum has at least as many as the two differ by.
+Vector sparsest_sum(const Columns& basis, const std::vector<long>& entries, Eigen::Index i) {
+  const auto at = [](Eigen::Index k) { return static_cast<std::size_t>(k); };
+  std::vector<Eigen::Index> others;
+  for (Eigen::Index j = 0; j < basis.cols(); ++j)
+    if (j != i) others.push_back(j);
+  const auto apart = [&](Eigen::Index j) { return std::abs(entries[at(j)] - entries[at(i)]); };
+  std::ranges::stable_sort(others, {}, apart);
+  Vector best;
+  long fewest = entries[at(i)];
+  for (const Eigen::Index j : others) {
+    if (apart(j) >= fewest) break;
+    for (const double sign : {1.0, -1.0}) {
+      Vector sum = basis.col(i) + sign * basis.col(j);
+      sum = (sum.array().abs() < zero_tolerance).select(0.0, sum);
+      const long count = entries_of(sum);
+      if (count == 0 || count >= fewest) continue;
+      fewest = count;
+      best = sum / max_norm(sum);
+    }
+  }
+  return best;
+}
+
+/// The same space by columns with fewer entries, such as loops of a circuit around one mesh each.
+Columns fewer_entries(Columns basis) {
+  constexpr long few = 3;
+  std::vector<long> entries;
+  for (Eigen::Index j = 0; j < basis.cols(); ++j) entries.push_back(entries_of(basis.col(j)));
+  for (bool changed = true; changed;) {
+    changed = false;
+    for (Eigen::Index i = basis.cols() - 1; i >= 0; --i) {
+      if (entries[static_cast<std::size_t>(i)] <= few) continue;
+      const Vector sum = sparsest_sum(basis, entries, i);
+      if (sum.size() == 0) continue;
+      basis.col(i) = sum;
+      entries[static_cast<std::size_t>(i)] = entries_of(sum);
+      changed = true;
+    }
+  }
+  return basis;
 }
 
 Columns row_matrix(const Scene& scene, const Point& at) {
@@ -157,6 +204,7 @@ Columns directions(const Scene& scene, const Point& start, const FullDerivatives
   Columns both(here.rows() + elsewhere.rows(), here.cols());
   both << here, elsewhere;
   Columns constant = kernel(both);
+  if (constant.cols() > several) constant = fewer_entries(std::move(constant));
   if (kernel(elsewhere).cols() > constant.cols())
     refuse(scene, w,
            "elsewhere another motion does: a direction without momentum that moves is not supported");

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import ctypes
+import math
 from typing import Any
 
 from . import _library as c
 from .arrays import real, whole
 from .errors import Misuse
 
-DEFAULT_EPS = 0.2
 _LARGEST_INT = 2**31 - 1  # of C
 KNOWN = ("method", "order", "step", "rule", "solver", "jacobian", "project_start", "substeps", "compensated_sums", "adaptive",
          "eps", "control", "smallest_step", "max_steps")
@@ -37,10 +37,12 @@ def options_from(given: dict[str, Any], until: float | None, pushed: bool = Fals
             raise Misuse("step is 0; a number other than zero is needed")
     options.smallest_step = real(given.get("smallest_step") or 0.0, "smallest_step")
     eps = given.get("eps")
-    if given.get("adaptive") or eps is not None:
-        options.eps = real(DEFAULT_EPS if eps is None else eps, "eps")
+    if eps is not None:
+        options.eps = real(eps, "eps")
         if options.eps <= 0.0:
             raise Misuse(f"eps is {options.eps}; a number of radians above 0 is needed")
+    elif given.get("adaptive"):
+        options.eps = math.nan  # what is usual for the method, which may be chosen for it
     options.pushed = int(pushed)
     if until is not None:
         options.ends, options.end = 1, real(until, "until")

@@ -104,7 +104,7 @@ class Scene:
         del kept
         self._handle = handle.value or 0
         self._close = c.lib.close  # there until the end of the interpreter
-        if name is not None and name.endswith(".toml") and text is None:
+        if name is not None and name.endswith((".toml", ".cir")) and text is None:
             text = Path(name).read_text(encoding="utf-8")
         self.text = text  #: of the scene file; None for scenes of the catalogue, of plugins, and of callbacks
         self._read_facts(coordinates)

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <diracstep/scene_format/compiler/formula_parser.hpp>
 #include <numbers>
 #include <ranges>
@@ -80,6 +81,12 @@ class FormulaParser::Reader : FormulaScanner {
     return loops;
   }
 
+  Node whole_index() {
+    const Node node = index(0);
+    expect_end();
+    return node;
+  }
+
   Node whole_coordinate() {
     const Node node = primary();
     expect_end();
@@ -143,6 +150,7 @@ class FormulaParser::Reader : FormulaScanner {
   }
 
   Node named(std::size_t place, const std::string& name) {
+    if (const auto local = context_.locals.find(name); local != context_.locals.end()) return local->second;
     if (const auto input = symbols_.inputs.find(name); input != symbols_.inputs.end())
       return located(read_input(place, input->second), place);
     if (peek() == '(') return call(place, name);
@@ -224,7 +232,9 @@ class FormulaParser::Reader : FormulaScanner {
       fail(place, "the definition of '" + name + "' uses itself");
     parser_.being_defined_.push_back(name);
     const Deeper deeper(*this);
-    const Node node = Reader(parser_, text, context_).whole_formula();
+    Context without_locals = context_;
+    without_locals.locals.clear();
+    const Node node = Reader(parser_, text, without_locals).whole_formula();
     parser_.being_defined_.pop_back();
     return parser_.defined_[key] = node;
   }
@@ -236,6 +246,7 @@ class FormulaParser::Reader : FormulaScanner {
     if (name == "diff") return diff(place);
     if (name == "if") return choice();
     if (name == "mod") return modulo();
+    if (parser_.circuit_ && (name == "V" || name == "I" || name == "P")) return of_circuit(place, name[0]);
     const auto function = std::ranges::find(functions, name, &Function::name);
     if (function == functions.end())
       fail(place, "unknown function '" + name + "'" + suggestion(name, function_names()));
@@ -249,6 +260,34 @@ class FormulaParser::Reader : FormulaScanner {
     }
     expect(')', "')'");
     return function->op == Op::pow ? graph_.raise(a, b) : graph_.apply(function->op, a, b);
+  }
+
+  /// V(a), V(a, b), I(R), P(R); "V(" stands behind us.
+  Node of_circuit(std::size_t place, char quantity) {
+    if (!context_.positions || context_.second != 'v')
+      fail(place, std::string(1, quantity) + "(…) may not stand in " + context_.what);
+    CircuitQuery query{quantity, {}, this->place(place)};
+    do query.names.push_back(circuit_name());
+    while (quantity == 'V' && query.names.size() < 2 && take(','));
+    expect(')', "')'");
+    return located(parser_.circuit_(query), place);
+  }
+
+  CircuitQuery::Name circuit_name() {
+    peek();
+    const std::size_t here = at();
+    CircuitQuery::Name name{word()};
+    if (name.name.empty() && number_follows()) {  // nodes may be numbered
+      const double number = this->number();
+      if (number != std::floor(number) || number < 0.0) fail(here, "expected the name of a node");
+      name.name = std::to_string(static_cast<long>(number));
+    }
+    if (name.name.empty()) fail_expecting("the name of a node or of an element");
+    if (take('[')) {
+      name.index = index(here);
+      expect(']', "']'");
+    }
+    return name;
   }
 
   /// a > b, or conditions joined by "and" and "or": a tree of choices.
@@ -458,6 +497,10 @@ Node FormulaParser::equation(const FormulaText& text, const Context& context) {
 
 std::vector<int> FormulaParser::loops(const FormulaText& text, const Context& context) {
   return Reader(*this, text, context).whole_loops();
+}
+
+Node FormulaParser::index(const FormulaText& text, const Context& context) {
+  return Reader(*this, text, context).whole_index();
 }
 
 Node FormulaParser::coordinate(const FormulaText& text, const Context& context) {

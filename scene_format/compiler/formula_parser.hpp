@@ -81,6 +81,19 @@ struct Context {
   bool reference = false;       ///< Kepler's and Jacobi's functions
   bool mechanics = false;       ///< of the equations of motion: parameters may be coordinates
   std::vector<int> loops = {};  ///< loop variables in force
+  /// Further names with what they stand for, before all others; definitions do not see them.
+  std::map<std::string, Node, std::less<>> locals = {};
+};
+
+/// "V(a, b[k])", "I(R)", "P(R)" in a formula: voltages, currents and powers of a circuit.
+struct CircuitQuery {
+  struct Name {
+    std::string name;
+    Node index = none;
+  };
+  char quantity;  ///< 'V', 'I', 'P'
+  std::vector<Name> names;
+  Place place;
 };
 
 /// Reads formulas into a graph.  The grammar is arithmetic and a fixed list of functions, nothing else: a
@@ -101,6 +114,11 @@ class FormulaParser {
   /// A coordinate, velocity or momentum: "x", "v_x[N]".
   Node coordinate(const FormulaText& text, const Context& context);
 
+  /// An index: made of numbers, sizes and loop variables.
+  Node index(const FormulaText& text, const Context& context);
+  /// Answers what formulas ask of a circuit; without it V, I and P are no functions.
+  void set_circuit(std::function<Node(const CircuitQuery&)> circuit) { circuit_ = std::move(circuit); }
+
   /// df/dt = Σ ∂f/∂q v + ∂f/∂t.
   Node rate(Node f);
   const std::string& file() const { return file_; }
@@ -112,6 +130,7 @@ class FormulaParser {
   Symbols& symbols_;
   std::map<std::string, Node> defined_;  ///< definitions by name and context
   std::vector<std::string> being_defined_;
+  std::function<Node(const CircuitQuery&)> circuit_;
   int depth_ = 0;
 };
 

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <diracstep/scene_format/compiler/circuit_reader.hpp>
+#include <diracstep/scene_format/compiler/netlist_reader.hpp>
 #include <diracstep/scene_format/compiler/scene_document.hpp>
 #include <diracstep/scene_format/compiler/size_limits.hpp>
 #include <diracstep/scene_format/compiler/table_reader.hpp>
@@ -38,7 +40,8 @@ class DocumentReader : TableReader {
                 "hamiltonian", "dissipation", "coordinates", "sizes",    "parameters",     "definitions",
                 "rows",        "force",       "start",       "span",     "reference",      "invariants",
                 "recommended", "inductor",    "capacitor",   "resistor", "source_voltage", "mutual",
-                "redundant",   "outputs",     "states",      "inputs",   "events"});
+                "redundant",   "outputs",     "states",      "inputs",   "events",         "source_current",
+                "diode",       "switch",      "transformer", "gyrator",  "opamp"});
     read_head(root);
     read_parameters(root, "sizes", true);
     read_parameters(root, "parameters", false);
@@ -59,6 +62,8 @@ class DocumentReader : TableReader {
     read_outputs(root);
     read_events(root);
     read_recommended(root);
+    guess_currents(document_);
+    guess_extensions();
     return std::move(document_);
   }
 
@@ -165,43 +170,9 @@ class DocumentReader : TableReader {
     }
   }
 
-  /// Branches become coordinates qNAME, the charge that has passed from the first node to the second.
   void read_circuit(const toml::table& root) {
-    for (const char* kind : {"inductor", "capacitor", "resistor", "source_voltage"})
-      for (const toml::table* branch : tables(root, kind)) read_branch(*branch, kind);
-    std::ranges::stable_sort(document_.branches, [](const auto& a, const auto& b) {
-      return std::pair(a.place.line, a.place.column) < std::pair(b.place.line, b.place.column);
-    });
-    for (const auto& branch : document_.branches)
-      add_coordinate({"q" + branch.name,
-                      "C",
-                      "charge through " + branch.kind + ' ' + branch.name,
-                      {},
-                      false,
-                      branch.place});
-    for (const toml::table* mutual : tables(root, "mutual")) {
-      check_keys(*mutual, "[[mutual]]", {"between", "value"});
-      const auto [first, second] = two_names(*mutual, "between");
-      document_.mutuals.push_back(
-          {first, second, required_formula(*mutual, "value", "[[mutual]]"), place_of(mutual->source())});
-    }
-  }
-
-  void read_branch(const toml::table& branch, const std::string& kind) {
-    const std::string what = "[[" + kind + "]]";
-    check_keys(branch, what, {"name", "nodes", "value"});
-    const auto [from, to] = two_names(branch, "nodes");
-    if (from == to) fail(place_of(branch.source()), what + " joins a node to itself");
-    document_.branches.push_back({kind, required_string(branch, "name", what), from, to,
-                                  required_formula(branch, "value", what), place_of(branch.source())});
-  }
-
-  std::pair<std::string, std::string> two_names(const toml::table& table, const char* key) const {
-    const toml::node* node = table.get(key);
-    const toml::array* array = node == nullptr ? nullptr : node->as_array();
-    if (array == nullptr || array->size() != 2 || !(*array)[0].is_string() || !(*array)[1].is_string())
-      fail(place_of(table.source()), fmt::format("expected {} = [\"a\", \"b\"]", key));
-    return {(*array)[0].as_string()->get(), (*array)[1].as_string()->get()};
+    for (SceneDocument::Coordinate& coordinate : CircuitReader(*this, document_).read(root))
+      add_coordinate(std::move(coordinate));
   }
 
   std::vector<double> list(const toml::table& table, const char* key, const std::string& what,
@@ -272,14 +243,28 @@ class DocumentReader : TableReader {
 
   void read_rows(const toml::table& root) {
     for (const toml::table* row : tables(root, "rows")) {
-      check_keys(*row, "[[rows]]", {"name", "equation", "for"});
+      check_keys(*row, "[[rows]]", {"name", "equation", "for", "compliance"});
       const Place place = place_of(row->source());
       const std::string name = string(*row, "name", fmt::format("row{}", document_.rows.size() + 1));
       if (!is_name(name)) fail(place, fmt::format("'{}' is no name for a row", name));
       if (!row_names_.insert(name).second) fail(place, fmt::format("two rows are named '{}'", name));
-      document_.rows.push_back(
-          {name, required_formula(*row, "equation", "[[rows]]"), optional_formula(*row, "for"), place});
+      document_.rows.push_back({name, required_formula(*row, "equation", "[[rows]]"),
+                                optional_formula(*row, "for"), place, optional_formula(*row, "compliance")});
+      if (document_.rows.back().compliance) add_extension(document_.rows.back());
     }
+  }
+
+  /// The coordinate of a compliant row, whose start follows from the others'.
+  void add_extension(const SceneDocument::Row& row) {
+    add_coordinate({row.extension(), "", "extension of row " + row.name, row.loops, false, row.place});
+    extensions_.push_back(row.extension());
+  }
+
+  void guess_extensions() {
+    if (document_.project) return;
+    for (const std::string& name : extensions_)
+      for (const std::string& guess : {name, "v_" + name})
+        document_.guesses.push_back({guess, document_.rows.front().place});
   }
 
   void read_start(const toml::table& root) {
@@ -419,6 +404,7 @@ class DocumentReader : TableReader {
 
   SceneDocument document_;
   std::set<std::string> names_, row_names_;
+  std::vector<std::string> extensions_;
 };
 
 /// The position after a quoted text that begins at `at`, or after three quotes and all up to the next three.
@@ -469,6 +455,11 @@ SceneDocument read_document(const std::string& file, const std::string& text) {
   if (const int line = line_of_long_key(text, limits.key_parts); line > 0)
     throw SceneError(file, {line, 1},
                      fmt::format("nested too deep: a key of more than {} parts", limits.key_parts));
+  if (file.ends_with(".cir")) {
+    SceneDocument document = read_netlist(file, text);
+    guess_currents(document);
+    return document;
+  }
   try {
     const toml::table root = toml::parse(std::string_view(text), std::string_view(file));
     return DocumentReader(file, text).read(root);

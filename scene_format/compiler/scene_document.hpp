@@ -42,6 +42,8 @@ struct SceneDocument {
     FormulaText equation;
     std::optional<FormulaText> loops;
     Place place;
+    std::optional<FormulaText> compliance = {};                    ///< of a spring in place of the row
+    std::string extension() const { return "extension_" + name; }  ///< its coordinate then
   };
   /// "x = …", "v_x = […]": a value, or one for each element of a repeated coordinate.
   struct Entry {
@@ -89,18 +91,36 @@ struct SceneDocument {
     FormulaText formula;
     Place place;
   };
-  /// A branch of a circuit between two nodes.
-  struct Branch {
-    std::string kind;  ///< "inductor", "capacitor", "resistor", "source"
+  /// A node of a circuit; of repeated nodes, "n[k-1]", with its index.
+  struct NodeName {
     std::string name;
-    std::string from, to;
-    FormulaText value;
+    std::optional<FormulaText> index = {};
+  };
+  /// A branch of a circuit between two nodes, or one for each turn of its loop.
+  struct Branch {
+    std::string kind;  ///< the element's table, such as "inductor"; "port" for the sides of a two-port
+    std::string name;
+    NodeName from, to;
+    std::map<std::string, FormulaText, std::less<>> values;  ///< by key, such as "value"
+    std::optional<FormulaText> loops;
     Place place;
+    NodeName plus = {}, minus = {};  ///< inputs of an op-amp
+
+    bool has(std::string_view key) const { return values.find(key) != values.end(); }
   };
   struct Mutual {
     std::string first, second;  ///< names of inductors
     FormulaText value;
+    bool coefficient = false;  ///< the value is k of M = k √(L1 L2)
     Place place;
+  };
+  /// A transformer or a gyrator; its sides are branches of kind "port".
+  struct TwoPort {
+    std::string kind, name;
+    FormulaText value;
+    Place place;
+
+    std::string side(int number) const { return name + (number == 1 ? "_1" : "_2"); }
   };
   struct Recommended {
     std::string method = "auto";
@@ -120,7 +140,7 @@ struct SceneDocument {
   std::vector<Row> rows;
   std::vector<Input> inputs;
   std::vector<Event> events;
-  std::vector<State> states;  ///< the last of the coordinates, in this order
+  std::vector<State> states;  ///< coordinates as well
   std::vector<Entry> force, start;
   std::optional<FormulaText> start_time;
   bool project = false;
@@ -132,6 +152,7 @@ struct SceneDocument {
   std::vector<Output> outputs;  ///< in the order of the file
   std::vector<Branch> branches;
   std::vector<Mutual> mutuals;
+  std::vector<TwoPort> two_ports;
   Recommended recommended;
 };
 

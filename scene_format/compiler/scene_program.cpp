@@ -30,6 +30,7 @@ class SceneCompiler {
 
   void compile() {
     declare();
+    circuit_.declare();
     compile_energies();
     compile_rows();
     compile_force();
@@ -141,6 +142,8 @@ class SceneCompiler {
                      ? parser_.formula(*document_.lagrangian, mechanics("the Lagrangian", 'v'))
                      : graph_.number(0.0);
     whole = graph_.add(whole, circuit_.lagrangian());
+    for (const auto& row : document_.rows)
+      if (row.compliance) whole = graph_.subtract(whole, spring_energy(row));
     const std::vector<Node> nodes = graph_.reachable(std::span(&whole, 1));
     const bool driven = std::ranges::any_of(nodes, [&](Node node) { return graph_[node].op == Op::time; });
     const bool others = !document_.rows.empty() || !document_.states.empty() || !document_.force.empty() ||
@@ -148,6 +151,49 @@ class SceneCompiler {
     if (!has_velocity(std::span(&whole, 1)) && !driven && !others)
       fail(place, "the Lagrangian contains no velocity v_…: nothing would move");
     program_.lagrangian = phase_function(with_parameters(whole), "the Lagrangian", place);
+  }
+
+  // Compliant rows φ(q) = 0 of compliance ε: φ(q) = s with the energy s²/(2ε) of the massless s, whose
+  // equation makes the multiplier s/ε.  At ε = 0 the row is φ(q) = 0, and s rests at 0.
+
+  Node compliance(const SceneDocument::Row& row) {
+    Context context{.what = "the compliance of row '" + row.name + "'", .mechanics = true};
+    context.loops = symbols_.families[static_cast<std::size_t>(symbols_.family(row.extension()))].loops;
+    return parser_.formula(*row.compliance, context);
+  }
+
+  /// `value` where ε is not 0, else `at_zero`.
+  Node unless_rigid(Node compliance, Node value, double at_zero) {
+    constexpr double smallest = 1e-300;
+    const Node above = graph_.subtract(graph_.apply(Op::abs, compliance), graph_.number(smallest));
+    return graph_.add(graph_.where(above, value),
+                      graph_.where(graph_.negative(above), graph_.number(at_zero)));
+  }
+
+  Node extension(const SceneDocument::Row& row) {
+    const int number = symbols_.family(row.extension());
+    return graph_.coordinate(number, own_index(symbols_.families[static_cast<std::size_t>(number)]),
+                             Role::position);
+  }
+
+  Node spring_energy(const SceneDocument::Row& row) {
+    const Node flexible = compliance(row);
+    const Node stiffness = unless_rigid(flexible, graph_.divide(graph_.number(1.0), flexible), 1.0);
+    Node energy =
+        graph_.multiply(graph_.multiply(graph_.number(0.5), stiffness), graph_.power(extension(row), 2));
+    const auto& loops = symbols_.families[static_cast<std::size_t>(symbols_.family(row.extension()))].loops;
+    for (auto loop = loops.rbegin(); loop != loops.rend(); ++loop) energy = graph_.sum(energy, *loop);
+    return energy;
+  }
+
+  /// φ(q) − s, of the turn of its own loops: those of the coordinate.
+  Node compliant(const SceneDocument::Row& row, Node position) {
+    if (has_velocity(std::span(&position, 1)))
+      fail(row.place,
+           fmt::format("row '{}' holds velocities; 'compliance' is for rows on positions", row.name));
+    const Node one = graph_.number(1.0);
+    return graph_.subtract(position,
+                           graph_.multiply(unless_rigid(compliance(row), one, 0.0), extension(row)));
   }
 
   // Rows.
@@ -162,12 +208,16 @@ class SceneCompiler {
     for (const auto& row : document_.rows) {
       const std::string what = "row '" + row.name + "'";
       std::vector<int> loops;
-      if (row.loops) loops = parser_.loops(*row.loops, {.what = what});
-      rows.push_back({{row.name, loops, row.equation.start},
-                      parser_.equation(row.equation, mechanics(what, 'v', loops))});
+      if (row.compliance)
+        loops = symbols_.families[static_cast<std::size_t>(symbols_.family(row.extension()))].loops;
+      else if (row.loops)
+        loops = parser_.loops(*row.loops, {.what = what});
+      Node node = parser_.equation(row.equation, mechanics(what, 'v', loops));
+      if (row.compliance) node = compliant(row, node);
+      rows.push_back({{row.name, loops, row.equation.start}, node});
     }
-    for (const auto& [name, node] : circuit_.current_laws())
-      rows.push_back({{"node_" + name, {}, {}, "Kirchhoff's current law at node '" + name + "'"}, node});
+    for (CircuitFormulas::Row& row : circuit_.rows())
+      rows.push_back({{row.name, row.loops, row.place, row.origin}, row.node});
     for (const auto& state : document_.states) rows.push_back(state_row(state));
     std::vector<bool> order;  // which kinds there are, by first appearance
     for (const Row& row : rows) {
@@ -202,14 +252,12 @@ class SceneCompiler {
   void require_state_rate(const SceneDocument::State& state, int family, Node rate, const std::string& what) {
     if (!program_.lagrangian)
       fail(state.place, "states need a 'lagrangian': beside a Hamiltonian alone they have no velocity");
-    const int first =
-        static_cast<int>(symbols_.families.size() - document_.states.size() - program_.differentiated.size());
     bool moved = false;
     for (const Node leaf : graph_.reachable(std::span(&rate, 1))) {
       if (!is_velocity(graph_[leaf])) continue;
       moved = true;
       const std::string& name = symbols_.families[static_cast<std::size_t>(graph_[leaf].a)].name;
-      if (graph_[leaf].a >= first)
+      if (std::ranges::find(document_.states, name, &SceneDocument::State::name) != document_.states.end())
         fail(state.rate.start, fmt::format("{} holds v_{}, the rate of a state: states that feed on rates of "
                                            "states are not supported; write that rate out",
                                            what, name));
@@ -299,6 +347,11 @@ class SceneCompiler {
     SceneFunction function{FunctionKind::force};
     Piece single;
     for (const auto& entry : document_.force) add_force(function, single, entry);
+    for (const auto& [family, loops, force, place, what] : circuit_.forces()) {
+      const Node target = graph_.coordinate(
+          family, own_index(symbols_.families[static_cast<std::size_t>(family)]), Role::position);
+      add_force_terms(function, single, terms_.of(force, loops, what, place), target);
+    }
     add_dissipation(function, single);
     if (!single.outputs.empty()) builder_.add_force(function, std::move(single));
     if (!function.pieces.empty()) program_.force = std::move(function);
@@ -487,7 +540,7 @@ class SceneCompiler {
   }
 
   SceneProgram& program_;
-  const SceneDocument& document_;
+  SceneDocument& document_;
   FormulaGraph& graph_;
   Symbols& symbols_;
   FormulaParser parser_;

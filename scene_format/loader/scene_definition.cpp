@@ -23,6 +23,10 @@ std::string without_spaces(std::string text) {
 
 std::string formula(const FormulaText& text) { return without_spaces(text.text); }
 
+std::string node(const SceneDocument::NodeName& name) {
+  return name.index ? fmt::format("{}[{}]", name.name, formula(*name.index)) : name.name;
+}
+
 class Definition {
  public:
   void add(std::string what, const std::string& text) {
@@ -60,14 +64,24 @@ std::vector<std::pair<std::string, std::string>> scene_definition(const SceneDoc
     all.add("input " + input.name, fmt::format("{} {:.17g} at {:.17g}", static_cast<int>(input.kind),
                                                fmt::join(input.values, ", "), fmt::join(input.times, ", ")));
   for (const auto& row : document.rows)
-    all.add("row " + row.name, formula(row.equation) + (row.loops ? " for " + formula(*row.loops) : ""));
+    all.add("row " + row.name, formula(row.equation) + (row.loops ? " for " + formula(*row.loops) : "") +
+                                   (row.compliance ? " compliance " + formula(*row.compliance) : ""));
   for (const auto& state : document.states) all.add("rate of " + state.name, formula(state.rate));
   for (const auto& entry : document.force) all.add("force on", entry);
-  for (const auto& branch : document.branches)
+  for (const auto& branch : document.branches) {
+    std::string values;
+    for (const auto& [key, value] : branch.values) values += fmt::format("{}={} ", key, formula(value));
     all.add(branch.kind + ' ' + branch.name,
-            fmt::format("{} from {} to {}", formula(branch.value), branch.from, branch.to));
+            fmt::format("{}from {} to {}{}", values, node(branch.from), node(branch.to),
+                        branch.loops ? " for " + formula(*branch.loops) : ""));
+    if (branch.kind == "opamp")
+      all.add("inputs of " + branch.name, node(branch.plus) + ' ' + node(branch.minus));
+  }
   for (const auto& mutual : document.mutuals)
-    all.add(fmt::format("mutual of {} and {}", mutual.first, mutual.second), formula(mutual.value));
+    all.add(fmt::format("{} of {} and {}", mutual.coefficient ? "coupling" : "mutual", mutual.first,
+                        mutual.second),
+            formula(mutual.value));
+  for (const auto& port : document.two_ports) all.add(port.kind + ' ' + port.name, formula(port.value));
   all.add("start time", document.start_time);
   for (const auto& entry : document.start) all.add("start of", entry);
   all.add("start projected", document.project ? "yes" : "no");

@@ -407,6 +407,30 @@ TEST_F(CInterface, StepsVaryAsTheLibrarysDo) {
   expect_message({"fixed size"});
 }
 
+/// A current behind 1 mH and 1 kΩ: L/R is a microsecond, the motion takes 13 ms.
+TEST_F(CInterface, StepsThatVaryByWhatIsUsualAreDampedWhereTheMotionIs) {
+  diracstep_source source{};
+  source.text =
+      "name = \"load\"\nlagrangian = \"1e-3*v_q^2/2\"\n[coordinates]\nq = {}\n"
+      "[force]\nq = \"5 + sin(100*pi*t) - 1000*v_q\"\n[span]\nend = 0.013\nstep = 5e-4\n";
+  ASSERT_EQ(open(source), DIRACSTEP_OK) << diracstep_message();
+  diracstep_options options{};
+  options.eps = std::nan("");
+  options.ends = 1;
+  options.end = 0.013;
+  ASSERT_EQ(create(options), DIRACSTEP_OK) << diracstep_message();
+  Arrays arrays(1, 0);
+  ASSERT_EQ(diracstep_run(made_, nullptr, &arrays.points), DIRACSTEP_OK) << diracstep_message();
+  diracstep_statistics statistics{};
+  ASSERT_EQ(diracstep_read_statistics(made_, &statistics), DIRACSTEP_OK);
+  EXPECT_STREQ(statistics.method, "damped/radau:3");
+  EXPECT_LT(statistics.smallest, 1e-2 * statistics.largest);
+  ASSERT_EQ(open("kepler_e06"), DIRACSTEP_OK);
+  ASSERT_EQ(create(options), DIRACSTEP_OK) << diracstep_message();
+  ASSERT_EQ(diracstep_read_statistics(made_, &statistics), DIRACSTEP_OK);
+  EXPECT_EQ(std::string(statistics.method).find("damped"), std::string::npos) << statistics.method;
+}
+
 TEST_F(CInterface, SearchesForAnErrorAndTellsWhatItFound) {
   diracstep_source source{};
   source.text = spring;

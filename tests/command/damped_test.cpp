@@ -214,6 +214,125 @@ TEST_F(DampedCommand, TheRingModulatorHasItsPublishedEnd_slow) {
     EXPECT_NEAR(of(end, "v", name), value, 2e-4 * std::abs(value)) << name;
 }
 
+/// The transistor amplifier of the IVP test set, an index 1 system in the voltages of its nodes.
+constexpr const char* transistor_amplifier = R"toml(
+[coordinates]
+y1 = {}
+y2 = {}
+y3 = {}
+y4 = {}
+y5 = {}
+y6 = {}
+y7 = {}
+y8 = {}
+[definitions]
+ue = "0.1*sin(200*pi*t)"
+i23 = "1e-6*(exp((y2 - y3)/0.026) - 1)"
+i56 = "1e-6*(exp((y5 - y6)/0.026) - 1)"
+[[rows]]
+name = "node1"
+equation = "1e-6*(v_y2 - v_y1) - (y1 - ue)/1000 = 0"
+[[rows]]
+name = "nodes12"
+equation = "(y1 - ue)/1000 + (y2 - 6)/9000 + y2/9000 + 0.01*i23 = 0"
+[[rows]]
+name = "node3"
+equation = "2e-6*v_y3 + y3/9000 - i23 = 0"
+[[rows]]
+name = "node4"
+equation = "3e-6*(v_y5 - v_y4) - (y4 - 6)/9000 - 0.99*i23 = 0"
+[[rows]]
+name = "nodes45"
+equation = "(y4 - 6)/9000 + 0.99*i23 + (y5 - 6)/9000 + y5/9000 + 0.01*i56 = 0"
+[[rows]]
+name = "node6"
+equation = "4e-6*v_y6 + y6/9000 - i56 = 0"
+[[rows]]
+name = "node7"
+equation = "5e-6*(v_y8 - v_y7) - (y7 - 6)/9000 - 0.99*i56 = 0"
+[[rows]]
+name = "nodes78"
+equation = "(y7 - 6)/9000 + 0.99*i56 + y8/9000 = 0"
+[start]
+y2 = 3
+y3 = 3
+y4 = 6
+y5 = 3
+y6 = 3
+y7 = 6
+guess = ["v_y1", "v_y2", "v_y3", "v_y4", "v_y5", "v_y6", "v_y7", "v_y8"]
+[span]
+end = 0.2
+step = 1e-4
+)toml";
+
+/// Published end values, of PSIDE at 1e-14 (IVP test set, problem transamp).
+TEST_F(DampedCommand, TheTransistorAmplifierHasItsPublishedEnd) {
+  const double published[] = {-0.5562145012262709e-2, 0.3006522471903042e1, 0.2849958788608128e1,
+                              0.2926422536206241e1,   0.2704617865010554e1, 0.2761837778393145e1,
+                              0.4770927631616772e1,   0.1236995868091548e1};
+  const std::string file = scene("transistor_amplifier", transistor_amplifier);
+  for (const char* how : {"", " --method damped/radau:3 --adaptive"}) {
+    const Json end = json("run " + file + how)["end"];
+    for (int k = 0; k < 8; ++k)
+      EXPECT_NEAR(of(end, "q", ("y" + std::to_string(k + 1)).c_str()), published[k], *how == 0 ? 2e-9 : 1e-6)
+          << how;
+  }
+}
+
+/// The 20 points of Fekete's problem of the IVP test set, and the published end of the first four at t = 1000
+/// (RADAU5 at 1e-12).
+std::string fekete() {
+  std::ostringstream x, y, z;
+  for (auto* out : {&x, &y, &z}) out->precision(17);
+  const auto ring = [&](int count, double turn, double height) {
+    for (int i = 1; i <= count; ++i) {
+      const double angle = 2.0 * M_PI * i / count + turn;
+      x << std::cos(angle) * std::cos(height) << ", ";
+      y << std::sin(angle) * std::cos(height) << ", ";
+      z << std::sin(height) << ", ";
+    }
+  };
+  ring(3, M_PI / 13.0, 3.0 * M_PI / 8.0);
+  ring(7, M_PI / 29.0, M_PI / 8.0);
+  ring(6, M_PI / 7.0, -2.0 * M_PI / 15.0);
+  ring(4, M_PI / 17.0, -3.0 * M_PI / 10.0);
+  return R"toml(
+lagrangian = """sum(i = 1..20, (v_x[i]^2 + v_y[i]^2 + v_z[i]^2)/2)
+  + sum(i = 2..20, j = 1..i-1, log((x[i] - x[j])^2 + (y[i] - y[j])^2 + (z[i] - z[j])^2)/2)"""
+dissipation = "sum(i = 1..20, 0.5*(v_x[i]^2 + v_y[i]^2 + v_z[i]^2)/2)"
+[coordinates]
+x = { for = "i = 1..20" }
+y = { for = "i = 1..20" }
+z = { for = "i = 1..20" }
+[[rows]]
+name = "sphere"
+for = "i = 1..20"
+equation = "x[i]^2 + y[i]^2 + z[i]^2 - 1 = 0"
+[start]
+x = [)toml" +
+         x.str() + "]\ny = [" + y.str() + "]\nz = [" + z.str() + "]\n[span]\nend = 1000\nstep = 0.1\n";
+}
+
+TEST_F(DampedCommand, FeketesPointsHaveTheirPublishedEnd) {
+  const std::pair<const char*, double> published[] = {
+      {"x_1", -0.4070263380333202}, {"y_1", 0.3463758772791802},  {"z_1", 0.8451942450030429},
+      {"x_2", 0.07752934752521549}, {"y_2", -0.2628662719972299}, {"z_2", 0.9617122871829146},
+      {"x_3", 0.7100577833343567},  {"y_3", 0.1212948055586120},  {"z_3", 0.6936177005172217},
+      {"x_4", 0.2348267744557627},  {"y_4", 0.7449277976923311},  {"z_4", 0.6244509285956391}};
+  const Json damped = json("run " + scene("fekete", fekete()) + " --method damped/radau:3 --adaptive");
+  for (const auto& [name, value] : published) EXPECT_NEAR(of(damped["end"], "q", name), value, 1e-9) << name;
+  EXPECT_LT(damped["steps"].get<long>(), 1000);  // the step grows to 200 as the points come to rest
+}
+
+/// Ten thousand steps of order 2 met 1e-6 before.
+TEST_F(DampedCommand, TheFlyballGovernorTakesFewStepsByDefault) {
+  const Json run = json("run flyball_governor");
+  EXPECT_EQ(run["method"], "damped/radau:3");
+  EXPECT_LT(run["steps"].get<long>(), 100);
+  EXPECT_LT(run["error_q"].get<double>(), 1e-8);
+}
+
 TEST_F(DampedCommand, VariableStepsNeedNothingButTheMethod) {
   const Json run = json("run flyball_governor --method damped/radau:4 --adaptive --eps 1e-8");
   EXPECT_LT(run["error_q"].get<double>(), 1e-7);

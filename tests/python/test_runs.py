@@ -49,6 +49,26 @@ def test_steps_that_vary(spring):
     assert len(many) > 1100 and many.q.flags.owndata  # more than there was room for at first
 
 
+def test_steps_that_vary_are_damped_where_the_motion_is():
+    load = ds.parse("""
+name = "load"
+lagrangian = "1e-3*v_q^2/2"
+[coordinates]
+q = {}
+[force]
+q = "5 + sin(100*pi*t) - 1000*v_q"
+[span]
+end = 0.013
+step = 5e-4
+""")
+    run = load.run(adaptive=True, until=0.013)
+    assert run.statistics.method == "damped/radau:3"
+    w, r, inductance = 100 * np.pi, 1000.0, 1e-3
+    current = 5 / r + (r * np.sin(w * 0.013) - w * inductance * np.cos(w * 0.013)) / (r * r + (w * inductance) ** 2)
+    assert run["v_q"][-1] == pytest.approx(current, abs=1e-8)
+    assert "damped" not in ds.load("kepler_e06").run(adaptive=True, until=2.0).statistics.method
+
+
 def test_an_error_is_asked_for(spring):
     run = spring.run(error=1e-9)
     assert run["x"][-1] == pytest.approx(np.cos(6.0), abs=1e-9)

@@ -3,6 +3,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <diracstep/core/adaptive/damping_survey.hpp>
 #include <diracstep/core/integrator/integrator.hpp>
 #include <diracstep/core/methods/default_method.hpp>
 #include <diracstep/core/numerics/errors.hpp>
@@ -110,10 +111,26 @@ std::string why_velocities(const Integrator& integrator) {
   return "∂²L/∂v² is regular along the rows";
 }
 
+/// The method of a run that names none.
+DefaultMethod method_of_a_run(const CatalogueScene& entry, const Registry& registry,
+                              const SolverFactory& solvers) {
+  const Recommendation& advice = entry.recommended;
+  if (advice.method != automatic_method) return {advice.method, advice.order, ""};
+  DefaultMethod choice = default_method(*completed(entry.scene), {.order = advice.order});
+  try {
+    const DefaultMethod of_motion = default_method_of_motion(entry.scene, registry, solvers, entry.t_end,
+                                                             advice.step, {}, {.order = advice.order});
+    if (registry.method(of_motion.method).info.damped) choice = of_motion;
+  } catch (const Misuse&) {  // which the steps will tell
+  }
+  return choice;
+}
+
 /// Some steps as a run takes them: whether they can be solved, how well the first is conditioned, and
 /// velocities read from momenta; points of the motion at steps 1, 4 and 16 go into `motion`.
 void examine_steps(const CatalogueScene& entry, const Registry& registry, const SolverFactory& solvers,
-                   std::vector<Finding>& findings, std::vector<MotionPoint>& motion) {
+                   const DefaultMethod& method, std::vector<Finding>& findings,
+                   std::vector<MotionPoint>& motion) {
   Finding steps{"regularity of the steps", false, ""};
   std::optional<Finding> reading;
   double condition = 0.0;
@@ -125,23 +142,32 @@ void examine_steps(const CatalogueScene& entry, const Registry& registry, const 
   const double h = std::copysign(advice.step, entry.t_end - entry.scene->start.time);
   const bool large = entry.scene->dimension() + entry.scene->rows() > dense_limit;
   try {
-    Integrator integrator(entry.scene, registry, watched, {advice.method, advice.order, h, {}});
+    std::optional<Integrator> fixed;
+    std::optional<AdaptiveIntegrator> variable;  // what is damped strongly is run by the local error
+    if (advice.method == automatic_method && registry.method(method.method).info.damped)
+      variable.emplace(entry.scene, registry, watched, IntegratorOptions{method.method, 0, h, {}},
+                       AdaptiveOptions{.end = entry.t_end});
+    else
+      fixed.emplace(entry.scene, registry, watched, IntegratorOptions{advice.method, advice.order, h, {}});
+    const Integrator& integrator = fixed ? *fixed : variable->integrator();
     StepReport report;
     for (long k = 1; k <= (large ? 1 : steps_looked_at); ++k) {
-      report = integrator.step();
+      report = fixed ? fixed->step() : variable->step();
       watching = false;
       if (!report.ok()) break;
       if (k != 1 && k != 4 && k != 16) continue;
       Sample sample;
-      const SolveReport read = integrator.sample(Momentum::projected, sample);
+      const SolveReport read =
+          fixed ? fixed->sample(Momentum::projected, sample) : variable->sample(Momentum::projected, sample);
       if (!reading || reading->passed)
         reading = {reading_of_velocities, read.ok(),
                    read.ok() ? why_velocities(integrator) : describe(read.status)};
       if (read.ok()) motion.push_back({sample.time, sample.q, entry.scene->lagrangian ? sample.v : sample.p});
     }
     steps.passed = report.ok() && condition < no_digit_left;
-    steps.detail = fmt::format("{} of order {}, step {:g}: condition of the Jacobian {:.1e}",
-                               integrator.options().method, integrator.options().order, h, condition);
+    steps.detail = fmt::format("{} of order {}, {}: condition of the Jacobian {:.1e}",
+                               integrator.options().method, integrator.options().order,
+                               fixed ? fmt::format("step {:g}", h) : "steps by their local error", condition);
     if (condition > ill_conditioned)
       steps.detail += fmt::format("; of the 16 digits of some component {:.0f} may be left",
                                   std::max(0.0, 16.0 - std::log10(condition)));
@@ -153,7 +179,8 @@ void examine_steps(const CatalogueScene& entry, const Registry& registry, const 
   if (reading) findings.push_back(std::move(*reading));
 }
 
-std::vector<std::string> advise(const CatalogueScene& entry, const Examination& examination) {
+std::vector<std::string> advise(const CatalogueScene& entry, const DefaultMethod& choice,
+                                const Examination& examination) {
   const Scene& scene = *entry.scene;
   std::vector<std::string> advice;
   const Finding& last = examination.findings.back();
@@ -171,7 +198,6 @@ std::vector<std::string> advise(const CatalogueScene& entry, const Examination& 
     advice.emplace_back("separable: type2/euler is explicit and cheap where nothing is stiff");
   else if (structure.separable && structure.y_hessian_constant && scene.constraints.empty() && !scene.force)
     advice.emplace_back("separable: type1/trapezoidal is explicit and cheap where nothing is stiff");
-  const DefaultMethod choice = default_method(scene, {.order = entry.recommended.order});
   if (entry.recommended.stated) {
     const bool named = entry.recommended.method != automatic_method;
     advice.push_back(fmt::format(
@@ -202,12 +228,13 @@ Examination examine(const CatalogueScene& entry, const Registry& registry, const
   findings = {examine_dimensions(*scene), examine_start(*scene), examine_rank(*scene)};
   std::vector<Finding> steps;
   std::vector<MotionPoint> motion;
-  examine_steps(entry, registry, solvers, steps, motion);
+  const DefaultMethod method = method_of_a_run(entry, registry, solvers);
+  examine_steps(entry, registry, solvers, method, steps, motion);
   for (Finding& finding : examine_derivatives(*entry.scene, motion)) findings.push_back(std::move(finding));
   if (entry.scene->lagrangian && entry.scene->hamiltonian)
     findings.push_back(examine_legendre_transform(*entry.scene, motion));
   findings.insert(findings.end(), steps.begin(), steps.end());
-  examination.advice = advise(entry, examination);
+  examination.advice = advise(entry, method, examination);
   return examination;
 }
 

@@ -42,9 +42,10 @@ TEST(Schema, HasTheKeysOfTheReader) {
         "hamiltonian", "dissipation", "coordinates", "sizes",    "parameters",     "definitions",
         "rows",        "force",       "start",       "span",     "reference",      "invariants",
         "recommended", "inductor",    "capacitor",   "resistor", "source_voltage", "mutual",
-        "redundant",   "inputs",      "states",      "outputs",  "events"})
+        "redundant",   "inputs",      "states",      "outputs",  "events",         "source_current",
+        "diode",       "switch",      "transformer", "gyrator",  "opamp"})
     EXPECT_TRUE(schema.contains(key)) << key;
-  EXPECT_EQ(schema.size(), 29u);
+  EXPECT_EQ(schema.size(), 35u);
 }
 
 }  // namespace
