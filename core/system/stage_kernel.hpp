@@ -49,8 +49,11 @@ class StageKernelSource {
   StageKernelSource(const StageKernelSource&) = delete;
   StageKernelSource& operator=(const StageKernelSource&) = delete;
   virtual ~StageKernelSource() = default;
-  /// The function for L with these rows, which may be null, and no force.  It lives as long as the Lagrangian.
-  virtual StageKernel stage_kernel(const ConstraintRows* rows, int stages) const = 0;
+
+  enum class Effort { none, compile };
+  /// The function for L with these rows, which may be null, and no force.  It lives as long as the
+  /// Lagrangian.  Without effort only if it is there already: compiling takes some tenths of a second.
+  virtual StageKernel stage_kernel(const ConstraintRows* rows, int stages, Effort effort) const = 0;
 };
 
 }  // namespace diracstep

@@ -233,6 +233,17 @@ bool Kernel::of_coordinates_alone() const {
   });
 }
 
+bool Kernel::has_roots_or_quotients_alone() const {
+  bool any = false;
+  for (const Instruction& instruction : code_) {
+    const Op op = instruction.data.op;
+    if (instruction.from != From::computed) continue;
+    any = any || op == Op::sqrt || op == Op::divide;
+    if (op != Op::sqrt && function_name(op) != nullptr) return false;
+  }
+  return any;
+}
+
 std::string Kernel::instructions(const CoordinateName& coordinate) const {
   std::string text;
   for (std::size_t k = 0; k < code_.size(); ++k)

@@ -70,6 +70,8 @@ class Kernel {
 
   /// Whether it reads coordinates and what is known of the parameters, nothing else.
   bool of_coordinates_alone() const;
+  /// Whether what takes its time are quotients and square roots, of which a processor takes several at once.
+  bool has_roots_or_quotients_alone() const;
   /// Its instructions in C, for a place where known[] is in scope; coordinate(role, slot) names a coordinate.
   using CoordinateName = std::function<std::string(int, int)>;
   std::string instructions(const CoordinateName& coordinate) const;

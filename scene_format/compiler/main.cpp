@@ -61,7 +61,8 @@ void compile(const fs::path& directory, const std::vector<fs::path>& scenes) {
       declarations += fmt::format("extern \"C\" const CompiledStageKernel {}[];\n", stage_table);
     texts += fmt::format("const unsigned char text_{}[] = {{{}}};\n", name, as_bytes(text));
     table += "    {\"" + name + "\", text_" + name + ", sizeof text_" + name + " - 1, \"" + program->name +
-             "\", diracstep_kernels_" + program->name + ", " + (stages.any() ? stage_table : "nullptr") + "},\n";
+             "\", diracstep_kernels_" + program->name + ", " + (stages.any() ? stage_table : "nullptr") +
+             "},\n";
   }
   write(directory / "shipped_scenes.cpp",
         "#include <diracstep/scene_format/loader/shipped_scenes.hpp>\n\n"

@@ -13,10 +13,10 @@ constexpr std::size_t position_kernel = 0, first_derivatives_kernel = 1;
 
 bool written_out(const SceneFunction& function, std::initializer_list<std::size_t> kernels) {
   return function.autonomous && std::ranges::all_of(function.pieces, [&](const Piece& piece) {
-    return piece.loops.empty() && std::ranges::all_of(kernels, [&](std::size_t number) {
-      return piece.kernels[number].of_coordinates_alone();
-    });
-  });
+           return piece.loops.empty() && std::ranges::all_of(kernels, [&](std::size_t number) {
+                    return piece.kernels[number].of_coordinates_alone();
+                  });
+         });
 }
 
 /// The struct StageKernelCall.
@@ -55,6 +55,15 @@ std::string repeated(const std::string& lines, int count) {
   return text;
 }
 
+/// Before a loop over the stages with these kernels in it.  A compiler unrolls the loop first and then does
+/// not see that roots and quotients could be taken side by side, which is where the time goes.
+std::string vectorised(const SceneFunction& function, std::size_t kernel) {
+  const bool slow = std::ranges::any_of(function.pieces, [&](const Piece& piece) {
+    return piece.kernels[kernel].has_roots_or_quotients_alone();
+  });
+  return slow ? "#pragma GCC unroll 1\n" : "";
+}
+
 /// The lines for each stage i.
 std::string lanes(const std::string& lines, int first = 0, const char* end = "S") {
   return fmt::format("  for (int i = {}; i < {}; ++i) {{\n{}  }}\n", first, end, lines);
@@ -85,6 +94,7 @@ StageKernels::StageKernels(const SceneProgram& program)
   const bool few = families.size() <= most_stage_coordinates &&
                    std::ranges::all_of(families, [](const auto& family) { return family.loops.empty(); });
   if (!few || !program.lagrangian || program.rows.size() > 1) return;
+  if (program.lagrangian->y_hessian_zero && !program.lagrangian->separable) return;  // another step
   if (!written_out(*program.lagrangian, {first_derivatives_kernel})) return;
   if (!program.rows.empty()) {
     const SceneFunction& rows = program.rows.front();
@@ -117,8 +127,8 @@ std::string StageKernels::appendix(const std::string& table) const {
   return text + table_of_kernels(table, names);
 }
 
-/// Arrays over the stages: v, lambda the unknowns; q, lq, lv at the Gauss nodes; node, impulse and a (the
-/// entries of A) at the Lobatto nodes; f and phi the residual.
+/// Arrays over the stages: v, lambda the unknowns; q, lq, lv and a (the entries of A) at the Gauss nodes;
+/// node, impulse and b (the entries of A) at the Lobatto nodes; f and phi the residual.
 std::string StageKernels::source(int stages) const {
   std::string text = fmt::format("#undef S\n#define S {0}\nstatic void stages{0}(void* data) {{\n", stages);
   text +=
@@ -126,8 +136,9 @@ std::string StageKernels::source(int stages) const {
       "  const double* const known = call->known;\n  (void)known;\n"
       "  double sum[S], largest[S], total[S];\n";
   text += coordinates("  double q#[S], v#[S], lq#[S], lv#[S], f#[S];\n");
-  if (m_ > 0) text += coordinates("  double node#[S], impulse#[S];\n") + rows("  double lambda#[S], phi#[S];\n");
-  text += entries("  double a@_#[S];\n");
+  if (m_ > 0)
+    text += coordinates("  double node#[S], impulse#[S];\n") + rows("  double lambda#[S], phi#[S];\n");
+  text += entries("  double a@_#[S], b@_#[S];\n");
   text += lanes(coordinates("    v#[i] = call->x[N * i + #];\n") +
                 rows("    lambda#[i] = call->x[N * S + M * i + #];\n"));
   text += "  for (;;) {\n" + momentum();
@@ -159,8 +170,9 @@ std::string StageKernels::entries(const std::string& lines) const {
 
 std::string StageKernels::momentum() const {
   return coordinates(sums("q#[i]", "call->q0[#]", "position", "v#")) +
+         vectorised(*lagrangian_, first_derivatives_kernel) +
          lanes(coordinates("    lq#[i] = lv#[i] = 0.0;\n") +
-               derivatives(*lagrangian_, first_derivatives_kernel, "q", "i")) +
+               derivatives(*lagrangian_, first_derivatives_kernel, {"q", "a", "i"}) + rows_at_gauss()) +
          coordinates("  for (int i = 0; i < S; ++i) f#[i] = lv#[i] - call->p0[#];\n" +
                      sums("f#[i]", "f#[i]", "force", "lq#")) +
          lanes(coordinates("    call->gauss[N * i + #] = q#[i];\n    call->lq[N * i + #] = lq#[i];\n"
@@ -169,27 +181,34 @@ std::string StageKernels::momentum() const {
 
 std::string StageKernels::impulses() const {
   std::string text = coordinates(sums("node#[i]", "call->q0[#]", "lobatto", "v#"));
-  text += lanes(coordinates("    call->lobatto_points[N * (i + 1) + #] = node#[i];\n    impulse#[i] = 0.0;\n") +
-                entries("    a@_#[i] = i == 0 ? call->at_lobatto[~] : 0.0;\n") + "    largest[i] = 0.0;\n");
-  text += lanes(derivatives(*rows_, first_derivatives_kernel, "node", "i + 1"), 0, "S - 1");
-  text += lanes(entries("    {\n    const double term = a@_#[i] * lambda@[i], size = fabs(term);\n"
-                        "    largest[i] = size > largest[i] ? size : largest[i];\n    impulse#[i] += term;\n    }\n"));
+  text +=
+      lanes(coordinates("    call->lobatto_points[N * (i + 1) + #] = node#[i];\n    impulse#[i] = 0.0;\n") +
+            entries("    b@_#[i] = i == 0 ? call->at_lobatto[~] : 0.0;\n") + "    largest[i] = 0.0;\n");
+  text += lanes(derivatives(*rows_, first_derivatives_kernel, {"node", "b", "i + 1"}), 0, "S - 1");
+  text += lanes(
+      entries("    {\n    const double term = b@_#[i] * lambda@[i], size = fabs(term);\n"
+              "    largest[i] = size > largest[i] ? size : largest[i];\n    impulse#[i] += term;\n    }\n"));
   text += lanes(coordinates("    call->impulses[N * i + #] = impulse#[i];\n") +
-                entries(fmt::format("    call->at_lobatto[{} * i + ~] = a@_#[i];\n", pattern_.nonzeros())));
-  text += "  {\n  double most = 0.0;\n"
-          "  for (int i = 0; i < S; ++i) most = largest[i] > most ? largest[i] : most;\n"
-          "  call->largest_impulse = most;\n  }\n";
+                entries(fmt::format("    call->at_lobatto[{} * i + ~] = b@_#[i];\n", pattern_.nonzeros())));
+  text +=
+      "  {\n  double most = 0.0;\n"
+      "  for (int i = 0; i < S; ++i) most = largest[i] > most ? largest[i] : most;\n"
+      "  call->largest_impulse = most;\n  }\n";
   return text + coordinates(sums("f#[i]", "f#[i]", "impulse", "impulse#"));
+}
+
+/// A of nonholonomic rows, in the loop that holds ∂L/∂q: the two share sines and cosines.
+std::string StageKernels::rows_at_gauss() const {
+  if (m_ == 0 || rows_->holonomic) return "";
+  return entries("    a@_#[i] = 0.0;\n") + derivatives(*rows_, first_derivatives_kernel, {"q", "a", "i"});
 }
 
 std::string StageKernels::constraint() const {
   const std::string zero = rows("    phi#[i] = 0.0;\n");
   if (rows_->holonomic)
-    return lanes(zero + derivatives(*rows_, position_kernel, "node", "i") +
+    return lanes(zero + derivatives(*rows_, position_kernel, {"node", "b", "i"}) +
                  rows("    phi#[i] *= call->per_step;\n"));
-  return lanes(zero + entries("    a@_#[i] = 0.0;\n") +
-               derivatives(*rows_, first_derivatives_kernel, "q", "i")) +
-         lanes(entries("    phi@[i] += a@_#[i] * v#[i];\n") +
+  return lanes(zero + entries("    phi@[i] += a@_#[i] * v#[i];\n") +
                entries(fmt::format("    call->at_gauss[{} * i + ~] = a@_#[i];\n", pattern_.nonzeros())));
 }
 
@@ -217,7 +236,8 @@ std::string StageKernels::correction() const {
   else
     for (int c = 0; c < n_; ++c) {
       std::string lines = "    lv#[i] = 0.0;\n";
-      for (int k = 0; k < n_; ++k) lines += fmt::format("    lv#[i] += call->inverse_mass[# + N * {0}] * f{0}[i];\n", k);
+      for (int k = 0; k < n_; ++k)
+        lines += fmt::format("    lv#[i] += call->inverse_mass[# + N * {0}] * f{0}[i];\n", k);
       text += lanes(replaced(lines, '#', c));
     }
   if (m_ > 0) text += correction_of_rows();
@@ -228,7 +248,7 @@ std::string StageKernels::correction() const {
 }
 
 std::string StageKernels::correction_of_rows() const {
-  const auto each = [&](const char* lines) {  // (row, coordinate) with coordinates inside
+  const auto each = [this](const char* lines) {  // coordinate by coordinate within each row
     std::string text;
     for (int a = 0; a < m_; ++a) text += replaced(coordinates(lines), '@', a);
     return text;
@@ -237,34 +257,37 @@ std::string StageKernels::correction_of_rows() const {
                                                   : lanes("    impulse#[i] = lv#[i];\n"));
   text += lanes(each("    phi@[i] -= call->constraint_forms[N * M * i + @ + M * #] * impulse#[i];\n"));
   text += "  {\n  double rows[M * S];\n" + lanes(rows("    rows[M * i + #] = phi#[i];\n")) +
-          "  call->solve_rows(call->owner, rows);\n" + lanes(rows("    phi#[i] = rows[M * i + #];\n")) + "  }\n";
+          "  call->solve_rows(call->owner, rows);\n" + lanes(rows("    phi#[i] = rows[M * i + #];\n")) +
+          "  }\n";
   text += lanes(coordinates("    impulse#[i] = 0.0;\n") +
                 each("    impulse#[i] += call->through_mass[N * M * i + # + N * @] * phi@[i];\n"));
   return text + coordinates(sums("lv#[i]", "lv#[i]", "by_impulse", "impulse#"));
 }
 
-/// The kernel of all pieces at point i of the coordinates `at` and of v: adds to lq, lv, phi or a at `lane`.
+/// The kernel of all pieces at point i: adds to lq, lv, phi or the entries of A.
 std::string StageKernels::derivatives(const SceneFunction& function, std::size_t kernel,
-                                      const std::string& at, const std::string& lane) const {
+                                      const Names& names) const {
   std::string text;
   for (const Piece& piece : function.pieces) {
     text += "    {\n" + piece.kernels[kernel].instructions([&](int role, int slot) {
       const bool position = role == static_cast<int>(Role::position);
-      return fmt::format("{}{}[i]", position ? at : "v", coordinate(piece, slot));
+      return fmt::format("{}{}[i]", position ? names.position : "v", coordinate(piece, slot));
     });
     for (const Store& store : piece.kernels[kernel].stores())
-      text += fmt::format("    {}[{}] += r{};\n", target(function, piece, store), lane, store.value);
+      text += fmt::format("    {}[{}] += r{};\n", target(function, piece, store, names.entry), names.lane,
+                          store.value);
     text += "    }\n";
   }
   return text;
 }
 
 /// Where a value of L or of the rows goes.
-std::string StageKernels::target(const SceneFunction& function, const Piece& piece, const Store& store) const {
+std::string StageKernels::target(const SceneFunction& function, const Piece& piece, const Store& store,
+                                 const char* entry) const {
   const auto row = [&](int output) { return piece.groups[static_cast<std::size_t>(output)]; };
   if (store.table == Store::Table::positions) {
     const auto& [output, slot] = piece.entries[static_cast<std::size_t>(store.entry)];
-    return fmt::format("a{}_{}", row(output), coordinate(piece, slot));
+    return fmt::format("{}{}_{}", entry, row(output), coordinate(piece, slot));
   }
   if (function.kind == FunctionKind::rows)
     return fmt::format("phi{}", row(store.entry - piece.layout.slot_count));

@@ -35,9 +35,14 @@ class StageKernels {
                    const std::string& first) const;
   std::string correction() const;
   std::string correction_of_rows() const;
-  std::string derivatives(const SceneFunction& function, std::size_t kernel, const std::string& at,
-                          const std::string& lane) const;
-  std::string target(const SceneFunction& function, const Piece& piece, const Store& store) const;
+  std::string rows_at_gauss() const;
+  /// Arrays that positions are read from and entries of A added to, and where.
+  struct Names {
+    const char *position, *entry, *lane;
+  };
+  std::string derivatives(const SceneFunction& function, std::size_t kernel, const Names& names) const;
+  std::string target(const SceneFunction& function, const Piece& piece, const Store& store,
+                     const char* entry) const;
   int coordinate(const Piece& piece, int slot) const;
 
   const SceneFunction *lagrangian_ = nullptr, *rows_ = nullptr;

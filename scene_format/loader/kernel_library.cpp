@@ -18,7 +18,6 @@
 #include <filesystem>
 #include <fstream>
 #include <sstream>
-#include <utility>
 #if defined(__GLIBC__)
 #include <gnu/libc-version.h>
 #endif
@@ -147,13 +146,13 @@ Table compiled_now(const Source& source, const KernelCache& cache, const std::st
   return {.origin = failure.empty() ? "the compiled kernels cannot be loaded" : failure};
 }
 
-/// From the cache, or compiled and put there.
-Table compiled_table(const Source& source) {
+/// From the cache, or where it is not there compiled and put there.
+Table compiled_table(const Source& source, bool compile_it = true) {
   const KernelCache cache;
   const std::string key = Sha256().add(circumstances(source.compiler)).add(source.text).hex();
   std::string complaint;
   Table found = with_table(cache.load(key, complaint), source.symbol, "compiled, from the cache");
-  return found.address != nullptr ? found : compiled_now(source, cache, key, complaint);
+  return found.address != nullptr || !compile_it ? found : compiled_now(source, cache, key, complaint);
 }
 
 KernelLibrary interpreted(const std::string& why) { return {.origin = "interpreted, slowly: " + why}; }
@@ -163,7 +162,8 @@ KernelLibrary interpreted(const std::string& why) { return {.origin = "interpret
 KernelLibrary kernel_library(const SceneProgram& program) {
   if (environment("DIRACSTEP_CC") == "none") return {.origin = "interpreted, as DIRACSTEP_CC=none asks for"};
   for (const ShippedScene& shipped : shipped_scenes())
-    if (shipped.program == program.name) return {shipped.kernels, {}, "compiled with the library", shipped.stages};
+    if (shipped.program == program.name)
+      return {shipped.kernels, {}, "compiled with the library", shipped.stages};
   if (const std::size_t limit = scene_compiler::size_limits().source_bytes; program.source.size() > limit)
     return interpreted(fmt::format("{} bytes of C code, the limit for a compiler is {} (DIRACSTEP_LIMITS)",
                                    program.source.size(), limit));
@@ -177,17 +177,20 @@ KernelLibrary kernel_library(const SceneProgram& program) {
   return {static_cast<const CompiledKernel*>(table.address), std::move(table.handle), table.origin};
 }
 
-CompiledStageKernel StageKernelLibrary::kernel(int stages) const {
+CompiledStageKernel StageKernelLibrary::kernel(int stages, bool compile) const {
   if (kernels_.kernels == nullptr || !sources_.any() || stages > StageKernels::most_stages) return nullptr;
   const auto number = static_cast<std::size_t>(stages) - 1;
   if (kernels_.handle == nullptr) return kernels_.stages == nullptr ? nullptr : kernels_.stages[number];
   const std::scoped_lock lock(mutex_);
   Compiled& compiled = compiled_[number];
-  if (std::exchange(compiled.asked_for, true)) return compiled.kernel;
+  if (compiled.tried || (compiled.looked_for && !compile)) return compiled.kernel;
+  compiled.looked_for = true;
+  compiled.tried = compile;
   const std::string symbol = fmt::format("diracstep_stages_{}_{}", program_.name, stages);
   const std::string text = sources_.source_file(symbol, stages);
-  Table table = compiled_table({text, symbol, found_compiler()});
+  Table table = compiled_table({text, symbol, found_compiler()}, compile);
   if (table.address == nullptr) return nullptr;
+  compiled.tried = true;
   compiled.handle = std::move(table.handle);
   return compiled.kernel = *static_cast<const CompiledStageKernel*>(table.address);
 }

@@ -24,20 +24,20 @@ struct KernelLibrary {
 /// above SizeLimits::source_bytes, the kernels are interpreted: the same numbers, more slowly.
 KernelLibrary kernel_library(const scene_compiler::SceneProgram& program);
 
-/// The stage kernels of a scene whose kernels are compiled: those that came with the library, or each from the
-/// cache or compiled as above when it is asked for first.  May be used from several threads at once.
+/// The stage kernels of a scene whose kernels are compiled: those that came with the library, or each from
+/// the cache or compiled as above.  May be used from several threads at once.
 class StageKernelLibrary {
  public:
   /// Both outlive it.
   StageKernelLibrary(const scene_compiler::SceneProgram& program, const KernelLibrary& kernels)
       : program_(program), kernels_(kernels), sources_(program) {}
 
-  /// Null where there is none.
-  scene_compiler::CompiledStageKernel kernel(int stages) const;
+  /// Null where there is none, or none yet and none is to be compiled.
+  scene_compiler::CompiledStageKernel kernel(int stages, bool compile) const;
 
  private:
   struct Compiled {
-    bool asked_for = false;
+    bool looked_for = false, tried = false;  ///< in the cache; and compiled
     scene_compiler::CompiledStageKernel kernel = nullptr;
     std::shared_ptr<void> handle = {};
   };

@@ -26,7 +26,6 @@ class Stages final : public FixedStages {
  public:
   explicit Stages(const StageArrays& arrays)
       : a_(arrays),
-        kernel_(kernel_of(arrays)),
         weights_(arrays.points->weights),
         second_(arrays.lagrangian->pattern()),
         forms_pattern_(m > 0 ? arrays.rows->pattern() : SparsityPattern::dense(1, n)),
@@ -44,11 +43,11 @@ class Stages final : public FixedStages {
     for (int j = 0; j < s; ++j)
       for (int l = 0; l < s; ++l)
         for (int k = 0; k < s; ++k) mix_[j * s + l] += by_constraint_[j * s + k] * by_impulse_[k * s + l];
-    if (kernel_.run != nullptr) call_ = call_of_kernel();
+    take_kernel(StageKernelSource::Effort::none);
   }
 
   double evaluate(const double* x) override {
-    if (kernel_.run != nullptr) {
+    if (has_kernel()) {
       copy<unknowns>(x, evaluated_x_.data());
       run_kernel(evaluated_x_.data(), residual_.data());
       return call_.largest_impulse;
@@ -83,7 +82,7 @@ class Stages final : public FixedStages {
 
   Contraction contract(double* x, double* f, const ContractionLimits& limits, Scales& scales,
                        const std::function<void()>& prepare) override {
-    if (kernel_.run != nullptr) return contract_in_kernel(x, f, limits, scales, prepare);
+    if (has_kernel()) return contract_in_kernel(x, f, limits, scales, prepare);
     std::array<double, 4> norms{};
     bool prepared = false;
     const auto evaluate = [&] {
@@ -182,9 +181,18 @@ class Stages final : public FixedStages {
   }
 
  private:
-  static StageKernel kernel_of(const StageArrays& arrays) {
-    const auto* const source = dynamic_cast<const StageKernelSource*>(arrays.lagrangian);
-    return source == nullptr ? StageKernel{} : source->stage_kernel(arrays.rows, s);
+  /// So many evaluations take as long as it takes to compile a kernel.
+  static constexpr long evaluations_worth_a_kernel = 1'000'000;
+
+  bool has_kernel() {
+    if (kernel_.run == nullptr && ++evaluations_ == evaluations_worth_a_kernel)
+      take_kernel(StageKernelSource::Effort::compile);
+    return kernel_.run != nullptr;
+  }
+  void take_kernel(StageKernelSource::Effort effort) {
+    const auto* const source = dynamic_cast<const StageKernelSource*>(a_.lagrangian);
+    if (source != nullptr) kernel_ = source->stage_kernel(a_.rows, s, effort);
+    if (kernel_.run != nullptr) call_ = call_of_kernel();
   }
 
   /// Aᵀλ, and the bits of its largest term, which have the order of positive doubles.
@@ -387,7 +395,8 @@ class Stages final : public FixedStages {
   }
 
   StageArrays a_;
-  StageKernel kernel_;
+  StageKernel kernel_{};
+  long evaluations_ = 0;  ///< without a kernel
   const StageWeights& weights_;
   FullBlocks<n, n> second_;
   FullBlocks<rows, n> forms_pattern_;
