@@ -9,6 +9,9 @@ namespace {
 
 /// As fixed_stages().
 constexpr std::size_t most_stage_coordinates = 4, most_stage_rows = 2;
+/// Where the formulas are longer, they are what takes the time, not what stands around them; and a compiler,
+/// which unrolls them over the stages, takes long.
+constexpr std::size_t most_instructions = 64;
 constexpr std::size_t position_kernel = 0, first_derivatives_kernel = 1;
 
 bool written_out(const SceneFunction& function, std::initializer_list<std::size_t> kernels) {
@@ -41,6 +44,13 @@ constexpr const char* stage_prelude = R"(typedef struct {
 } diracstep_stages;
 typedef void (*diracstep_stage_kernel)(void*);
 )";
+
+std::size_t size(const SceneFunction& function, std::initializer_list<std::size_t> kernels) {
+  std::size_t sum = 0;
+  for (const Piece& piece : function.pieces)
+    for (const std::size_t number : kernels) sum += piece.kernels[number].size();
+  return sum;
+}
 
 std::string replaced(const std::string& lines, char mark, int number) {
   std::string text;
@@ -96,11 +106,13 @@ StageKernels::StageKernels(const SceneProgram& program)
   if (!few || !program.lagrangian || program.rows.size() > 1) return;
   if (program.lagrangian->y_hessian_zero && !program.lagrangian->separable) return;  // another step
   if (!written_out(*program.lagrangian, {first_derivatives_kernel})) return;
+  std::size_t instructions = size(*program.lagrangian, {first_derivatives_kernel});
   if (!program.rows.empty()) {
     const SceneFunction& rows = program.rows.front();
     if (rows.groups.size() > most_stage_rows || !rows.workless ||
         !written_out(rows, {position_kernel, first_derivatives_kernel}))
       return;
+    instructions += size(rows, {position_kernel, first_derivatives_kernel});
     rows_ = &rows;
     m_ = static_cast<int>(rows.groups.size());
     std::vector<std::pair<int, int>> entries;
@@ -110,7 +122,7 @@ StageKernels::StageKernels(const SceneProgram& program)
                              graph_[piece.slots[static_cast<std::size_t>(slot)]].a);
     pattern_ = SparsityPattern(m_, n_, entries);
   }
-  lagrangian_ = &*program.lagrangian;
+  if (instructions <= most_instructions) lagrangian_ = &*program.lagrangian;
 }
 
 std::string StageKernels::source_file(const std::string& table, int stages) const {

@@ -12,7 +12,7 @@ class FixedPointTrial {
  public:
   static constexpr int solves_to_judge = 12;
   /// The first solves of a run have too little history to be guessed well, and do not count.
-  static constexpr int solves_without_history = 5;
+  static constexpr int solves_without_history = 2;
 
   bool given_up() const { return given_up_; }
   bool over() const { return solves_ >= solves_to_judge; }

@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
-#include <array>
+#include <algorithm>
 #include <cstring>
 #include <diracstep/core/integrator/integrator.hpp>
 #include <diracstep/core/steps/gauss_lobatto/step.hpp>
@@ -137,8 +137,8 @@ TEST_P(StageKernelOf, LeavesEveryRunItsBits) {
     }
 }
 
-INSTANTIATE_TEST_SUITE_P(Catalogue, StageKernelOf, ::testing::ValuesIn(scenes_with_kernels()),
-                         [](const auto& info) { return info.param; });
+std::string name_of_scene(const ::testing::TestParamInfo<std::string>& info) { return info.param; }
+INSTANTIATE_TEST_SUITE_P(Catalogue, StageKernelOf, ::testing::ValuesIn(scenes_with_kernels()), name_of_scene);
 
 }  // namespace
 }  // namespace diracstep::testing
