@@ -1,7 +1,9 @@
 /// What a step GL(s) of a small scene takes, in processor time, in runs from the start to an error below 1e-6
 /// at their end: by KINSOL with Newton's method (the default) and with fixed-point iterations where they are
-/// quick, by direct(), and written out by hand for the scene: sizes, derivatives and rows known where it is
-/// compiled, fixed-point iterations with the rows of each node, the same guess, the same tolerance.
+/// quick, by direct() with and without the stage kernel of the scene, and written out by hand for the scene:
+/// sizes, derivatives and rows known where it is compiled, fixed-point iterations with the rows of each node,
+/// the same guess, the same tolerance.  At the end runs a hundred times as long, in which the first steps,
+/// taken without a history to guess from, do not show.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -11,7 +13,10 @@
 #include <diracstep/scene_format/scene_catalogue.hpp>
 #include <diracstep/solvers/direct_solver.hpp>
 #include <functional>
+#include <memory>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "timing.hpp"
 
@@ -250,6 +255,34 @@ class ByHand {
   std::array<Unknowns, 3> past_;
 };
 
+/// A Lagrangian without the stage kernels that come beside it.
+class Bare final : public Lagrangian {
+ public:
+  explicit Bare(std::shared_ptr<const Lagrangian> of)
+      : Lagrangian(of->pattern(), of->structure()), of_(std::move(of)) {}
+
+  double value(double t, ConstVectorRef x, ConstVectorRef y) const override { return of_->value(t, x, y); }
+  void gradient(double t, ConstVectorRef x, ConstVectorRef y, VectorRef fx, VectorRef fy) const override {
+    of_->gradient(t, x, y, fx, fy);
+  }
+  void hessian(double t, ConstVectorRef x, ConstVectorRef y, VectorRef fxx, VectorRef fxy,
+               VectorRef fyy) const override {
+    of_->hessian(t, x, y, fxx, fxy, fyy);
+  }
+  void gradients(const PointColumns& at, double* fx, double* fy) const override {
+    of_->gradients(at, fx, fy);
+  }
+  void hessians(const PointColumns& at, double* fxx, double* fxy, double* fyy) const override {
+    of_->hessians(at, fxx, fxy, fyy);
+  }
+  void gradient_rate(double t, ConstVectorRef x, ConstVectorRef y, VectorRef fyt) const override {
+    of_->gradient_rate(t, x, y, fyt);
+  }
+
+ private:
+  std::shared_ptr<const Lagrangian> of_;
+};
+
 /// Steps of one kind: `run` takes so many, and what they have done so far.
 struct Side {
   std::function<void(int)> run;
@@ -257,9 +290,9 @@ struct Side {
   std::function<double()> iterations;
 };
 
-Side of_library(const CatalogueScene& entry, int s, double h, const SolverFactory& solver) {
+Side of_library(const std::shared_ptr<const Scene>& scene, int s, double h, const SolverFactory& solver) {
   const auto integrator =
-      std::make_shared<Integrator>(entry.scene, Registry::with_built_ins(), solver,
+      std::make_shared<Integrator>(scene, Registry::with_built_ins(), solver,
                                    IntegratorOptions{.method = "type1/gl:" + std::to_string(s), .step = h});
   return {[=](int steps) {
             integrator->reset();
@@ -290,14 +323,22 @@ Side by_hand(const CatalogueScene& entry, int, double h) {
 
 using Hand = std::function<Side(const CatalogueScene&, int, double)>;
 
+std::string shown(double number, const char* form) {
+  std::array<char, 16> text{};
+  std::snprintf(text.data(), text.size(), form, number);
+  return std::isnan(number) ? "-" : text.data();
+}
+
 void compare(const char* scene, int s, double end, int steps, const Hand& hand = {}) {
   constexpr int rounds = 15;
   const int repeats = std::max(1, 2000 / steps);  // so that the clock can tell them
   const CatalogueScene entry = make_scene(scene);
+  const auto bare = std::make_shared<Scene>(*entry.scene);
+  bare->lagrangian = std::make_shared<const Bare>(entry.scene->lagrangian);
   const double h = end / steps;
-  std::vector<Side> sides{of_library(entry, s, h, kinsol()),
-                          of_library(entry, s, h, kinsol({.iteration = Iteration::automatic})),
-                          of_library(entry, s, h, direct())};
+  std::vector<Side> sides{of_library(entry.scene, s, h, kinsol()),
+                          of_library(entry.scene, s, h, kinsol({.iteration = Iteration::automatic})),
+                          of_library(bare, s, h, direct()), of_library(entry.scene, s, h, direct())};
   if (hand) sides.push_back(hand(entry, s, h));
   for (Side& side : sides) side.run(steps);
   double apart = 0.0;
@@ -307,14 +348,12 @@ void compare(const char* scene, int s, double end, int steps, const Hand& hand =
     work.emplace_back([&side, steps, repeats] {
       for (int r = 0; r < repeats; ++r) side.run(steps);
     });
-  const auto ns = fewest_nanoseconds(work, repeats * steps, rounds);
-  std::printf("%-27sGL(%d)%7.3f", scene, s, h);
-  for (std::size_t k = 0; k < 4; ++k) k < ns.size() ? std::printf("%8.0f", ns[k]) : std::printf("%8s", "-");
-  std::printf("%8.1f%8.1f", ns[0] / ns[1], ns[0] / ns[2]);
-  if (hand)
-    std::printf("%10.1f%10.1f", ns[0] / ns[3], ns[2] / ns[3]);
-  else
-    std::printf("%10s%10s", "-", "-");
+  auto ns = fewest_nanoseconds(work, repeats * steps, rounds);
+  ns.resize(5, std::nan(""));
+  std::printf("%-27sGL(%d)%7.3f%6d", scene, s, h, steps);
+  for (const double time : ns) std::printf("%8s", shown(time, "%.0f").c_str());
+  for (const double ratio : {ns[0] / ns[3], ns[2] / ns[3], ns[3] / ns[4]})
+    std::printf("%10s", shown(ratio, "%.1f").c_str());
   std::printf("  ");
   for (const Side& side : sides) std::printf("%6.2f", side.iterations());
   std::printf("%9.0e\n", apart);
@@ -324,11 +363,13 @@ void compare(const char* scene, int s, double end, int steps, const Hand& hand =
 
 int main() {
   std::printf(
-      "ns a step; ratios: KINSOL over automatic, over direct, over by hand, direct over by hand; iterations "
-      "a\n"
-      "step of each; how far they are apart at the end\n");
-  std::printf("%-27s%5s%7s%8s%8s%8s%8s%8s%8s%10s%10s  %s\n", "", "", "step", "KINSOL", "autom.", "direct",
-              "hand", "K/aut.", "K/dir.", "K/hand", "dir./hand", "iterations");
+      "ns a step: by KINSOL with Newton's method, with fixed-point iterations where they are quick, by "
+      "direct "
+      "without and\n"
+      "with the stage kernel, by hand; ratios of these; iterations a step of each; how far they are apart at "
+      "the end\n");
+  std::printf("%-27s%5s%7s%6s%8s%8s%8s%8s%8s%10s%10s%10s  %s\n", "", "", "step", "steps", "KINSOL", "autom.",
+              "bare", "direct", "hand", "K/direct", "bare/dir.", "dir./hand", "iterations");
   compare("kepler_e06", 4, 50.0, 453, by_hand<KeplerByHand, 4>);
   compare("kepler_e06", 6, 50.0, 231, by_hand<KeplerByHand, 6>);
   compare("pendulum_cartesian", 3, 29.7, 709, by_hand<PendulumByHand, 3>);
@@ -338,4 +379,8 @@ int main() {
   compare("chaplygin_sleigh", 4, 10.0, 29);
   compare("lotka_volterra_2d", 3, 10.0, 47);
   compare("double_pendulum", 4, 10.0, 289);
+  compare("knife_edge", 4, 1000.0, 1400, by_hand<KnifeEdgeByHand, 4>);
+  compare("contact_oscillator", 3, 1000.0, 2900, by_hand<ContactByHand, 3>);
+  compare("nonholonomic_particle_free", 4, 1000.0, 1400, by_hand<ParticleByHand, 4>);
+  compare("chaplygin_sleigh", 4, 1000.0, 2900);
 }

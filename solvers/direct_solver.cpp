@@ -11,7 +11,7 @@ namespace diracstep {
 namespace {
 
 /// Without KINSOL around them so many fixed-point iterations cost what Newton's method does.
-constexpr int quick_directly = 7;
+constexpr int quick_directly = 8;
 /// Of a matrix of so many entries, a step takes one Jacobian and its factors cost what two or three residuals
 /// do.
 constexpr int few_entries = 600;

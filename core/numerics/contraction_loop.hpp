@@ -31,26 +31,46 @@ inline bool contracts_too_slowly(const ContractionLimits& limits, double norm, d
 
 }  // namespace detail
 
+/// What follows in an iteration x ← x − P⁻¹F each time that F has been evaluated.
+class ContractionSteps {
+ public:
+  enum class Next { stop, correct, correct_and_stop };
+
+  explicit ContractionSteps(const ContractionLimits& limits) : limits_(limits) {}
+
+  /// `norm`: the largest entry of F in units of its block, infinite where one is no number.
+  Next after(double norm) {
+    if (std::isnan(first_)) first_ = norm;
+    end_.nearer = norm <= first_;
+    end_.solved = detail::contracted(limits_, norm, before_);
+    // What is left has the same sign in one step after the other, and drives the energy one way: unless it is
+    // small beside round-off, a last correction, which is not evaluated any more, makes it so.
+    if (end_.solved) return norm > limits_.tolerance / 8.0 ? Next::correct_and_stop : Next::stop;
+    if (detail::contracts_too_slowly(limits_, norm, before_, end_.iterations)) return Next::stop;
+    ++end_.iterations;
+    before_ = norm;
+    return Next::correct;
+  }
+
+  /// How it ended, but for the norms.
+  const Contraction& end() const { return end_; }
+
+ private:
+  ContractionLimits limits_;
+  Contraction end_;
+  double first_ = NAN, before_ = HUGE_VAL;
+};
+
 /// Repeats correct(), which is x ← x − P⁻¹F, until F is round-off or that is slow.  evaluate() takes F at x
-/// and gives its largest entry in units of its block, infinite where one is no number.
+/// and gives its norm as ContractionSteps takes it.
 template <class Evaluate, class Correct>
 inline Contraction contract(const ContractionLimits& limits, Evaluate evaluate, Correct correct) {
-  Contraction end;
-  const double first = evaluate();
-  double norm = first, before = HUGE_VAL;
-  while (!detail::contracted(limits, norm, before) &&
-         !detail::contracts_too_slowly(limits, norm, before, end.iterations)) {
-    correct();
-    ++end.iterations;
-    before = norm;
-    norm = evaluate();
-  }
-  end.solved = detail::contracted(limits, norm, before);
-  // What is left has the same sign in one step after the other, and drives the energy one way: unless it is
-  // small beside round-off, a last correction, which is not evaluated any more, makes it so.
-  if (end.solved && norm > limits.tolerance / 8.0) correct();
-  end.nearer = norm <= first;
-  return end;
+  using Next = ContractionSteps::Next;
+  ContractionSteps steps(limits);
+  Next next = steps.after(evaluate());
+  for (; next == Next::correct; next = steps.after(evaluate())) correct();
+  if (next == Next::correct_and_stop) correct();
+  return steps.end();
 }
 
 }  // namespace diracstep

@@ -185,7 +185,7 @@ std::string power_text(const std::string& x, int exponent) {
 
 }  // namespace
 
-std::string Kernel::expression(const Instruction& instruction) const {
+std::string Kernel::expression(const Instruction& instruction, const CoordinateName& coordinate) const {
   const NodeData& data = instruction.data;
   const std::string a = fmt::format("r{}", data.a), b = fmt::format("r{}", data.b);
   switch (instruction.from) {
@@ -196,7 +196,7 @@ std::string Kernel::expression(const Instruction& instruction) const {
     case From::instance:
       return fmt::format("instance[{}]", data.a);
     case From::coordinate:
-      return fmt::format("in{}[slots[{}]]", data.c, data.a);
+      return coordinate(data.c, data.a);
     case From::multiplier:
       return fmt::format("multipliers[slots[{}]]", data.a);
     case From::time:
@@ -226,12 +226,37 @@ std::string Kernel::expression(const Instruction& instruction) const {
                              : fmt::format("{}({})", function_name(data.op), a);
 }
 
+bool Kernel::of_coordinates_alone() const {
+  return std::ranges::all_of(code_, [](const Instruction& instruction) {
+    const From from = instruction.from;
+    return from == From::computed || from == From::literal || from == From::known || from == From::coordinate;
+  });
+}
+
+bool Kernel::has_roots_or_quotients_alone() const {
+  bool any = false;
+  for (const Instruction& instruction : code_) {
+    const Op op = instruction.data.op;
+    if (instruction.from != From::computed) continue;
+    any = any || op == Op::sqrt || op == Op::divide;
+    if (op != Op::sqrt && function_name(op) != nullptr) return false;
+  }
+  return any;
+}
+
+std::string Kernel::instructions(const CoordinateName& coordinate) const {
+  std::string text;
+  for (std::size_t k = 0; k < code_.size(); ++k)
+    text += fmt::format("    const double r{} = {};\n", k, expression(code_[k], coordinate));
+  return text;
+}
+
 std::string Kernel::source(const std::string& name, int instance_width, int position_width) const {
   std::set<std::string> pointers, tables;  // those that are used: no compiler shall warn
-  std::string body;
+  std::string body =
+      instructions([](int role, int slot) { return fmt::format("in{}[slots[{}]]", role, slot); });
   for (std::size_t k = 0; k < code_.size(); ++k) {
     const From from = code_[k].from;
-    body += fmt::format("    const double r{} = {};\n", k, expression(code_[k]));
     if (from == From::known) pointers.insert("const double* const known = call->known;");
     if (from == From::instance)
       tables.insert(fmt::format("const double* const instance = call->instance + i * {};", instance_width));

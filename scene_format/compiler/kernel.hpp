@@ -2,6 +2,7 @@
 
 #include <array>
 #include <diracstep/scene_format/compiler/formula_graph.hpp>
+#include <functional>
 #include <span>
 #include <string>
 #include <unordered_map>
@@ -23,6 +24,8 @@ struct KernelCall {
 };
 /// Takes a KernelCall; to the generated source, which may be C, that is a struct of its own.
 using CompiledKernel = void (*)(const void* call);
+/// Takes a StageKernelCall (core/system/stage_kernel.hpp), likewise.
+using CompiledStageKernel = void (*)(void* call);
 
 /// Subexpressions that are computed before any kernel runs.
 class Constants {
@@ -65,13 +68,23 @@ class Kernel {
   std::string source(const std::string& name, int instance_width, int position_width) const;
   std::size_t size() const { return code_.size(); }
 
+  /// Whether it reads coordinates and what is known of the parameters, nothing else.
+  bool of_coordinates_alone() const;
+  /// Whether what takes its time are quotients and square roots, of which a processor takes several at once.
+  bool has_roots_or_quotients_alone() const;
+  /// Its instructions in C, for a place where known[] is in scope; coordinate(role, slot) names a coordinate.
+  using CoordinateName = std::function<std::string(int, int)>;
+  std::string instructions(const CoordinateName& coordinate) const;
+  /// Store::value of each is the number k of the rk that holds it after the instructions.
+  const std::vector<Store>& stores() const { return stores_; }
+
  private:
   enum class From : unsigned char { computed, literal, known, instance, coordinate, multiplier, time, scale };
   struct Instruction {
     From from;
     NodeData data;  ///< a, b: earlier instructions, or where a leaf is read from; c: column
   };
-  std::string expression(const Instruction& instruction) const;
+  std::string expression(const Instruction& instruction, const CoordinateName& coordinate) const;
 
   std::vector<Instruction> code_;
   std::vector<Store> stores_;  ///< their values are numbers of instructions

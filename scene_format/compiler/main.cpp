@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <diracstep/scene_format/compiler/scene_program.hpp>
+#include <diracstep/scene_format/compiler/stage_kernel.hpp>
 #include <exception>
 #include <filesystem>
 #include <fstream>
@@ -48,17 +49,25 @@ void compile(const fs::path& directory, const std::vector<fs::path>& scenes) {
     if (program->document.name != name)
       throw std::runtime_error(path.string() + ": the scene is named '" + program->document.name + "'");
     const bool first = kernels.insert(program->name).second;  // two scenes may have the same formulas
-    write(directory / (name + ".cpp"), first ? program->source : "// The same formulas as another scene.\n");
+    const StageKernels stages(*program);
+    const std::string stage_table = "diracstep_stages_" + program->name;
+    std::string source = "// The same formulas as another scene.\n";
+    if (first) source = program->source + (stages.any() ? stages.appendix(stage_table) : "");
+    write(directory / (name + ".cpp"), source);
     if (first)
       declarations +=
           fmt::format("extern \"C\" const CompiledKernel diracstep_kernels_{}[];\n", program->name);
+    if (first && stages.any())
+      declarations += fmt::format("extern \"C\" const CompiledStageKernel {}[];\n", stage_table);
     texts += fmt::format("const unsigned char text_{}[] = {{{}}};\n", name, as_bytes(text));
     table += "    {\"" + name + "\", text_" + name + ", sizeof text_" + name + " - 1, \"" + program->name +
-             "\", diracstep_kernels_" + program->name + "},\n";
+             "\", diracstep_kernels_" + program->name + ", " + (stages.any() ? stage_table : "nullptr") +
+             "},\n";
   }
   write(directory / "shipped_scenes.cpp",
         "#include <diracstep/scene_format/loader/shipped_scenes.hpp>\n\n"
-        "using diracstep::scene_compiler::CompiledKernel;\n" +
+        "using diracstep::scene_compiler::CompiledKernel;\n"
+        "using diracstep::scene_compiler::CompiledStageKernel;\n" +
             declarations + "\nnamespace diracstep {\nnamespace {\n" + texts +
             "const ShippedScene scenes[] = {\n" + table +
             "};\n}  // namespace\nstd::span<const ShippedScene> shipped_scenes() { return scenes; }\n}  // "

@@ -28,7 +28,9 @@ namespace {
 
 namespace fs = std::filesystem;
 using scene_compiler::CompiledKernel;
+using scene_compiler::CompiledStageKernel;
 using scene_compiler::SceneProgram;
+using scene_compiler::StageKernels;
 
 constexpr std::array<const char*, 7> flags{"-std=c11", "-O3", "-ffp-contract=off", "-fno-math-errno", "-fPIC",
                                            "-shared",  "-w"};
@@ -78,11 +80,11 @@ std::string first_line(const fs::path& path) {
 }
 
 /// Empty, or why it failed.
-std::string compile(const SceneProgram& program, const std::string& compiler, const fs::path& folder) {
+std::string compile(const std::string& text, const std::string& compiler, const fs::path& folder) {
   const fs::path source = folder / "kernels.c", messages = folder / "messages.txt";
   try {
     OutputFile file(source.string(), OutputFile::Mode::fresh);
-    file.write(program.source);
+    file.write(text);
     file.close();
   } catch (const std::exception& error) {
     return error.what();
@@ -106,40 +108,62 @@ std::string compile(const SceneProgram& program, const std::string& compiler, co
   return end.status == 0 ? "" : fmt::format("{} failed: {}", compiler, first_line(messages));
 }
 
-KernelLibrary with_table(std::shared_ptr<void> object, const SceneProgram& program,
-                         const std::string& origin) {
+/// A table of kernels in a compiled object.
+struct Table {
+  void* address = nullptr;  ///< null where there is none, for the reason in `origin`
+  std::shared_ptr<void> handle = {};
+  std::string origin = {};
+};
+
+Table with_table(std::shared_ptr<void> object, const std::string& symbol, const std::string& origin) {
   if (!object) return {};
-  void* const table = dlsym(object.get(), ("diracstep_kernels_" + program.name).c_str());
-  return {static_cast<const CompiledKernel*>(table), std::move(object), origin};
+  void* const table = dlsym(object.get(), symbol.c_str());
+  return {table, std::move(object), origin};
 }
 
-KernelLibrary interpreted(const std::string& why) { return {.origin = "interpreted, slowly: " + why}; }
+/// A C source that defines the table `symbol`, and what compiles it.
+struct Source {
+  const std::string& text;
+  std::string symbol, compiler;
+};
 
-KernelLibrary compiled_now(const SceneProgram& program, const KernelCache& cache, const std::string& compiler,
-                           const std::string& key, const std::string& complaint) {
+Table compiled_now(const Source& source, const KernelCache& cache, const std::string& key,
+                   const std::string& complaint) {
   const fs::path folder = cache.make_work_folder();
-  if (folder.empty()) return interpreted("no folder for a compiler's files can be made");
-  const std::string failure = compile(program, compiler, folder);
-  KernelLibrary made;
+  if (folder.empty()) return {.origin = "no folder for a compiler's files can be made"};
+  const std::string failure = compile(source.text, source.compiler, folder);
+  Table made;
   if (failure.empty()) {
     std::string origin = "compiled now";
     if (!complaint.empty()) origin += fmt::format("; what was in the cache {}", complaint);
     if (!cache.keep(folder / "kernels.so", key))
       origin += "; not kept: " + (cache.refusal().empty() ? "the cache cannot be written" : cache.refusal());
-    made = with_table(loaded_object(folder / "kernels.so"), program, origin);
+    made = with_table(loaded_object(folder / "kernels.so"), source.symbol, origin);
   }
   std::error_code ignored;
   fs::remove_all(folder, ignored);
-  if (made.kernels != nullptr) return made;
-  return interpreted(failure.empty() ? "the compiled kernels cannot be loaded" : failure);
+  if (made.address != nullptr) return made;
+  return {.origin = failure.empty() ? "the compiled kernels cannot be loaded" : failure};
 }
+
+/// From the cache, or where it is not there compiled and put there.
+Table compiled_table(const Source& source, bool compile_it = true) {
+  const KernelCache cache;
+  const std::string key = Sha256().add(circumstances(source.compiler)).add(source.text).hex();
+  std::string complaint;
+  Table found = with_table(cache.load(key, complaint), source.symbol, "compiled, from the cache");
+  return found.address != nullptr || !compile_it ? found : compiled_now(source, cache, key, complaint);
+}
+
+KernelLibrary interpreted(const std::string& why) { return {.origin = "interpreted, slowly: " + why}; }
 
 }  // namespace
 
 KernelLibrary kernel_library(const SceneProgram& program) {
   if (environment("DIRACSTEP_CC") == "none") return {.origin = "interpreted, as DIRACSTEP_CC=none asks for"};
   for (const ShippedScene& shipped : shipped_scenes())
-    if (shipped.program == program.name) return {shipped.kernels, {}, "compiled with the library"};
+    if (shipped.program == program.name)
+      return {shipped.kernels, {}, "compiled with the library", shipped.stages};
   if (const std::size_t limit = scene_compiler::size_limits().source_bytes; program.source.size() > limit)
     return interpreted(fmt::format("{} bytes of C code, the limit for a compiler is {} (DIRACSTEP_LIMITS)",
                                    program.source.size(), limit));
@@ -148,12 +172,27 @@ KernelLibrary kernel_library(const SceneProgram& program) {
     return interpreted(fmt::format("DIRACSTEP_CC={} could not be run", environment("DIRACSTEP_CC")));
   if (compiler.empty())
     return interpreted("no C compiler was found (cc, gcc or clang; Debian: apt-get install gcc libc6-dev)");
-  const KernelCache cache;
-  const std::string key = Sha256().add(circumstances(compiler)).add(program.source).hex();
-  std::string complaint;
-  KernelLibrary found = with_table(cache.load(key, complaint), program, "compiled, from the cache");
-  if (found.kernels != nullptr) return found;
-  return compiled_now(program, cache, compiler, key, complaint);
+  Table table = compiled_table({program.source, "diracstep_kernels_" + program.name, compiler});
+  if (table.address == nullptr) return interpreted(table.origin);
+  return {static_cast<const CompiledKernel*>(table.address), std::move(table.handle), table.origin};
+}
+
+CompiledStageKernel StageKernelLibrary::kernel(int stages, bool compile) const {
+  if (kernels_.kernels == nullptr || !sources_.any() || stages > StageKernels::most_stages) return nullptr;
+  const auto number = static_cast<std::size_t>(stages) - 1;
+  if (kernels_.handle == nullptr) return kernels_.stages == nullptr ? nullptr : kernels_.stages[number];
+  const std::scoped_lock lock(mutex_);
+  Compiled& compiled = compiled_[number];
+  if (compiled.tried || (compiled.looked_for && !compile)) return compiled.kernel;
+  compiled.looked_for = true;
+  compiled.tried = compile;
+  const std::string symbol = fmt::format("diracstep_stages_{}_{}", program_.name, stages);
+  const std::string text = sources_.source_file(symbol, stages);
+  Table table = compiled_table({text, symbol, found_compiler()}, compile);
+  if (table.address == nullptr) return nullptr;
+  compiled.tried = true;
+  compiled.handle = std::move(table.handle);
+  return compiled.kernel = *static_cast<const CompiledStageKernel*>(table.address);
 }
 
 }  // namespace diracstep

@@ -17,6 +17,7 @@ class LoadedFunction {
   LoadedFunction(LoadedFunction&&) = default;  // its jobs point into its pieces
 
   const scene_compiler::SceneFunction& function() const { return *function_; }
+  const LoadedScene& scene() const { return *scene_; }
   const std::vector<std::string>& row_names() const { return row_names_; }
   /// Where a row comes from that the file does not hold; empty for others.
   const std::string& row_origin(int row) const;

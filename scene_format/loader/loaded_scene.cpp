@@ -16,7 +16,8 @@ LoadedScene::LoadedScene(std::unique_ptr<const SceneProgram> compiled, Parameter
     : program(std::move(compiled)),
       parameters(std::move(values)),
       layout(*program, parameters),
-      library(kernel_library(*program)) {
+      library(kernel_library(*program)),
+      stage_kernels(*program, library) {
   Evaluator evaluator(*program, parameters, program->known.nodes());
   evaluator.evaluate();
   for (std::size_t i = 0; i < program->known.nodes().size(); ++i)

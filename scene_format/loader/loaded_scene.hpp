@@ -24,6 +24,7 @@ struct LoadedScene {
   CoordinateLayout layout;
   std::vector<double> known;  ///< subexpressions of the parameters alone
   KernelLibrary library;
+  StageKernelLibrary stage_kernels;
 };
 using LoadedScenePtr = std::shared_ptr<const LoadedScene>;
 

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <array>
+#include <diracstep/core/system/stage_kernel.hpp>
 #include <diracstep/scene_format/compiler/evaluator.hpp>
 #include <diracstep/scene_format/loader/loaded_function.hpp>
 #include <diracstep/scene_format/loader/scene_functions.hpp>
@@ -45,7 +46,7 @@ void clear(double* x, int size) {
 }
 
 template <class Base>
-class FilePhaseFunction final : public Base {
+class FilePhaseFunction : public Base {
  public:
   explicit FilePhaseFunction(LoadedFunction function)
       : Base(symmetric_pattern(function.dimension(), function.entries(false)),
@@ -117,6 +118,9 @@ class FilePhaseFunction final : public Base {
     function_.run(4, call);
   }
 
+ protected:
+  const LoadedScene& scene() const { return function_.scene(); }
+
  private:
   /// A call holds one time.
   bool at_once(const PointColumns& at) const {
@@ -150,6 +154,7 @@ class FileRows final : public ConstraintRows {
   }
 
   std::string origin(int row) const override { return function_.row_origin(row); }
+  const LoadedScene& scene() const { return function_.scene(); }
 
   bool workless() const override { return function_.function().workless; }
 
@@ -238,6 +243,19 @@ class FileRows final : public ConstraintRows {
   LoadedFunction function_;
 };
 
+class FileLagrangian final : public FilePhaseFunction<Lagrangian>, public StageKernelSource {
+ public:
+  using FilePhaseFunction::FilePhaseFunction;
+
+  StageKernel stage_kernel(const ConstraintRows* rows, int stages, Effort effort) const override {
+    const auto* const of_file = dynamic_cast<const FileRows*>(rows);
+    const bool of_this_file =
+        rows == nullptr ? scene().program->rows.empty() : of_file != nullptr && &of_file->scene() == &scene();
+    if (!of_this_file) return {};
+    return {scene().stage_kernels.kernel(stages, effort == Effort::compile), scene().known.data()};
+  }
+};
+
 class FileForce final : public Force {
  public:
   explicit FileForce(LoadedFunction function)
@@ -297,7 +315,7 @@ bool vanishes(const LoadedScene& scene, const SceneFunction& function) {
 
 std::shared_ptr<const Lagrangian> file_lagrangian(const LoadedScenePtr& scene) {
   if (!scene->program->lagrangian) return nullptr;
-  return std::make_shared<FilePhaseFunction<Lagrangian>>(LoadedFunction(scene, *scene->program->lagrangian));
+  return std::make_shared<FileLagrangian>(LoadedFunction(scene, *scene->program->lagrangian));
 }
 
 std::shared_ptr<const Hamiltonian> file_hamiltonian(const LoadedScenePtr& scene) {

@@ -13,6 +13,7 @@ struct ShippedScene {
   std::size_t size;
   const char* program;  ///< the content name of the kernels' source
   const scene_compiler::CompiledKernel* kernels;
+  const scene_compiler::CompiledStageKernel* stages;  ///< from s = 1 on; null where there are none
 };
 
 /// Sorted by name.

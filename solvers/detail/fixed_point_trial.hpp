@@ -11,11 +11,17 @@ namespace diracstep::detail {
 class FixedPointTrial {
  public:
   static constexpr int solves_to_judge = 12;
+  /// The first solves of a run have too little history to be guessed well, and do not count.
+  static constexpr int solves_without_history = 2;
 
   bool given_up() const { return given_up_; }
   bool over() const { return solves_ >= solves_to_judge; }
   /// Counts a solve; whether there are enough to judge by.
   bool add(int iterations) {
+    if (first_solves_ < solves_without_history) {
+      ++first_solves_;
+      return false;
+    }
     iterations_ += iterations;
     ++solves_;
     return over();
@@ -27,18 +33,20 @@ class FixedPointTrial {
 
   void reset() { *this = {}; }
   void save(Snapshot& to) const {
+    to.put("solves that do not count", first_solves_);
     to.put("judged solves", solves_);
     to.put("judged iterations", iterations_);
     to.put("fixed-point iteration given up", given_up_);
   }
   void restore(SnapshotReader& from) {
+    first_solves_ = static_cast<int>(from.whole_number("solves that do not count", solves_without_history));
     solves_ = static_cast<int>(from.whole_number("judged solves", solves_to_judge));
     iterations_ = static_cast<int>(from.whole_number("judged iterations", std::numeric_limits<int>::max()));
     given_up_ = from.flag("fixed-point iteration given up");
   }
 
  private:
-  int solves_ = 0, iterations_ = 0;
+  int first_solves_ = 0, solves_ = 0, iterations_ = 0;
   bool given_up_ = false;
 };
 

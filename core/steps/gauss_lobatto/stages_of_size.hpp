@@ -11,6 +11,7 @@
 #include <diracstep/core/steps/gauss_lobatto/fixed_stages.hpp>
 #include <diracstep/core/steps/gauss_lobatto/full_blocks.hpp>
 #include <diracstep/core/steps/gauss_lobatto/stage_sums.hpp>
+#include <diracstep/core/system/stage_kernel.hpp>
 #include <functional>
 
 namespace diracstep::detail {
@@ -42,9 +43,15 @@ class Stages final : public FixedStages {
     for (int j = 0; j < s; ++j)
       for (int l = 0; l < s; ++l)
         for (int k = 0; k < s; ++k) mix_[j * s + l] += by_constraint_[j * s + k] * by_impulse_[k * s + l];
+    take_kernel(StageKernelSource::Effort::none);
   }
 
   double evaluate(const double* x) override {
+    if (has_kernel()) {
+      copy<unknowns>(x, evaluated_x_.data());
+      run_kernel(evaluated_x_.data(), residual_.data());
+      return call_.largest_impulse;
+    }
     std::uint64_t largest = 0;
     StagePoints& at = *a_.points;
     const double* const q0 = at.lobatto.data();
@@ -63,6 +70,7 @@ class Stages final : public FixedStages {
   }
 
   void residual(const double* x, double* f) override {
+    if (kernel_.run != nullptr) return copy<unknowns>(residual_.data(), f);
     std::array<double, velocities> row;
     for (int i = 0; i < s; ++i)
       for (int r = 0; r < n; ++r) row[i * n + r] = a_.lv[i * n + r] - a_.p0[r];
@@ -74,6 +82,7 @@ class Stages final : public FixedStages {
 
   Contraction contract(double* x, double* f, const ContractionLimits& limits, Scales& scales,
                        const std::function<void()>& prepare) override {
+    if (has_kernel()) return contract_in_kernel(x, f, limits, scales, prepare);
     std::array<double, 4> norms{};
     bool prepared = false;
     const auto evaluate = [&] {
@@ -104,6 +113,7 @@ class Stages final : public FixedStages {
     const double* from = block_.data();
     for (int k = 0; k < velocities; ++k, from += velocities) copy<velocities>(from, values + unknowns * k);
     if constexpr (m > 0) {
+      if (kernel_.run != nullptr) expand_impulses();
       if (s > 1) add_curvature(values);
       add_multipliers(values);
       add_constraint(values);
@@ -113,6 +123,7 @@ class Stages final : public FixedStages {
   void take_splitting(const double* inverse_mass) override {
     copy<n * n>(inverse_mass, inverse_mass_.data());
     if constexpr (m > 0) {
+      if (kernel_.run != nullptr) expand_impulses();
       expand_constraint(constraint_forms_);
       for (int l = 0; l < s; ++l)
         for (int b = 0; b < m; ++b)
@@ -157,8 +168,7 @@ class Stages final : public FixedStages {
         for (int a = 0; a < m; ++a)
           for (int r = 0; r < n; ++r)
             multipliers[m * j + a] -= constraint_forms_[j][a + m * r] * mixed[n * j + r];
-      if (!regular_) multipliers[0] = std::nan("");
-      response_.solve(multipliers);
+      solve_rows(multipliers);
       for (int l = 0; l < s; ++l)
         for (int r = 0; r < n; ++r) {
           double sum = 0.0;
@@ -171,6 +181,20 @@ class Stages final : public FixedStages {
   }
 
  private:
+  /// So many evaluations take as long as it takes to compile a kernel.
+  static constexpr long evaluations_worth_a_kernel = 1'000'000;
+
+  bool has_kernel() {
+    if (kernel_.run == nullptr && ++evaluations_ == evaluations_worth_a_kernel)
+      take_kernel(StageKernelSource::Effort::compile);
+    return kernel_.run != nullptr;
+  }
+  void take_kernel(StageKernelSource::Effort effort) {
+    const auto* const source = dynamic_cast<const StageKernelSource*>(a_.lagrangian);
+    if (source != nullptr) kernel_ = source->stage_kernel(a_.rows, s, effort);
+    if (kernel_.run != nullptr) call_ = call_of_kernel();
+  }
+
   /// Aᵀλ, and the bits of its largest term, which have the order of positive doubles.
   static void impulse(const Forms& forms, const double* lambda, double* to, std::uint64_t& largest) {
     for (int r = 0; r < n; ++r) {
@@ -199,6 +223,98 @@ class Stages final : public FixedStages {
       for (int a = 0; a < m; ++a)
         for (int r = 0; r < n; ++r) f[m * j + a] += forms[a + m * r] * x[n * j + r];
     }
+  }
+
+  /// What a kernel asks in the course of contract().
+  struct Course {
+    Stages& stages;
+    ContractionSteps steps;
+    Scales& scales;
+    const std::function<void()>& prepare;
+    bool prepared = false;
+
+    int next() {
+      const StageKernelCall& call = stages.call_;
+      scales.moved = false;
+      scales.momentum = std::max(scales.momentum, call.largest_impulse + scales.beside_impulses);
+      double norm = call.momentum / scales.momentum;
+      if (m > 0) norm = std::max(norm, call.constraint / scales.constraint);
+      const ContractionSteps::Next next = steps.after(norm);
+      if (next == ContractionSteps::Next::stop) return StageKernelCall::stop;
+      if (!prepared) prepare();
+      prepared = scales.moved = true;
+      return next == ContractionSteps::Next::correct ? StageKernelCall::correct
+                                                     : StageKernelCall::correct_and_stop;
+    }
+  };
+
+  Contraction contract_in_kernel(double* x, double* f, const ContractionLimits& limits, Scales& scales,
+                                 const std::function<void()>& prepare) {
+    Course course{*this, ContractionSteps(limits), scales, prepare};
+    call_.owner = &course;
+    call_.next = [](void* owner) { return static_cast<Course*>(owner)->next(); };
+    run_kernel(x, f);
+    call_.next = nullptr;
+    if (!scales.moved) copy<unknowns>(f, residual_.data());
+    Contraction end = course.steps.end();
+    end.residual_norms = {call_.momentum, call_.constraint};
+    return end;
+  }
+
+  /// All of the residual at once, with its f in `f`, or the whole iteration.
+  void run_kernel(double* x, double* f) {
+    if (const double h = a_.points->step.size; h != weights_step_) {
+      weights_step_ = h;
+      call_.per_step = 1.0 / h;
+      for (int i = 0; i < s; ++i)
+        for (int k = 0; k < s; ++k) {
+          stage_weights_[0][s * k + i] = weights_.position(k, i);
+          stage_weights_[1][s * k + i] = weights_.lobatto(k, i + 1);
+          stage_weights_[2][s * k + i] = weights_.force(k, i);
+          stage_weights_[3][s * k + i] = weights_.impulse(k, i);
+        }
+    }
+    call_.x = x;
+    call_.f = f;
+    kernel_.run(&call_);
+  }
+
+  /// Everything but x, f and the step.
+  StageKernelCall call_of_kernel() {
+    StagePoints& at = *a_.points;
+    for (int i = 0; i < s; ++i)
+      for (int k = 0; k < s; ++k) {
+        stage_weights_[4][s * k + i] = by_constraint_[s * i + k];
+        stage_weights_[5][s * k + i] = by_impulse_[s * i + k];
+      }
+    StageKernelCall call{};
+    call.known = kernel_.known;
+    call.q0 = at.lobatto.data(), call.p0 = a_.p0;
+    call.position = stage_weights_[0].data(), call.lobatto = stage_weights_[1].data();
+    call.force = stage_weights_[2].data(), call.impulse = stage_weights_[3].data();
+    call.gauss = at.gauss.data(), call.lobatto_points = at.lobatto.data();
+    call.lq = a_.lq, call.lv = a_.lv;
+    call.at_lobatto = a_.at_lobatto, call.at_gauss = a_.at_gauss, call.impulses = a_.impulses;
+    call.solve_rows = [](void* owner, double* multipliers) {
+      static_cast<Course*>(owner)->stages.solve_rows(multipliers);
+    };
+    call.inverse_mass = inverse_mass_.data();
+    call.constraint_forms = constraint_forms_.front().data();
+    call.through_mass = through_mass_.front().data();
+    call.by_constraint = stage_weights_[4].data(), call.by_impulse = stage_weights_[5].data();
+    return call;
+  }
+
+  /// NaN where the matrix is singular.
+  void solve_rows(double* multipliers) {
+    if (!regular_) multipliers[0] = std::nan("");
+    response_.solve(multipliers);
+  }
+
+  /// A where the impulses enter.
+  void expand_impulses() {
+    for (int j = 0; j < s; ++j)
+      forms_pattern_.expand(a_.at_lobatto + forms_pattern_.entries() * j, lobatto_forms_[j].data());
   }
 
   /// A where the constraint stands.
@@ -279,6 +395,8 @@ class Stages final : public FixedStages {
   }
 
   StageArrays a_;
+  StageKernel kernel_{};
+  long evaluations_ = 0;  ///< without a kernel
   const StageWeights& weights_;
   FullBlocks<n, n> second_;
   FullBlocks<rows, n> forms_pattern_;
@@ -291,6 +409,10 @@ class Stages final : public FixedStages {
   Square inverse_mass_{};
   std::array<double, velocities * velocities> block_{};
   SmallLu<s * m> response_;
+  std::array<std::array<double, s * s>, 6> stage_weights_{};  ///< of the kernel
+  double weights_step_ = 0.0;                                 ///< the step size that they are for
+  StageKernelCall call_{};
+  std::array<double, unknowns> evaluated_x_{}, residual_{};  ///< of the kernel, at the last point
 };
 
 }  // namespace diracstep::detail

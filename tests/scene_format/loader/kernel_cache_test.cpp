@@ -6,9 +6,12 @@
 #include <chrono>
 #include <csignal>
 #include <cstdlib>
+#include <diracstep/core/integrator/integrator.hpp>
+#include <diracstep/core/system/stage_kernel.hpp>
 #include <diracstep/scene_format/loader/compiler_process.hpp>
 #include <diracstep/scene_format/loader/kernel_cache.hpp>
 #include <diracstep/scene_format/scene_file.hpp>
+#include <diracstep/solvers/direct_solver.hpp>
 #include <filesystem>
 #include <fstream>
 #include <map>
@@ -47,11 +50,18 @@ class Cache : public ::testing::Test {
   fs::path cache() const { return folder_ / "cache"; }
 
   /// How the kernels of an oscillator were made; another `number` is another source.
-  static std::string origin(int number = 1) {
+  static std::string origin(int number = 1) { return oscillator(number).code; }
+
+  static CatalogueScene oscillator(int number) {
     return scene_from_text(
-               "s.toml", "name = \"s\"\nlagrangian = \"v_x^2/2 - " + std::to_string(number) +
-                             "*x^4/7\"\n[coordinates]\nx = {}\n[start]\nx = 1\n[span]\nend = 1\nstep = 0.1\n")
-        .code;
+        "s.toml", "name = \"s\"\nlagrangian = \"v_x^2/2 - " + std::to_string(number) +
+                      "*x^4/7\"\n[coordinates]\nx = {}\n[start]\nx = 1\n[span]\nend = 1\nstep = 0.1\n");
+  }
+
+  using Effort = StageKernelSource::Effort;
+  static bool has_stage_kernel(const CatalogueScene& entry, Effort effort) {
+    const auto* const source = dynamic_cast<const StageKernelSource*>(entry.scene->lagrangian.get());
+    return source != nullptr && source->stage_kernel(nullptr, 3, effort).run != nullptr;
   }
 
   std::vector<fs::path> kept() const {
@@ -74,6 +84,31 @@ class Cache : public ::testing::Test {
   fs::path folder_;
   std::map<std::string, std::optional<std::string>> before_;
 };
+
+/// A first short run does not wait for it.
+TEST_F(Cache, AStageKernelIsCompiledWhereItIsWorthIt) {
+  const CatalogueScene entry = oscillator(3);
+  EXPECT_FALSE(has_stage_kernel(entry, Effort::none));
+  EXPECT_EQ(kept().size(), 1u);
+  EXPECT_TRUE(has_stage_kernel(entry, Effort::compile));
+  EXPECT_EQ(kept().size(), 2u);
+  EXPECT_TRUE(has_stage_kernel(entry, Effort::none));
+  EXPECT_TRUE(has_stage_kernel(oscillator(3), Effort::none)) << "it is in the cache";
+  set("DIRACSTEP_CC", "none");
+  EXPECT_FALSE(has_stage_kernel(oscillator(3), Effort::compile));
+}
+
+TEST_F(Cache, ALongRunCompilesItsStageKernel) {
+  const CatalogueScene entry = oscillator(4);
+  Integrator steps(entry.scene, Registry::with_built_ins(), direct(), {.method = "type1/gl:3", .step = 0.01});
+  const auto take = [&](int count) {
+    for (int k = 0; k < count; ++k) ASSERT_TRUE(steps.step().ok());
+  };
+  take(1000);
+  EXPECT_FALSE(has_stage_kernel(entry, Effort::none));
+  take(1000000);
+  EXPECT_TRUE(has_stage_kernel(entry, Effort::none));
+}
 
 TEST_F(Cache, ADamagedObjectIsCompiledAnewAndNeverLoaded) {
   ASSERT_EQ(origin(), "compiled now");
