@@ -114,7 +114,7 @@ class LinearisedMotion {
 
 /// So that an undamped motion of so many radians loses 1e-5 of its amplitude; see default_method_of_motion().
 double local_error_for(double radians) {
-  constexpr double usual = AdaptiveOptions::usual_local_error, smallest = 1e-10;
+  constexpr double usual = AdaptiveOptions::usual_local_error, smallest = 1e-8;
   return radians > 0.0 ? std::clamp(std::pow(2e-3 / radians, 1.2), smallest, usual) : usual;
 }
 
@@ -138,11 +138,12 @@ DampingSurvey survey_damping(const std::shared_ptr<const Scene>& scene, const Re
   AdaptiveIntegrator integrator(scene, registry, solvers, options, {.eps = surveying_error, .end = end});
   LinearisedMotion motion(integrator.integrator().scene(), solvers);
   Sample node;
+  survey.undamped = HUGE_VAL;
   for (long k = 0; k < damping_steps && std::abs(integrator.time() - start) < span; ++k) {
     if (!integrator.sample(Momentum::projected, node).ok()) break;
     const auto [rate, undamped] = motion.rates(node);
     const double h = step > 0.0 ? longest : std::min(std::abs(integrator.next_size()), longest);
-    survey.undamped = std::max(survey.undamped, undamped);
+    if (rate > 0.0) survey.undamped = std::min(survey.undamped, undamped);
     survey.covered = std::abs(node.time - start);
     survey.rate = std::max(survey.rate, rate);
     if (rate * h > survey.product) {
@@ -154,6 +155,7 @@ DampingSurvey survey_damping(const std::shared_ptr<const Scene>& scene, const Re
     survey.failure = report.failure;
     break;
   }
+  if (!std::isfinite(survey.undamped)) survey.undamped = 0.0;
   return survey;
 }
 
@@ -166,10 +168,10 @@ DefaultMethod default_method_of_motion(const std::shared_ptr<const Scene>& given
     const DampingSurvey survey = survey_damping(scene, registry, solvers, end, step, options);
     if (survey.strong()) {
       DefaultMethod choice{surveying_method, 0,
-                           "strong damping: what is fastest dies out at a rate of " + to_text(survey.rate, 2) +
-                               ", which times a step of " + to_text(survey.step, 2) + " is " +
-                               to_text(survey.product, 2) + " at most, above " +
-                               to_text(DampingSurvey::strong_from, 2)};
+                           "strong damping: what is fastest dies out at a rate of " +
+                               to_text(survey.rate, 2) + ", which times a step of " +
+                               to_text(survey.step, 2) + " is " + to_text(survey.product, 2) +
+                               " at most, above " + to_text(DampingSurvey::strong_from, 2)};
       const double radians = survey.undamped * std::abs(end - scene->start.time);
       choice.local_error = local_error_for(radians);
       if (choice.local_error < AdaptiveOptions::usual_local_error)

@@ -10,11 +10,11 @@ namespace diracstep {
 
 /// How fast a motion is damped, beside the steps that it is followed with.
 struct DampingSurvey {
-  double rate = 0.0;         ///< d, the largest decay rate met, 1/time
-  double undamped = 0.0;     ///< the largest |Im λ| met with |Re λ| below a hundredth of it
-  double step = 0.0;         ///< h, the step where d h is largest
-  double product = 0.0;      ///< the largest d h
-  double covered = 0.0;      ///< time surveyed
+  double rate = 0.0;      ///< d, the largest decay rate met, 1/time
+  double undamped = 0.0;  ///< the largest |Im λ| with |Re λ| below a hundredth of it, where that is smallest
+  double step = 0.0;      ///< h, the step where d h is largest
+  double product = 0.0;   ///< the largest d h
+  double covered = 0.0;   ///< time surveyed
   std::string failure = {};  ///< empty, or why nothing is known
 
   /// Above it GL(s) leaves a third and more of what should have died out, with a sign that alternates from
@@ -44,7 +44,7 @@ DampingSurvey survey_damping(const std::shared_ptr<const Scene>& scene, const Re
 /// below 1e-9 is asked for and survey_damping() finds strong damping; else that of default_method().
 ///
 /// Radau IIA also takes energy from what nothing damps.  Where the survey finds such a motion, of ω T radians
-/// in all, DefaultMethod::local_error is eps = (2e-3/(ω T))^(6/5), from 1e-10 to 1e-6: on an oscillator the
+/// in all, DefaultMethod::local_error is eps = (2e-3/(ω T))^(6/5), from 1e-8 to 1e-6: on an oscillator the
 /// amplitude lost is about 4.5e-3 ω T eps^(5/6) (measured for ω T from 1e2 to 1e5), then 1e-5.
 DefaultMethod default_method_of_motion(const std::shared_ptr<const Scene>& scene, const Registry& registry,
                                        const SolverFactory& solvers, double end, double step,

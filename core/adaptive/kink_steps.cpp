@@ -13,20 +13,33 @@ constexpr double finest_part = 1e-14;  // of the step
 
 }  // namespace
 
-KinkSteps::KinkSteps(Integrator& integrator)
-    : integrator_(integrator), kinks_(integrator.scene().kinks) {
+KinkSteps::KinkSteps(Integrator& integrator) : integrator_(integrator), kinks_(integrator.scene().kinks) {
   if (kinks_ && kinks_->count() == 0) kinks_ = nullptr;
 }
 
-void KinkSteps::read(Vector& switches) const {
+/// By the velocity of the projected momentum: where rows act, the estimate of a step is not that of the
+/// method's order.
+void KinkSteps::read(Vector& switches) {
+  const bool known = integrator_.sample(Momentum::projected, here_).ok();
   switches.resize(kinks_->count());
-  kinks_->evaluate(integrator_.time(), integrator_.position(), integrator_.velocity_estimate(), switches);
+  kinks_->evaluate(integrator_.time(), integrator_.position(),
+                   known ? here_.v : integrator_.velocity_estimate(), switches);
 }
 
 /// The number of a kink that the step crossed; -1 where none.
 int KinkSteps::first_change() const {
   for (Eigen::Index k = 0; k < after_.size(); ++k)
     if (kinks_->kinds()[static_cast<std::size_t>(k)] == Kinks::Kind::kink && before_[k] * after_[k] < 0.0)
+      return static_cast<int>(k);
+  return -1;
+}
+
+/// The number of a kink that the motion is about to cross or comes from; -1 where none.
+int KinkSteps::ahead() const {
+  if (changes_.size() != before_.size()) return -1;
+  for (Eigen::Index k = 0; k < before_.size(); ++k)
+    if (kinks_->kinds()[static_cast<std::size_t>(k)] == Kinks::Kind::kink &&
+        std::abs(before_[k]) <= 2.0 * changes_[k])
       return static_cast<int>(k);
   return -1;
 }
@@ -64,10 +77,11 @@ StepReport KinkSteps::stuck(int number) const {
   StepReport report;
   report.solve.status = SolveStatus::no_convergence;
   report.time = integrator_.time();
-  report.failure = "from t = " + to_text(integrator_.time(), 6) + " the motion crosses " +
-                   kinks_->names()[static_cast<std::size_t>(number)] +
-                   " again and again: the force there points back from both sides, as that of dry friction at rest, and "
-                   "lets no step pass; write one that is steep instead of a jump, as tanh(v/eps)";
+  report.failure =
+      "from t = " + to_text(integrator_.time(), 6) + " the motion crosses " +
+      kinks_->names()[static_cast<std::size_t>(number)] +
+      " again and again: the force there points back from both sides, as that of dry friction at rest, and "
+      "lets no step pass; write one that is steep instead of a jump, as tanh(v/eps)";
   return report;
 }
 
@@ -81,8 +95,12 @@ StepReport KinkSteps::step(double h, const std::function<bool()>& at_part) {
     double size = left;
     StepReport report = integrator_.step(size);
     for (int k = 0; k < most_halvings && !report.ok(); ++k) report = integrator_.step(size *= 0.5);
-    if (!report.ok()) return crossed >= 0 ? stuck(crossed) : report;
+    if (!report.ok()) {
+      const int number = crossed >= 0 ? crossed : ahead();
+      return number >= 0 ? stuck(number) : report;
+    }
     read(after_);
+    changes_ = (after_ - before_).cwiseAbs();
     int number = first_change(), last = -1;
     while (number >= 0 && std::abs(size) > finest_part * std::abs(h)) {
       last = number;

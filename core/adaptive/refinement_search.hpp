@@ -45,6 +45,7 @@ class RefinementSearch {
   }
   void count(ErrorControlRun& now, const Work& work);
   bool time_is_up() const;
+  bool kinks_on_the_way() const;
   bool reached_end(double t) const;
   bool stopped(long max_solves);
   bool survey(bool accepted);

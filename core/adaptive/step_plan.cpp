@@ -44,8 +44,7 @@ double StepPlan::mean_step(long refinement) const {
   return (stretches_.back().end - stretches_.front().begin) / static_cast<double>(steps_ * refinement);
 }
 
-StepReport StepPlan::run(Integrator& integrator, long refinement,
-                         const std::function<bool()>& at_node,
+StepReport StepPlan::run(Integrator& integrator, long refinement, const std::function<bool()>& at_node,
                          const std::function<bool()>& at_part) const {
   StepReport report;
   KinkSteps steps(integrator);

@@ -152,12 +152,13 @@ std::string Integrator::kink_ahead(double h) const {
   Vector here(scene_->kinks->count()), there(here);
   const Vector speed_up = (state_.v - last_.start.v) / last_.size;
   scene_->kinks->evaluate(time(), state_.q, state_.v, here);
-  scene_->kinks->evaluate(time() + h, state_.q + h * state_.v + 0.5 * h * h * speed_up, state_.v + h * speed_up,
-                          there);
+  scene_->kinks->evaluate(time() + h, state_.q + h * state_.v + 0.5 * h * h * speed_up,
+                          state_.v + h * speed_up, there);
   for (Eigen::Index k = 0; k < here.size(); ++k)
     if (here[k] * there[k] < 0.0)
       return "; in the step " + scene_->kinks->names()[static_cast<std::size_t>(k)] +
-             " changes sides: where a force jumps there and points back from both sides, as dry friction at rest, "
+             " changes sides: where a force jumps there and points back from both sides, as dry friction at "
+             "rest, "
              "no step has a solution; write one that is steep instead of a jump, as tanh(v/eps)";
   return {};
 }

@@ -111,7 +111,7 @@ class Integrator {
   std::unique_ptr<StepSequence> sequence_;
   std::unique_ptr<TimeKinks> time_kinks_;
   std::unique_ptr<LeftOutRows> left_out_;  ///< null where no rows are left out
-  std::vector<Interval> parts_, pieces_;  ///< of the step
+  std::vector<Interval> parts_, pieces_;   ///< of the step
   bool met_kinks_ = false;
 
   Clock clock_;

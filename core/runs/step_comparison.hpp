@@ -14,9 +14,9 @@ namespace diracstep {
 /// of the motion of 1, the others at more.  Velocities and momenta, whose way may be short at a turning
 /// point, are measured by the longest way of the whole run, and doubted above a half of it.
 ///
-/// A step of order 3 and above that differs from its parts by a hundredth of the whole motion, of the way from
-/// the first point compared and the largest momentum, is doubted too: no resolved motion has such steps, and
-/// in a run that is soon slow, as after a start under drag, it may be the only one.
+/// A step of order 3 and above that differs from its parts by a hundredth of the whole motion, of the way
+/// from the first point compared and the largest momentum, is doubted too: no resolved motion has such steps,
+/// and in a run that is soon slow, as after a start under drag, it may be the only one.
 class StepComparison {
  public:
   static constexpr double first_part = 0.382;
@@ -31,7 +31,8 @@ class StepComparison {
   std::string text() const;
   /// The largest difference of positions so far; NaN before the first.
   double worst() const { return worst_; }
-  /// The largest difference of positions so far, in parts of the way of the motion, or of momenta in parts of the largest.
+  /// The largest difference of positions so far, in parts of the way of the motion, or of momenta in parts of
+  /// the largest.
   double part_of_motion() const;
 
  private:

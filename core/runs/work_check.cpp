@@ -75,7 +75,8 @@ std::string WorkCheck::text() const {
   if (!(taken_ > too_much_taken * at_play_)) return {};
   std::ostringstream text;
   text.precision(2);
-  text << "the method took " << 100.0 * taken_ / at_play_ << " % of the energy at play until t = " << taken_by_
+  text << "the method took " << 100.0 * taken_ / at_play_
+       << " % of the energy at play until t = " << taken_by_
        << ", beside the work of the forces: it damps what its steps do not resolve; a smaller --eps or step, "
           "or a method that keeps the energy if that matters here";
   return text.str();

@@ -6,9 +6,9 @@
 
 namespace diracstep {
 
-/// Compares the energy of a run with a method that damps with the work  W = ∫ f·v dt  of the scene's forces: what is lost
-/// beside it, the method took.  Doubted where that exceeds a thousandth of the energies at play, the larger of |p·v|/2 and
-/// the change of the energy, and five times the error of the quadrature.
+/// Compares the energy of a run with a method that damps with the work  W = ∫ f·v dt  of the scene's forces:
+/// what is lost beside it, the method took.  Doubted where that exceeds a thousandth of the energies at play,
+/// the larger of |p·v|/2 and the change of the energy, and five times the error of the quadrature.
 ///
 /// Only for scenes with a force whose energy changes by it alone: no time in L, and rows that do no work.
 class WorkCheck {

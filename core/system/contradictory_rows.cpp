@@ -170,8 +170,7 @@ namespace {
 std::vector<std::string> names_left_out(const Scene& scene) {
   const std::vector<std::string> kept = scene.row_names();
   std::vector<std::string> names = scene.whole->row_names();
-  std::erase_if(names,
-                [&](const std::string& name) { return std::ranges::find(kept, name) != kept.end(); });
+  std::erase_if(names, [&](const std::string& name) { return std::ranges::find(kept, name) != kept.end(); });
   return names;
 }
 

@@ -43,12 +43,14 @@ step = 0.1
 }
 
 TEST_F(Believed, RowsLeftOutAreHeldTo) {
-  for (const char* later : {"if(t > 0.4 and t < 0.6, 1, 0)", "exp(-((t - 0.5)/0.01)^2)", "exp(-((t - 0.537)/0.001)^2)"}) {
+  for (const char* later :
+       {"if(t > 0.4 and t < 0.6, 1, 0)", "exp(-((t - 0.5)/0.01)^2)", "exp(-((t - 0.537)/0.001)^2)"}) {
     const std::string file = scene("rows", two_rows(later));
     for (const char* how : {"", " --error 1e-6"}) {
       const Outcome outcome = run("run " + file + " --drop-redundant" + how);
       EXPECT_EQ(outcome.status, 1) << later << how << outcome.err;
-      EXPECT_TRUE(says(outcome, "left out as redundant: 'two' contradicts 'one'")) << later << how << outcome.err;
+      EXPECT_TRUE(says(outcome, "left out as redundant: 'two' contradicts 'one'"))
+          << later << how << outcome.err;
     }
   }
   const Outcome agreed = run("run " + scene("rows", two_rows("0*t")) + " --drop-redundant");
@@ -251,8 +253,10 @@ v_x = 0.4
 v_y = 0
 guess = )toml";
   const std::string span = "\n[span]\nend = 0.5\nstep = 0.05\n";
-  expect_misuse("run " + scene("velocity", text + R"(["y"])" + span), {"'rod'", "no velocity is named as a guess"});
-  expect_misuse("run " + scene("position", text + R"(["v_y"])" + span), {"'rod'", "no position is named as a guess"});
+  expect_misuse("run " + scene("velocity", text + R"(["y"])" + span),
+                {"'rod'", "no velocity is named as a guess"});
+  expect_misuse("run " + scene("position", text + R"(["v_y"])" + span),
+                {"'rod'", "no position is named as a guess"});
 }
 
 TEST_F(Believed, LagrangiansLinearInTheVelocityHaveNoRateToTell) {
