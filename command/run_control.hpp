@@ -3,6 +3,7 @@
 #include <diracstep/command/files/checkpoint_file.hpp>
 #include <diracstep/command/files/trajectory_file.hpp>
 #include <diracstep/command/run_report.hpp>
+#include <diracstep/core/runs/event_steps.hpp>
 #include <optional>
 #include <string>
 #include <utility>
@@ -16,16 +17,15 @@ struct Keeping {
   long every = 1;  ///< each so many points go to the file
   /// In place of each so many: times in the direction of the steps, which may lie between nodes.
   std::vector<double> times = {};
-  std::vector<Event> events = {};                                  ///< that are looked for at each step
   TrajectoryFile* file = nullptr;                                  ///< none: only the end is read
   std::string checkpoint = {};                                     ///< path, or empty
   long checkpoint_every = 0;                                       ///< steps; 0: every ten seconds
   std::vector<std::pair<std::string, std::string>> identity = {};  ///< of the run, for the checkpoint
 };
 
-/// Steps from where the integrator stands to step number `steps`, to a failure or to Ctrl-C, and keeps points
-/// and checkpoints on the way.  A checkpoint stands before the point of its step is kept, and what it says of
+/// Steps from where they stand to step number `steps`, to an event that stops them, to a failure or to
+/// Ctrl-C, and keeps points and checkpoints on the way.  A checkpoint stands before the point of its step is kept, and what it says of
 /// the trajectory is on the disk before it is.
-void run_to(long steps, Integrator& integrator, const Keeping& keeping, RunResult& result);
+void run_to(long steps, EventSteps<Integrator>& motion, const Keeping& keeping, RunResult& result);
 
 }  // namespace diracstep::command

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/system/consistent_start.hpp>
+#include <diracstep/core/system/row_subset.hpp>
 #include <diracstep/files/input_file.hpp>
 #include <diracstep/scene_format/compiler/size_limits.hpp>
 #include <diracstep/scene_format/loader/defined_start.hpp>
@@ -327,20 +328,55 @@ void add_outputs(CatalogueScene& entry, const LoadedScenePtr& loaded) {
     if (std::ranges::find(names, name) != names.end())
       throw SceneError(program.document.file, program.document.outputs[i].place,
                        fmt::format("the output '{}' has the name of a coordinate", name));
-    entry.outputs.push_back({name, file_value(loaded, function)});
+    entry.outputs.push_back({name, file_point_value(loaded, function, entry.shown().row_names())});
   }
 }
 
-void add_events(CatalogueScene& entry, const LoadedScenePtr& loaded) {
+Event event_of(const CatalogueScene& entry, const LoadedScenePtr& loaded, const SceneDocument::Event& stated,
+               const EventProgram& program) {
   using Stated = SceneDocument::Event::Direction;
+  const std::vector<std::string> rows = entry.shown().row_names();
+  const auto function = [&](const std::optional<SceneFunction>& of) {
+    return of ? file_point_value(loaded, *of, rows) : PointFunction{};
+  };
+  Event event;
+  event.name = stated.name;
+  event.at = function(program.when);
+  event.direction = stated.direction == Stated::both     ? Event::Direction::both
+                    : stated.direction == Stated::rising ? Event::Direction::rising
+                                                         : Event::Direction::falling;
+  event.stop = stated.stop;
+  event.every = stated.every;
+  event.condition = function(program.condition);
+  event.on = stated.on;
+  event.off = stated.off;
+  event.restitution = function(program.restitution);
+  if (program.contact) event.contact = file_rows(loaded, *program.contact);
+  for (std::size_t k = 0; k < program.set.size(); ++k)
+    for_each_value(*loaded, program.set[k], 0.0, [&](int index, double) {
+      event.set.push_back(
+          {index, program.set[k].role == Role::second, file_point_value(loaded, program.values[k], rows)});
+    });
+  return event;
+}
+
+void add_events(CatalogueScene& entry, const LoadedScenePtr& loaded) {
   const SceneProgram& program = *loaded->program;
-  for (std::size_t i = 0; i < program.events.size(); ++i) {
-    const SceneDocument::Event& stated = program.document.events[i];
-    const Event::Direction direction = stated.direction == Stated::both     ? Event::Direction::both
-                                       : stated.direction == Stated::rising ? Event::Direction::rising
-                                                                            : Event::Direction::falling;
-    entry.events.push_back({stated.name, file_value(loaded, program.events[i]), direction, stated.stop});
-  }
+  for (std::size_t i = 0; i < program.events.size(); ++i)
+    entry.events.push_back(event_of(entry, loaded, program.document.events[i], program.events[i]));
+}
+
+/// Leaves out the rows that are off at the start; the scene with all of them where events switch some.
+std::shared_ptr<const Scene> take_off_rows(const SceneDocument& document, Scene& scene) {
+  const bool switched = std::ranges::any_of(
+      document.events, [](const auto& event) { return !event.on.empty() || !event.off.empty(); });
+  std::vector<std::string> off;
+  for (const auto& row : document.rows)
+    if (!row.on) off.push_back(row.name);
+  if (!switched && off.empty()) return nullptr;
+  auto all = std::make_shared<const Scene>(scene);
+  scene = *without_rows(scene, off);
+  return all;
 }
 
 /// Throws SceneError where an input ends before the span does.
@@ -365,9 +401,9 @@ CatalogueScene load(const std::string& file, const std::string& text, const Para
   require_inputs_over_span(document, stated.start.time);
   set_rates_of_states(loaded, stated);
   Scene scene = scene_of(loaded, stated.start);
-  require_defined_start(*loaded, scene);
-
   CatalogueScene entry;
+  entry.all_rows = take_off_rows(document, scene);
+  require_defined_start(*loaded, scene);
   entry.scene = std::make_shared<const Scene>(std::move(scene));
   project(*loaded, entry, stated);
   entry.stated_start = std::move(stated);

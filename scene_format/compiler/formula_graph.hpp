@@ -20,7 +20,7 @@ enum class Op : unsigned char {
   time,
   scale,       ///< s in ∂(A w + s b)/∂q
   coordinate,  ///< a = family of coordinates, b = index or none, c = Role
-  multiplier,  ///< a = output of a piece
+  multiplier,  ///< a = output of a piece; where c = 1 number of a force
   list,        ///< (a, b): two indices
   sum,         ///< of a over the loop numbered b
   negative,
@@ -111,6 +111,8 @@ class FormulaGraph {
     return insert({Op::coordinate, family, index, static_cast<int>(role)});
   }
   Node multiplier(int output) { return insert({Op::multiplier, output}); }
+  /// The force of a row, by its number in Symbols::forces.
+  Node force(int number) { return insert({Op::multiplier, number, none, 1}); }
   Node list(Node first, Node second) { return insert({Op::list, first, second}); }
   Node sum(Node body, int loop) { return insert({Op::sum, body, loop}); }
 

@@ -160,7 +160,19 @@ class FormulaParser::Reader : FormulaScanner {
     if (const Node node = coordinate(place, name, Role::position); node != none) return node;
     if (name.size() > 2 && name[1] == '_' && (name[0] == 'v' || name[0] == 'p'))
       if (const Node node = coordinate(place, name, Role::second); node != none) return node;
+    if (const Node node = force(name); node != none) return node;
     fail(place, "unknown name '" + name + "' in " + context_.what + suggestion(name, known_names()));
+  }
+
+  /// lambda_ROW.
+  Node force(const std::string& name) {
+    constexpr std::string_view prefix = "lambda_";
+    if (!context_.motion || !name.starts_with(prefix)) return none;
+    const std::string row = name.substr(prefix.size());
+    if (std::ranges::find(symbols_.rows, row) == symbols_.rows.end()) return none;
+    auto found = std::ranges::find(symbols_.forces, row);
+    if (found == symbols_.forces.end()) found = symbols_.forces.insert(found, row);
+    return graph_.force(static_cast<int>(found - symbols_.forces.begin()));
   }
 
   Node parameter(std::size_t place, int id) {
@@ -186,6 +198,8 @@ class FormulaParser::Reader : FormulaScanner {
     if (id == none) return none;
     if (role == Role::position && !context_.positions)
       fail(place, "the coordinate '" + name + "' may not stand in " + context_.what);
+    if (role == Role::second && name[0] != context_.second && context_.motion)
+      role = Role::direction;  // where functions of the motion find the other one of v and p
     if (role == Role::second && name[0] != context_.second)
       fail(place, "'" + name + "' may not stand in " + context_.what +
                       (context_.second != 0 ? std::string("; expected ") + context_.second + '_' + base
@@ -214,7 +228,7 @@ class FormulaParser::Reader : FormulaScanner {
   Node definition(std::size_t place, const std::string& name, const FormulaText& text) {
     std::string key = name + ' ' + context_.second + (context_.positions ? 'q' : ' ') +
                       (context_.time ? 't' : ' ') + (context_.sums ? 's' : ' ') +
-                      (context_.reference ? 'r' : ' ');
+                      (context_.reference ? 'r' : ' ') + (context_.motion ? 'm' : ' ');
     for (const int loop : context_.loops) key += ' ' + std::to_string(loop);
     const auto found = parser_.defined_.find(key);
     if (found != parser_.defined_.end()) return found->second;
@@ -413,6 +427,8 @@ class FormulaParser::Reader : FormulaScanner {
       if (context_.positions) names.push_back(family.name);
       if (context_.second != 0) names.push_back(std::string(1, context_.second) + '_' + family.name);
     }
+    if (context_.motion)
+      for (const auto& row : symbols_.rows) names.push_back("lambda_" + row);
     for (const auto& parameter : symbols_.parameters) names.push_back(parameter.name);
     for (const auto& [name, text] : symbols_.definitions) names.push_back(name);
     for (const auto& [name, table] : symbols_.inputs) names.push_back(name);

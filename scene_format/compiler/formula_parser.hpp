@@ -46,6 +46,8 @@ struct Symbols {
   std::map<std::string, FormulaText, std::less<>> definitions;
   std::map<std::string, InputTable, std::less<>> inputs;
   std::vector<Loop> loops;
+  std::vector<std::string> rows;    ///< that are not repeated
+  std::vector<std::string> forces;  ///< of these rows, as far as formulas read them
 
   void add(Family family) {
     family_numbers.emplace(family.name, static_cast<int>(families.size()));
@@ -77,6 +79,7 @@ struct Context {
   char second = 0;         ///< 'v' or 'p': velocities or momenta
   bool time = false;
   bool sums = false;
+  bool motion = false;          ///< velocities and momenta, and forces lambda_ROW of rows
   bool reference = false;       ///< Kepler's and Jacobi's functions
   std::vector<int> loops = {};  ///< loop variables in force
 };

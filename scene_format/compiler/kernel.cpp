@@ -47,8 +47,8 @@ Kernel::Kernel(FormulaGraph& graph, const std::vector<Store>& stores, const Piec
       from = From::coordinate;
       data.a = layout.slots.at(graph.coordinate(data.a, data.b, Role::position));
     } else if (data.op == Op::multiplier) {
-      from = From::multiplier;
-      data.a += layout.slot_count;
+      from = data.c == 1 ? From::force : From::multiplier;
+      if (data.c != 1) data.a += layout.slot_count;
     } else if (data.op == Op::time) {
       from = From::time;
     } else if (data.op == Op::scale) {
@@ -88,6 +88,9 @@ void Kernel::run(const KernelCall& call, int instance_width, int position_width)
           break;
         case From::multiplier:
           values[k] = call.multipliers[slots[data.a]];
+          break;
+        case From::force:
+          values[k] = call.multipliers[data.a];
           break;
         case From::time:
           values[k] = call.t;
@@ -199,6 +202,8 @@ std::string Kernel::expression(const Instruction& instruction) const {
       return fmt::format("in{}[slots[{}]]", data.c, data.a);
     case From::multiplier:
       return fmt::format("multipliers[slots[{}]]", data.a);
+    case From::force:
+      return fmt::format("multipliers[{}]", data.a);
     case From::time:
       return "call->t";
     case From::scale:
@@ -235,7 +240,8 @@ std::string Kernel::source(const std::string& name, int instance_width, int posi
     if (from == From::known) pointers.insert("const double* const known = call->known;");
     if (from == From::instance)
       tables.insert(fmt::format("const double* const instance = call->instance + i * {};", instance_width));
-    if (from == From::multiplier) pointers.insert("const double* const multipliers = call->multipliers;");
+    if (from == From::multiplier || from == From::force)
+      pointers.insert("const double* const multipliers = call->multipliers;");
     if (from == From::coordinate)
       pointers.insert(fmt::format("const double* const in{0} = call->in[{0}];", code_[k].data.c));
     if (from == From::coordinate || from == From::multiplier)

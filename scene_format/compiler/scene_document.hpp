@@ -42,6 +42,7 @@ struct SceneDocument {
     FormulaText equation;
     std::optional<FormulaText> loops;
     Place place;
+    bool on = true;  ///< at the start
   };
   /// "x = …", "v_x = […]": a value, or one for each element of a repeated coordinate.
   struct Entry {
@@ -80,9 +81,15 @@ struct SceneDocument {
   struct Event {
     enum class Direction { both, rising, falling };
     std::string name;
-    FormulaText when;
+    std::optional<FormulaText> when;  ///< none: an event of a clock
     Direction direction = Direction::both;
     bool stop = false;
+    double every = 0.0;
+    std::optional<FormulaText> condition;  ///< above 0 where it holds
+    std::vector<Entry> set;
+    std::optional<FormulaText> restitution;
+    std::vector<std::string> on, off;  ///< rows
+    Place place;
   };
   struct Output {
     std::string name;

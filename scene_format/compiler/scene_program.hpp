@@ -103,6 +103,14 @@ struct KinkProgram {
   SceneFunction phase_rates{FunctionKind::rows};  ///< of sines of the time
 };
 
+/// [[events]], as in the document.
+struct EventProgram {
+  std::optional<SceneFunction> when, condition, restitution;
+  std::optional<SceneFunction> contact;  ///< `when` as a holonomic row
+  std::vector<NamedValue> set;           ///< the components that are set,
+  std::vector<SceneFunction> values;     ///< and to what
+};
+
 /// A scene file compiled: everything but the numbers.
 struct SceneProgram {
   SceneProgram(SceneDocument scene, bool as_written, const SizeLimits& limits)
@@ -121,7 +129,7 @@ struct SceneProgram {
   std::vector<InvariantProgram> invariants;
   std::vector<OutputProgram> outputs;
   std::vector<StateProgram> states;
-  std::vector<SceneFunction> events;  ///< as in the document
+  std::vector<EventProgram> events;  ///< as in the document
   KinkProgram kinks;
   std::string source;  ///< C for all kernels
   std::string name;    ///< of the source, by its content; the table in it is diracstep_kernels_NAME

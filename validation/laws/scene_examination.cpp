@@ -111,7 +111,7 @@ std::string why_velocities(const Integrator& integrator) {
 /// Some steps as a run takes them: whether they can be solved, how well the first is conditioned, and
 /// velocities read from momenta; points of the motion at steps 1, 4 and 16 go into `motion`.
 void examine_steps(const CatalogueScene& entry, const Registry& registry, const SolverFactory& solvers,
-                   std::vector<Finding>& findings, std::vector<MotionPoint>& motion) {
+                   std::vector<Finding>& findings, std::vector<ExaminedPoint>& motion) {
   Finding steps{"regularity of the steps", false, ""};
   std::optional<Finding> reading;
   double condition = 0.0;
@@ -197,7 +197,7 @@ Examination examine(const CatalogueScene& entry, const Registry& registry, const
   std::vector<Finding>& findings = examination.findings;
   findings = {examine_dimensions(*scene), examine_start(*scene), examine_rank(*scene)};
   std::vector<Finding> steps;
-  std::vector<MotionPoint> motion;
+  std::vector<ExaminedPoint> motion;
   examine_steps(entry, registry, solvers, steps, motion);
   for (Finding& finding : examine_derivatives(*entry.scene, motion)) findings.push_back(std::move(finding));
   if (entry.scene->lagrangian && entry.scene->hamiltonian)
