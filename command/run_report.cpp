@@ -121,7 +121,7 @@ Json events_json(const RunResult& result, const Scene& scene) {
     if (hit.after)
       json.back()["after"] = {{"q", by_name(scene.coordinates, hit.after->q)},
                               {"v", by_name(scene.coordinates, hit.after->v)}};
-    if (result.events[hit.event].contact) json.back()["impulse"] = Json(hit.impulse);
+    if (result.events[hit.event].restitution) json.back()["impulse"] = Json(hit.impulse);
   }
   return json;
 }

@@ -380,10 +380,12 @@ std::shared_ptr<const Scene> take_off_rows(const SceneDocument& document, Scene&
 }
 
 /// Throws SceneError where an input ends before the span does.
-void require_inputs_over_span(const SceneDocument& document, double start) {
+void require_inputs_over_span(const SceneProgram& program, double start) {
+  const SceneDocument& document = program.document;
   for (const auto& input : document.inputs)
     for (const double t : {start, document.t_end})
-      if (!input.hold && !(t >= input.times.front() && t <= input.times.back()))
+      if (!input.hold && program.symbols.inputs_of_time.contains(input.name) &&
+          !(t >= input.times.front() && t <= input.times.back()))
         throw SceneError(
             document.file, input.place,
             fmt::format("the input '{}' is given from t = {:g} to {:g}, and the scene is at t = {:g}; "
@@ -398,7 +400,7 @@ CatalogueScene load(const std::string& file, const std::string& text, const Para
   const LoadedScenePtr loaded = std::make_shared<const LoadedScene>(std::move(program), std::move(values));
   const SceneDocument& document = loaded->program->document;
   StatedStart stated = start_of(*loaded);
-  require_inputs_over_span(document, stated.start.time);
+  require_inputs_over_span(*loaded->program, stated.start.time);
   set_rates_of_states(loaded, stated);
   Scene scene = scene_of(loaded, stated.start);
   CatalogueScene entry;
@@ -429,7 +431,8 @@ CatalogueScene load(const std::string& file, const std::string& text, const Para
   add_outputs(entry, loaded);
   add_events(entry, loaded);
   for (const auto& input : document.inputs)
-    if (!input.hold) entry.input_ranges.push_back({input.name, input.times.front(), input.times.back()});
+    if (!input.hold && loaded->program->symbols.inputs_of_time.contains(input.name))
+      entry.input_ranges.push_back({input.name, input.times.front(), input.times.back()});
   return entry;
 }
 

@@ -173,6 +173,7 @@ class VariableEventRun {
       const double size = motion_.stepper().next_size(), left = (end_ - motion_.time()) / size;
       report = left < 1.0 ? motion_.read_up_to(end_, here, at_end) : step();
       if (!report.ok() || motion_.stopped()) break;
+      if (motion_.acted() && left < 1.0) renew_checks();
       if (!at_end) report.solve = motion_.sample(here);
       if (report.ok() && (at_end || ++points_ % options_.every == 0)) keep(here);
     }
@@ -195,13 +196,15 @@ class VariableEventRun {
     checks_->before_step();
     StepReport report = motion_.step();
     if (!report.ok()) return report;
-    if (motion_.acted()) {
-      end_checks();
-      begin_checks();
-    } else {
+    if (motion_.acted())
+      renew_checks();
+    else
       checks_->after_step();
-    }
     return report;
+  }
+  void renew_checks() {
+    end_checks();
+    begin_checks();
   }
   void begin_checks() { checks_.emplace(motion_.stepper(), side_()); }
   void end_checks() {

@@ -39,7 +39,7 @@ class ImpactRow final : public ConstraintRows {
 };
 
 /// A_c v + b_c.
-double contact_rate(const ConstraintRows& contact, double t, const Vector& q, const Vector& v) {
+double rate_of_row(const ConstraintRows& contact, double t, const Vector& q, const Vector& v) {
   ConstraintsAtPoint row({std::shared_ptr<const ConstraintRows>(std::shared_ptr<void>(), &contact)},
                          static_cast<int>(v.size()));
   row.evaluate(t, q);
@@ -87,10 +87,11 @@ EventActions::EventActions(const std::shared_ptr<const Scene>& start, const std:
       if (setting.index < 0 || setting.index >= all_->dimension())
         throw Misuse("event '" + event.name + "' sets coordinate " + std::to_string(setting.index) + " of " +
                      std::to_string(all_->dimension()));
-    if (event.contact && (event.contact->rows() != 1 || event.contact->dimension() != all_->dimension() ||
-                          !event.contact->holonomic() || !event.restitution))
+    const bool bad = event.contact && (event.contact->rows() != 1 || !event.contact->holonomic() ||
+                                       event.contact->dimension() != all_->dimension());
+    if (bad || (event.restitution && !event.contact))
       throw Misuse("event '" + event.name +
-                   "': a contact is one holonomic row in all coordinates, with a restitution");
+                   "': a contact is one holonomic row in all coordinates, and an impact needs one");
   }
 }
 
@@ -129,7 +130,7 @@ EventActions::Outcome EventActions::act(const Event& event, const Sample& at, co
   for (const Event::Setting& setting : event.set)
     if (setting.second && by_momentum_) outcome.p[setting.index] = setting.value(point);
   const bool has_velocity = !scene->lagrangian->structure().phase_space();
-  if (event.contact && !has_velocity) {
+  if (event.restitution && !has_velocity) {
     outcome.failure = "event '" + event.name + "': a Lagrangian linear in v knows no impact";
     return outcome;
   }
@@ -137,8 +138,8 @@ EventActions::Outcome EventActions::act(const Event& event, const Sample& at, co
   if (has_velocity) {
     auto with_contact = std::make_shared<Scene>(*scene);
     double wanted = 0.0;
-    if (event.contact) {
-      const double before = contact_rate(*event.contact, at.time, outcome.q, outcome.v);
+    if (event.restitution) {
+      const double before = rate_of_row(*event.contact, at.time, outcome.q, outcome.v);
       wanted = -event.restitution(point) * before;
       outcome.rate = wanted;
       with_contact->constraints.insert(with_contact->constraints.begin(),
@@ -146,7 +147,7 @@ EventActions::Outcome EventActions::act(const Event& event, const Sample& at, co
     }
     outcome.failure =
         solve_velocity(*with_contact, solvers_, at.time, outcome.q, outcome.p, outcome.v, first_impulse);
-    if (event.contact) outcome.impulse = first_impulse;
+    if (event.restitution) outcome.impulse = first_impulse;
     if (outcome.failure.empty()) scene->lagrangian->gradient(at.time, outcome.q, outcome.v, lq, outcome.p);
   }
   if (outcome.failure.empty() && !(outcome.q.allFinite() && outcome.v.allFinite() && outcome.p.allFinite()))
@@ -161,6 +162,10 @@ EventActions::Outcome EventActions::act(const Event& event, const Sample& at, co
   else
     outcome.failure = "event '" + event.name + "' at t = " + to_text(at.time, 10) + ": " + outcome.failure;
   return outcome;
+}
+
+double EventActions::contact_rate(const Event& event, const Sample& at) {
+  return rate_of_row(*event.contact, at.time, at.q, at.v);
 }
 
 std::shared_ptr<const Scene> EventActions::without(const std::vector<bool>& on) const {

@@ -34,6 +34,9 @@ class EventActions {
   /// switches are switched where it succeeds.
   Outcome act(const Event& event, const Sample& at, const Scene& current);
 
+  /// A_c v + b_c.
+  static double contact_rate(const Event& event, const Sample& at);
+
   /// The scene of the rows that are on, starting at a point.
   std::shared_ptr<const Scene> scene_from(double t, const Vector& q, const Vector& v) const;
   /// By row of `all`.

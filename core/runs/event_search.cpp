@@ -109,13 +109,18 @@ bool EventSearch::keep_first_that_acts(const Sample& point) {
   std::ranges::stable_sort(met_, {}, [&](const EventHit& hit) { return sense * hit.sample.time; });
   std::vector<EventHit> kept;
   bool acting = false;
-  for (EventHit& hit : met_) {
+  for (const EventHit& hit : met_) {
     const Event& event = events_[hit.event];
     if (acting && std::abs(hit.sample.time - kept.back().sample.time) > same_instant * std::abs(step)) break;
     if (event.condition && !(event.condition(hit.sample.point()) > 0.0)) continue;
     acting = acting || event.acts() || event.stop;
-    kept.push_back(std::move(hit));
+    kept.push_back(hit);
   }
+  at_zero_.clear();
+  if (acting)
+    for (const EventHit& hit : met_)
+      if (std::abs(hit.sample.time - kept.back().sample.time) <= same_instant * std::abs(step))
+        at_zero_.push_back(hit.event);
   met_ = std::move(kept);
   return acting;
 }

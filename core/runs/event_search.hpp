@@ -36,6 +36,8 @@ class EventSearch {
   /// function that is not a number, else one that is ok().
   StepReport see(const Sample& point, const Read& read);
   std::vector<EventHit>& met() { return met_; }
+  /// The events whose functions vanish where the last of met() acts, whether their conditions hold or not.
+  const std::vector<std::size_t>& at_zero() const { return at_zero_; }
 
   /// Where a run goes on after events that acted: `left` names a contact and the rate at which it was left.
   struct Left {
@@ -80,6 +82,7 @@ class EventSearch {
   bool begun_ = false;
   double start_ = 0.0, last_time_ = 0.0;
   std::vector<EventHit> met_;
+  std::vector<std::size_t> at_zero_;
 };
 
 }  // namespace diracstep

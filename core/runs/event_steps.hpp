@@ -163,6 +163,7 @@ class EventSteps {
   StepReport look(const detail::Node& from, const Sample& point);
   StepReport act(std::vector<EventHit> met);
   StepReport make_true(EventHit hit, std::vector<EventSearch::Left>& left);
+  void add_left(std::size_t number, std::vector<EventSearch::Left>& left) const;
   StepReport failed(std::string failure) const {
     StepReport report;
     report.solve.status = SolveStatus::refused;
@@ -292,16 +293,28 @@ StepReport EventSteps<Stepper>::act(std::vector<EventHit> met) {
     }
     met.clear();
     const Sample& here = after_;
+    for (const std::size_t k : search_.at_zero()) add_left(k, left);
     for (const std::size_t k : search_.go_on(here, left, actions_.awake()))
       if (!events()[k].condition || events()[k].condition(here.point()) > 0.0) met.push_back({k, here});
   }
   return {};
 }
 
+/// Another event whose function of the configuration vanishes there as well.
+template <class Stepper>
+void EventSteps<Stepper>::add_left(std::size_t number, std::vector<EventSearch::Left>& left) const {
+  constexpr double round_off = 1e-12;
+  const Event& event = events()[number];
+  if (!event.contact || std::ranges::find(left, number, &EventSearch::Left::event) != left.end()) return;
+  const double rate = EventActions::contact_rate(event, after_);
+  if (std::abs(rate) > round_off * after_.v.template lpNorm<Eigen::Infinity>()) left.push_back({number, rate});
+}
+
 template <class Stepper>
 StepReport EventSteps<Stepper>::make_true(EventHit hit, std::vector<EventSearch::Left>& left) {
   const Event& event = events()[hit.event];
   const double t = hit.sample.time;
+  stepper().restart(t, hit.sample.q, hit.sample.p, hit.sample.v);  // where the motion ends if it cannot act
   if (const double when = zeno_[hit.event].met(t, std::abs(t - began_at_)); std::isfinite(when))
     return failed("event '" + event.name + "' is met ever faster and infinitely often before t = " +
                   to_text(when, 10) +
@@ -321,7 +334,7 @@ StepReport EventSteps<Stepper>::make_true(EventHit hit, std::vector<EventSearch:
   }
   stepper().restart(t, outcome.q, outcome.p, outcome.v);
   acted_ = true;
-  if (event.contact && event.on.empty()) {
+  if (event.restitution && event.on.empty()) {
     std::erase_if(left, [&](const EventSearch::Left& other) { return other.event == hit.event; });
     left.push_back({hit.event, outcome.rate});
   }

@@ -19,7 +19,7 @@ namespace diracstep {
 ///
 ///       p⁺ = p⁻ + A_cᵀ Λ_c + Aᵀ Λ,   A_c v⁺ + b_c = −e (A_c v⁻ + b_c),   A v⁺ + b = 0,   p = ∂L/∂v(q, v)
 ///
-/// Without `contact` there is no Λ_c: what was set off the distribution, or off a row that was switched on,
+/// Without `restitution` there is no Λ_c: what was set off the distribution, or off a row that was switched on,
 /// is moved onto it by impulses of the rows, as a plastic impact does.
 struct Event {
   enum class Direction { both, rising, falling };
@@ -37,10 +37,10 @@ struct Event {
   PointFunction condition = {};  ///< happens only where this is above 0; empty: always
   std::vector<Setting> set = {};
   std::vector<std::string> on = {}, off = {};               ///< names of rows
-  std::shared_ptr<const ConstraintRows> contact = nullptr;  ///< one holonomic row g(t, q), that of `at`
-  PointFunction restitution = {};                           ///< e
+  std::shared_ptr<const ConstraintRows> contact = nullptr;  ///< `at` as a holonomic row, where it is g(t, q)
+  PointFunction restitution = {};                           ///< e; needs a contact
 
-  bool acts() const { return !set.empty() || !on.empty() || !off.empty() || contact; }
+  bool acts() const { return !set.empty() || !on.empty() || !off.empty() || restitution; }
 };
 
 }  // namespace diracstep

@@ -144,7 +144,7 @@ class FormulaParser::Reader : FormulaScanner {
 
   Node named(std::size_t place, const std::string& name) {
     if (const auto input = symbols_.inputs.find(name); input != symbols_.inputs.end())
-      return located(read_input(place, input->second), place);
+      return located(read_input(place, name, input->second), place);
     if (peek() == '(') return call(place, name);
     if (name == "pi") return graph_.number(std::numbers::pi);
     const std::vector<int> inner_first(context_.loops.rbegin(), context_.loops.rend());
@@ -323,7 +323,7 @@ class FormulaParser::Reader : FormulaScanner {
   }
 
   /// An input at the time, or at what stands in parentheses behind its name.
-  Node read_input(std::size_t place, const InputTable& table) {
+  Node read_input(std::size_t place, const std::string& name, int table) {
     Node u = none;
     if (take('(')) {
       u = expression();
@@ -333,20 +333,8 @@ class FormulaParser::Reader : FormulaScanner {
         fail(place, "an input is a function of the time t, which may not stand in " + context_.what);
       u = graph_.time();
     }
-    const auto from = [&](double start) { return graph_.subtract(u, graph_.number(start)); };
-    Node value =
-        graph_.where(graph_.negative(from(table.parts.front().from)), graph_.number(table.value_before));
-    for (std::size_t k = 0; k < table.parts.size(); ++k) {
-      const InputTable::Part& part = table.parts[k];
-      const double to = k + 1 < table.parts.size() ? table.parts[k + 1].from : table.last;
-      Node polynomial = graph_.number(0.0);
-      const std::vector<double> highest_first(part.coefficients.rbegin(), part.coefficients.rend());
-      for (const double c : highest_first)
-        polynomial = graph_.add(graph_.multiply(polynomial, from(part.from)), graph_.number(c));
-      value = graph_.add(value,
-                         graph_.where(from(part.from), graph_.where(graph_.negative(from(to)), polynomial)));
-    }
-    return graph_.add(value, graph_.where(from(table.last), graph_.number(table.value_after)));
+    if (u == graph_.time()) symbols_.inputs_of_time.insert(name);
+    return graph_.table(table, 0, u);
   }
 
   int loop() {

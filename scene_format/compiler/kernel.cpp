@@ -16,7 +16,7 @@ int Constants::add(Node node) {
 
 Kernel::Kernel(FormulaGraph& graph, const std::vector<Store>& stores, const PieceLayout& layout,
                Constants& known, Constants& instance)
-    : width_(layout.width()) {
+    : tables_(&graph.tables()), width_(layout.width()) {
   std::vector<Node> roots;
   for (const Store& store : stores)
     if (!graph.is_number(store.value, 0.0)) {
@@ -99,6 +99,11 @@ void Kernel::run(const KernelCall& call, int instance_width, int position_width)
           values[k] = call.s;
           break;
         case From::computed:
+          if (data.op == Op::table) {
+            const auto number = static_cast<std::size_t>(data.c / LookupTable::width);
+            values[k] = (*tables_)[number].value(value(data.a), data.c % LookupTable::width);
+            break;
+          }
           values[k] = computed(data, value(data.a), arity(data.op) == 2 ? value(data.b) : 0.0);
           break;
       }
@@ -224,11 +229,23 @@ std::string Kernel::expression(const Instruction& instruction) const {
       return a + " / " + b;
     case Op::power:
       return power_text(a, data.c);
+    case Op::table: {
+      const int number = data.c / LookupTable::width;
+      return fmt::format("diracstep_table(table{0}_knots, table{0}_parts, {1}, {2}, {3})", number,
+                         (*tables_)[static_cast<std::size_t>(number)].knots.size(), a,
+                         data.c % LookupTable::width);
+    }
     default:
       break;
   }
   return arity(data.op) == 2 ? fmt::format("{}({}, {})", function_name(data.op), a, b)
                              : fmt::format("{}({})", function_name(data.op), a);
+}
+
+void Kernel::add_tables(std::set<int>& numbers) const {
+  for (const Instruction& instruction : code_)
+    if (instruction.data.op == Op::table && instruction.from == From::computed)
+      numbers.insert(instruction.data.c / LookupTable::width);
 }
 
 std::string Kernel::source(const std::string& name, int instance_width, int position_width) const {

@@ -1,7 +1,9 @@
 #pragma once
 
 #include <array>
+#include <deque>
 #include <diracstep/scene_format/compiler/formula_graph.hpp>
+#include <set>
 #include <span>
 #include <string>
 #include <unordered_map>
@@ -63,6 +65,8 @@ class Kernel {
   void run(const KernelCall& call, int instance_width, int position_width) const;
   /// A C function of this name.
   std::string source(const std::string& name, int instance_width, int position_width) const;
+  /// Adds the numbers of the tables that it reads.
+  void add_tables(std::set<int>& numbers) const;
   std::size_t size() const { return code_.size(); }
 
  private:
@@ -73,6 +77,7 @@ class Kernel {
   };
   std::string expression(const Instruction& instruction) const;
 
+  const std::deque<LookupTable>* tables_;  ///< of the graph, which outlives the kernel
   std::vector<Instruction> code_;
   std::vector<Store> stores_;  ///< their values are numbers of instructions
   int width_;

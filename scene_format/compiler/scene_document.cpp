@@ -2,9 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/files/csv_table.hpp>
 #include <diracstep/scene_format/compiler/scene_document.hpp>
 #include <diracstep/scene_format/compiler/size_limits.hpp>
 #include <diracstep/scene_format/compiler/table_reader.hpp>
+#include <filesystem>
 #include <initializer_list>
 #include <set>
 
@@ -221,23 +224,47 @@ class DocumentReader : TableReader {
       require_new_name(item.key, item.place);
       const std::string what = "input '" + item.key + "'";
       const toml::table& entry = table(item, "wind = { times = [0, 1, 2], values = [0, 3, 1] }");
-      check_keys(entry, what, {"times", "values", "kind", "hold", "unit", "meaning"});
-      SceneDocument::Input input{item.key,
-                                 input_kind(entry),
-                                 list(entry, "times", what, item.place),
-                                 list(entry, "values", what, item.place),
-                                 flag(entry, "hold"),
-                                 item.place};
+      check_keys(entry, what, {"times", "values", "file", "column", "kind", "hold", "unit", "meaning"});
+      SceneDocument::Input input{item.key, input_kind(entry), {}, {}, flag(entry, "hold"), item.place};
+      const bool in_file = entry.contains("file");
+      if (in_file == (entry.contains("times") || entry.contains("values")))
+        fail(item.place, what + " needs 'times' and 'values', or a 'file'");
+      if (in_file) {
+        read_table_file(entry, what, input);
+      } else {
+        input.times = list(entry, "times", what, item.place);
+        input.values = list(entry, "values", what, item.place);
+      }
       if (input.times.size() != input.values.size() || input.times.size() < 2 ||
           input.times.size() > most_points)
         fail(item.place, fmt::format("{} has {} times and {} values; expected as many of both, from 2 to {}",
                                      what, input.times.size(), input.values.size(), most_points));
       for (std::size_t k = 1; k < input.times.size(); ++k)
         if (!(input.times[k] > input.times[k - 1]))
-          fail(place_of((*entry.get("times")->as_array())[k].source()),
+          fail(place_of((in_file ? *entry.get("file") : (*entry.get("times")->as_array())[k]).source()),
                fmt::format("{}: the time {:g} does not lie behind {:g}; expected them in ascending order",
                            what, input.times[k], input.times[k - 1]));
       document_.inputs.push_back(std::move(input));
+    }
+  }
+
+  /// Times from the first column of a CSV file and values from the column named, or from the second.
+  void read_table_file(const toml::table& entry, const std::string& what, SceneDocument::Input& input) const {
+    const std::string name = required_string(entry, "file", what), column = string(entry, "column");
+    const Place place = place_of(entry.get("file")->source());
+    const std::filesystem::path path(name);
+    if (path.is_absolute() || std::ranges::find(path, "..") != path.end())
+      fail(place, what + ": 'file' is a path below the folder of the scene, without '..'");
+    const std::string full = (std::filesystem::path(document_.file).parent_path() / path).string();
+    try {
+      const CsvTable table = read_csv(full, what, size_limits().file_bytes);
+      const std::size_t second = column.empty() ? 1 : table.column(column);
+      for (const auto& line : table.lines) {
+        input.times.push_back(line.at(0));
+        input.values.push_back(line.at(second));
+      }
+    } catch (const Misuse& misuse) {
+      fail(place, misuse.what());
     }
   }
 

@@ -7,6 +7,7 @@
 #include <diracstep/scene_format/compiler/piece_builder.hpp>
 #include <diracstep/scene_format/compiler/scene_program.hpp>
 #include <diracstep/scene_format/compiler/sum_terms.hpp>
+#include <set>
 
 namespace diracstep::scene_compiler {
 
@@ -65,7 +66,8 @@ class SceneCompiler {
     symbols_.definitions = document_.definitions;
     for (const auto& row : document_.rows)
       if (!row.loops) symbols_.rows.push_back(row.name);
-    for (const auto& input : document_.inputs) symbols_.inputs.emplace(input.name, table_of(input));
+    for (const auto& input : document_.inputs)
+      symbols_.inputs.emplace(input.name, graph_.add_table(table_of(input)));
     for (const auto& coordinate : document_.coordinates) {
       Symbols::Family family{coordinate.name, {}, coordinate.cyclic};
       if (coordinate.loops)
@@ -446,12 +448,29 @@ class SceneCompiler {
       require_settable(program.set.back());
       program.values.push_back(motion_function(entry.values[0], "'set' of " + what));
     }
-    if (!event.restitution) return;
-    program.restitution = motion_function(*event.restitution, "the restitution of " + what);
-    Row row{{event.name, {}, event.when->start}, parser_.formula(*event.when, mechanics(what, 'v'))};
-    if (!is_holonomic(row))
+    if (event.restitution)
+      program.restitution = motion_function(*event.restitution, "the restitution of " + what);
+    if (event.when) compile_contact(event, program, what);
+  }
+
+  /// `when` as a row, where it is a function of coordinates and t.
+  void compile_contact(const SceneDocument::Event& event, EventProgram& program, const std::string& what) {
+    Context context = mechanics(what, program_.lagrangian ? 'v' : 'p');
+    context.motion = true;
+    Row row{{event.name, {}, event.when->start}, parser_.formula(*event.when, context)};
+    bool gap = false;
+    for (const Node node : graph_.reachable(std::span(&row.node, 1))) {
+      const NodeData& data = graph_[node];
+      const bool position = data.op == Op::coordinate && data.c == static_cast<int>(Role::position);
+      gap = gap || position;
+      if ((data.op != Op::coordinate || position) && data.op != Op::multiplier) continue;
+      gap = false;
+      break;
+    }
+    if (!gap && event.restitution)
       fail(event.when->start, what + " is an impact: its 'when' is the gap, a formula in coordinates and t "
                                      "without velocities");
+    if (!gap) return;
     SceneFunction contact{FunctionKind::rows, true};
     Piece single;
     add_row(contact, single, row);
@@ -474,8 +493,20 @@ class SceneCompiler {
       fail(value.place, fmt::format("v_{} is the rate of a state and is not set", family.name));
   }
 
+  /// Those that kernels read.
+  std::string source_of_tables() const {
+    std::set<int> numbers;
+    for (const SceneFunction* function : program_.functions())
+      for (const Piece& piece : function->pieces)
+        for (const Kernel& kernel : piece.kernels) kernel.add_tables(numbers);
+    std::string text = numbers.empty() ? "" : LookupTable::source_of_value();
+    for (const int number : numbers)
+      text += graph_.tables()[static_cast<std::size_t>(number)].source(fmt::format("table{}", number));
+    return text;
+  }
+
   void write_source() {
-    std::string body = kernel_prelude(), table;
+    std::string body = kernel_prelude() + source_of_tables(), table;
     int number = 0;
     for (const SceneFunction* function : program_.functions())
       for (const Piece& piece : function->pieces)
