@@ -42,7 +42,8 @@ class Run {
         next_checkpoint_(Clock::now() + between_checkpoints),
         progress_(static_cast<double>(taken()) / static_cast<double>(steps)) {
     begin_checks();
-    if (taken() > 0) checks_->see(start_of(motion.scene()));
+    if (taken() > 0 && std::ranges::none_of(motion.events(), &Event::acts))
+      checks_->see(start_of(motion.scene()));
     const auto before_here = [&](double t) { return ahead_of_here(t) < -same_time; };
     next_time_ = std::ranges::find_if_not(keeping.times, before_here);
   }
@@ -72,12 +73,11 @@ class Run {
   StepReport step() {
     checks_->before_step(motion_.stepper());
     StepReport report = motion_.step();
-    if (!report.ok()) return report;
     if (motion_.acted()) {
       end_checks();
       begin_checks();
-      if (!motion_.stopped()) look();
-    } else {
+      if (report.ok() && !motion_.stopped()) look();
+    } else if (report.ok()) {
       checks_->after_step(motion_.stepper());
     }
     return report;

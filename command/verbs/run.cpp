@@ -195,10 +195,9 @@ class VariableEventRun {
   StepReport step() {
     checks_->before_step();
     StepReport report = motion_.step();
-    if (!report.ok()) return report;
     if (motion_.acted())
       renew_checks();
-    else
+    else if (report.ok())
       checks_->after_step();
     return report;
   }
@@ -366,6 +365,10 @@ void take_outputs(const CatalogueScene& entry, RunResult& result) {
   if (!result.has_end()) return;
   for (const Output& output : entry.outputs)
     result.outputs.emplace_back(output.name, output.at(result.end.point()));
+  for (const auto& [name, value] : result.outputs)
+    if (!std::isfinite(value))
+      result.doubt = joined_doubts({result.doubt, fmt::format("the output '{}' is not a finite number at t = {:g}",
+                                                              name, result.end.time)});
 }
 
 void report(const RunResult& result, const RunArguments& options, const CatalogueScene& entry,

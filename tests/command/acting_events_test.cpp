@@ -24,7 +24,7 @@ class ActingEvents : public Command {
   }
 };
 
-constexpr const char* ball = R"(name = "ball"
+constexpr const char* ball = R"toml(name = "ball"
 lagrangian = "m*v_y^2/2 - m*g*y"
 [coordinates]
 y = {}
@@ -47,12 +47,12 @@ name = "floor"
 when = "y"
 restitution = "e"
 set = { n = "n + 1" }
-)";
+)toml";
 
 /// Falls for t1 = √(2h/g), and after impact k for 2 t1 e^k; the impulses are m (1 + e) √(2gh) e^k.
 TEST_F(ActingEvents, ABallBouncesByItsClosedForm) {
   const double g = 9.81, e = 0.8, falls = std::sqrt(2.0 / g), speed = std::sqrt(2.0 * g);
-  for (const char* steps : {"--step 0.01", "--step 0.5", "--adaptive", "--method damped/radau --adaptive"}) {
+  for (const char* steps : {"--step 0.01", "--step 0.5", "--adaptive", "--method damped/radau:3 --adaptive --eps 1e-10"}) {
     const Json json = result(scene(ball) + " " + steps);
     ASSERT_EQ(json["events"].size(), 6U) << steps;
     double t = falls;
@@ -95,9 +95,9 @@ TEST_F(ActingEvents, ABallThatComesToRestIsToldOrHeldByARow) {
 }
 
 /// A ray in an ellipse keeps its energy and L² − (a² − b²) v_y², the product of its angular momenta about the
-/// two foci; 10⁴ reflections.
+/// two foci; 10⁴ reflections.  Times near 2e4 have a round-off of 4e-12, by which the points of reflection are off.
 TEST_F(ActingEvents, ABilliardInAnEllipseKeepsBothInvariants) {
-  const std::string file = scene(R"(name = "billiard"
+  const std::string file = scene(R"toml(name = "billiard"
 lagrangian = "(v_x^2 + v_y^2)/2"
 [coordinates]
 x = {}
@@ -116,21 +116,21 @@ foci = "(x*v_y - y*v_x)^2 - 3*v_y^2"
 name = "wall"
 when = "1 - x^2/4 - y^2"
 restitution = 1
-)");
+)toml");
   const Json json = result(file);
   EXPECT_GT(json["events"].size(), 10000U);
-  EXPECT_NEAR(json["outputs"]["foci"].get<double>(), 0.01 * 0.01 - 3.0 * 0.49, 1e-10);
+  EXPECT_NEAR(json["outputs"]["foci"].get<double>(), 0.01 * 0.01 - 3.0 * 0.49, 1e-8);
   EXPECT_NEAR(json["end"]["energy"].get<double>(), 0.745, 1e-11);
   for (const Json& event : json["events"]) {
     const double x = event["q"]["x"], y = event["q"]["y"];
-    ASSERT_NEAR(x * x / 4.0 + y * y, 1.0, 1e-13);
+    ASSERT_NEAR(x * x / 4.0 + y * y, 1.0, 1e-10);
   }
 }
 
 /// Housner (1963): a block of half width b and half height h that rocks from corner to corner keeps
 /// 1 − 3/2 sin²α of its angular velocity, tan α = b/h: the plastic impact onto the rows of the new corner.
 TEST_F(ActingEvents, ARockingBlockLosesWhatItsNewCornerTakes) {
-  const std::string file = scene(R"(name = "block"
+  const std::string file = scene(R"toml(name = "block"
 lagrangian = "(v_x^2 + v_y^2)/2 + (b^2 + h^2)/3*v_th^2/2 - 9.81*y"
 [coordinates]
 x = {}
@@ -178,8 +178,8 @@ direction = "falling"
 on = ["left_pin", "left_floor"]
 off = ["right_pin", "right_floor"]
 [outputs]
-floor = "lambda_left_floor + lambda_right_floor"
-)");
+carried = "lambda_left_floor + lambda_right_floor"
+)toml");
   const double sine = 0.25 / std::hypot(0.25, 1.0), kept = 1.0 - 1.5 * sine * sine;
   for (const char* steps : {"--step 0.01", "--adaptive"}) {
     const Json json = result(file + " " + steps);
@@ -193,13 +193,13 @@ floor = "lambda_left_floor + lambda_right_floor"
       last = event["name"];
     }
     EXPECT_LT(json["constraint"].get<double>(), 1e-12);
-    EXPECT_GT(json["outputs"]["floor"].get<double>(), 5.0);
+    EXPECT_GT(json["outputs"]["carried"].get<double>(), 5.0);
   }
 }
 
 /// A block on a belt: sticks until k x = f_s, slips by x = f_k/k + …, and sticks again after
 /// 2 (π − atan((f_s − f_k) ω/(k w)))/ω, ω = √(k/m).
-constexpr const char* stick_slip = R"(name = "stick_slip"
+constexpr const char* stick_slip = R"toml(name = "stick_slip"
 lagrangian = "v_x^2/2 - 2*x^2"
 [coordinates]
 x = {}
@@ -230,7 +230,7 @@ when = "v_x - w"
 if = "abs(4*x) < fs"
 on = "stick"
 set = { slips = "0" }
-)";
+)toml";
 
 TEST_F(ActingEvents, ABlockOnABeltSticksAndSlips) {
   const double slip = M_PI - std::atan(1.0), stick = 1.0;  // from x = 0 to 2/4 with 0.5
@@ -248,7 +248,7 @@ TEST_F(ActingEvents, ABlockOnABeltSticksAndSlips) {
 
 /// A wheel that may turn forward only: held where it would turn back, let go where the torque turns.
 TEST_F(ActingEvents, ARatchetHoldsAndLetsGo) {
-  const Json json = result(scene(R"(name = "ratchet"
+  const Json json = result(scene(R"toml(name = "ratchet"
 lagrangian = "v_x^2/2"
 [coordinates]
 x = {}
@@ -271,7 +271,7 @@ name = "free"
 when = "lambda_pawl"
 direction = "falling"
 off = "pawl"
-)"));
+)toml"));
   ASSERT_EQ(json["events"].size(), 2U);
   double low = 2.0, high = 3.0;  // sin t = 0.2 t
   for (int k = 0; k < 60; ++k) {
@@ -289,7 +289,7 @@ off = "pawl"
 /// A mass under a sampled controller with limits and an integrator that unwinds: the zero-order hold has the
 /// motion x + T v + T² u/2m, v + T u/m from sample to sample.
 TEST_F(ActingEvents, ASampledControllerIsItsDifferenceEquation) {
-  const std::string file = scene(R"(name = "sampled"
+  const std::string file = scene(R"toml(name = "sampled"
 lagrangian = "v_x^2"
 [coordinates]
 x = {}
@@ -308,7 +308,7 @@ step = 0.02
 name = "sample"
 every = 0.05
 set = { u = "push", i = "i + 0.05*(1 - x + (push - wanted)/20)" }
-)");
+)toml");
   double x = 0.0, v = 0.0, i = 0.0, u = 0.0;
   for (int k = 0; k < 80; ++k) {
     const double wanted = 40.0 * (1.0 - x) + 20.0 * i - 12.0 * v;
@@ -339,7 +339,7 @@ TEST_F(ActingEvents, AResumedRunHasTheBytesOfTheWhole) {
 
 /// Where forces of rows and momenta stand in outputs they are those of the columns beside them.
 TEST_F(ActingEvents, OutputsReadForcesAndMomenta) {
-  const std::string file = scene(R"(name = "pendulum"
+  const std::string file = scene(R"toml(name = "pendulum"
 lagrangian = "(v_x^2 + v_y^2)/2 - 9.81*y"
 [coordinates]
 x = {}
@@ -355,7 +355,7 @@ step = 0.05
 [outputs]
 pull = "2*lambda_rod"
 momentum = "p_x + v_x"
-)");
+)toml");
   ASSERT_EQ(run("run " + file + " --out '" + path("p.csv") + "'").status, 0);
   const auto all = lines(contents(path("p.csv")));
   ASSERT_EQ(all.front(), "t,x,y,v_x,v_y,p_x,p_y,lambda_rod,energy,pull,momentum");
