@@ -47,7 +47,10 @@ void KinkFinder::look_at(Node node, const Source& source) {
                         "a jump", source);
     case Op::table:
       for (const double knot : graph_.tables()[static_cast<std::size_t>(data.c / LookupTable::width)].knots)
-        add_switch(found_.kinks, graph_.subtract(data.a, graph_.number(knot)), node, "a table", source);
+        if (graph_[data.a].op == Op::time)
+          found_.knots.insert(knot);
+        else
+          add_switch(found_.kinks, graph_.subtract(data.a, graph_.number(knot)), node, "a table", source);
       return;
     case Op::min:
     case Op::max:

@@ -6,6 +6,7 @@
 #include <diracstep/scene_format/compiler/scene_document.hpp>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -101,6 +102,7 @@ struct KinkProgram {
   SceneFunction events{FunctionKind::rows};       ///< functions of the time whose zeros are instants,
   SceneFunction widths{FunctionKind::rows};       ///< and how wide each is there, row by row
   SceneFunction phase_rates{FunctionKind::rows};  ///< of sines of the time
+  std::set<double> knots;  ///< of tables of the time: kinks at times that need not be looked for
 };
 
 /// [[events]], as in the document.

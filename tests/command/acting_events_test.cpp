@@ -402,7 +402,7 @@ TEST_F(ActingEvents, BadOnesAreToldWithTheirPlace) {
   refused("when = \"v_x\"\nrestitution = 1\n", {"scene.toml:10", "without velocities"});
   refused("when = \"x\"\nrestitution = 1\ndirection = \"both\"\n", {"scene.toml:12", "free side"});
   refused("when = \"x\"\nset = { z = \"1\" }\n", {"scene.toml:11", "'z'"});
-  refused("when = \"x\"\nset = { p_x = \"1\" }\n", {"scene.toml:11", "p_x"});
+  refused("when = \"x\"\nset = { p_x = \"1\" }\n", {"scene.toml:11", "velocities v_"});
   refused("when = \"x\"\nif = \"x\"\n", {"scene.toml:11:", "comparison"});
   refused("when = \"lambda_rod\"\n", {"scene.toml:10", "lambda_rod"});
   expect_misuse("run " + scene(head + "when = \"x - 0.1\"\nset = { x = \"0\" }\n") + " --every-time 0.1",
