@@ -24,8 +24,8 @@ struct Keeping {
 };
 
 /// Steps from where they stand to step number `steps`, to an event that stops them, to a failure or to
-/// Ctrl-C, and keeps points and checkpoints on the way.  A checkpoint stands before the point of its step is kept, and what it says of
-/// the trajectory is on the disk before it is.
+/// Ctrl-C, and keeps points and checkpoints on the way.  A checkpoint stands before the point of its step is
+/// kept, and what it says of the trajectory is on the disk before it is.
 void run_to(long steps, EventSteps<Integrator>& motion, const Keeping& keeping, RunResult& result);
 
 }  // namespace diracstep::command

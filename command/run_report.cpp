@@ -223,8 +223,9 @@ std::string run_text(const RunResult& result, const CatalogueScene& entry, const
                   name(result.momentum));
   if (result.variable) text += summary(*result.variable);
   if (result.has_end()) {
-    text += fmt::format("\nt = {:.10g}\n{}energy: {:.15g}, changed by {:.2e}\n", result.end.time,
-                        end_table(result.end, entry.shown()), result.end.energy, energy_change(result, entry));
+    text +=
+        fmt::format("\nt = {:.10g}\n{}energy: {:.15g}, changed by {:.2e}\n", result.end.time,
+                    end_table(result.end, entry.shown()), result.end.energy, energy_change(result, entry));
     text += invariants_text(result) + outputs_text(result) + events_text(result);
     if (std::isfinite(result.check.error_q))
       text += fmt::format("error against the {} reference: q {:.2e}, p {:.2e}\n", entry.reference.kind,

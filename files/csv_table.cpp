@@ -69,8 +69,8 @@ CsvTable read_csv(const std::string& path, const std::string& what, std::size_t 
     if (width == 0 && fields.size() < 2)
       throw Misuse(fmt::format("{}: '{}', line {}: expected two columns or more", what, path, number));
     if (width != 0 && fields.size() != width)
-      throw Misuse(
-          fmt::format("{}: '{}', line {}: {} columns; expected {}", what, path, number, fields.size(), width));
+      throw Misuse(fmt::format("{}: '{}', line {}: {} columns; expected {}", what, path, number,
+                               fields.size(), width));
     if (numbers)
       table.lines.push_back(std::move(*numbers));
     else if (width == 0)

@@ -34,9 +34,7 @@ OutputFile opened(const std::string& path, OutputFile::Mode mode) {
 }  // namespace
 
 TrajectoryFile::TrajectoryFile(const std::string& path, const Scene& scene, std::vector<Output> further)
-    : rows_(scene.rows()),
-      further_(std::move(further)),
-      file_(opened(path, OutputFile::Mode::fresh)) {
+    : rows_(scene.rows()), further_(std::move(further)), file_(opened(path, OutputFile::Mode::fresh)) {
   put(header(scene, further_));
 }
 
@@ -71,8 +69,7 @@ void TrajectoryFile::write(const Sample& sample) {
   add(sample.lambda.head(rows_));
   fmt::format_to(std::back_inserter(line), ",{:.17g}", sample.energy);
   for (const Output& column : further_)
-    fmt::format_to(std::back_inserter(line), ",{:.17g}",
-                   column.at(sample.point()));
+    fmt::format_to(std::back_inserter(line), ",{:.17g}", column.at(sample.point()));
   put(line += '\n');
   ++mark_.lines;
 }

@@ -47,9 +47,10 @@ std::vector<Output> further_columns(const CatalogueScene& entry) {
   std::vector<Output> columns;
   const bool by_momentum = !entry.scene->lagrangian;
   for (const Invariant& invariant : entry.invariants)
-    columns.push_back({"invariant_" + invariant.name, [at = invariant.at, by_momentum](const MotionPoint& point) {
-                         return at(point.t, point.q, by_momentum ? point.p : point.v);
-                       }});
+    columns.push_back(
+        {"invariant_" + invariant.name, [at = invariant.at, by_momentum](const MotionPoint& point) {
+           return at(point.t, point.q, by_momentum ? point.p : point.v);
+         }});
   columns.insert(columns.end(), entry.outputs.begin(), entry.outputs.end());
   return columns;
 }
@@ -354,7 +355,7 @@ void require_events_found(const CatalogueScene& entry, const RunArguments& optio
   if (options.error)
     throw Misuse("--error does not go with the events of the scene: name a method and a step");
   const bool times = !options.at.empty() || options.every_time,
-             ends = std::ranges::any_of(entry.events, [](const Event& e) { return e.stop || e.acts(); });
+             ends = std::ranges::any_of(entry.events, [](const Event&e) { return e.stop || e.acts(); });
   if (times && (options.adaptive || ends))
     throw Misuse(
         "--at and --every-time go with fixed steps and with events that neither stop the run nor change its "
@@ -367,8 +368,9 @@ void take_outputs(const CatalogueScene& entry, RunResult& result) {
     result.outputs.emplace_back(output.name, output.at(result.end.point()));
   for (const auto& [name, value] : result.outputs)
     if (!std::isfinite(value))
-      result.doubt = joined_doubts({result.doubt, fmt::format("the output '{}' is not a finite number at t = {:g}",
-                                                              name, result.end.time)});
+      result.doubt =
+          joined_doubts({result.doubt, fmt::format("the output '{}' is not a finite number at t = {:g}", name,
+                                                   result.end.time)});
 }
 
 void report(const RunResult& result, const RunArguments& options, const CatalogueScene& entry,

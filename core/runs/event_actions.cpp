@@ -68,7 +68,10 @@ std::string solve_velocity(const Scene& scene, const SolverFactory& solvers, dou
 
 EventActions::EventActions(const std::shared_ptr<const Scene>& start, const std::shared_ptr<const Scene>& all,
                            SolverFactory solvers, const std::vector<Event>& events)
-    : start_(completed(start)), by_momentum_(!start->lagrangian), solvers_(std::move(solvers)), events_(events) {
+    : start_(completed(start)),
+      by_momentum_(!start->lagrangian),
+      solvers_(std::move(solvers)),
+      events_(events) {
   all_ = start_;
   if (events.empty()) return;
   if (all) {
@@ -107,7 +110,8 @@ std::vector<bool> EventActions::awake() const {
     const auto is = [&](bool state) {
       return [&, state](const std::string& name) { return on_[row(name)] == state; };
     };
-    const bool nothing_new = std::ranges::all_of(event.on, is(true)) && std::ranges::all_of(event.off, is(false));
+    const bool nothing_new =
+        std::ranges::all_of(event.on, is(true)) && std::ranges::all_of(event.off, is(false));
     awake.push_back((event.on.empty() && event.off.empty()) || !nothing_new);
   }
   return awake;
@@ -123,7 +127,8 @@ EventActions::Outcome EventActions::act(const Event& event, const Sample& at, co
   for (const std::string& name : event.on) on[row(name)] = true;
   for (const std::string& name : event.off) on[row(name)] = false;
   outcome.switched = on != on_;
-  auto scene = outcome.switched ? without(on) : std::shared_ptr<const Scene>(std::shared_ptr<void>(), &current);
+  auto scene =
+      outcome.switched ? without(on) : std::shared_ptr<const Scene>(std::shared_ptr<void>(), &current);
 
   Vector lq(outcome.v.size());
   scene->lagrangian->gradient(at.time, outcome.q, outcome.v, lq, outcome.p);

@@ -26,9 +26,9 @@ class EventActions {
   struct Outcome {
     std::string failure;  ///< empty, or why there is none
     Vector q, p, v;
-    double impulse = 0.0;     ///< Λ_c
-    double rate = 0.0;        ///< A_c v⁺ + b_c, at which a contact is left
-    bool switched = false;    ///< other rows are on than before
+    double impulse = 0.0;   ///< Λ_c
+    double rate = 0.0;      ///< A_c v⁺ + b_c, at which a contact is left
+    bool switched = false;  ///< other rows are on than before
   };
   /// `current` is the scene as the steps take it, with the rows that are on before.  Rows that the event
   /// switches are switched where it succeeds.

@@ -10,10 +10,10 @@ namespace diracstep {
 
 /// Where an event was met.
 struct EventHit {
-  std::size_t event;                    ///< number of it
-  Sample sample;                        ///< just before it
-  std::optional<Sample> after = {};     ///< what it made of it; none where it does not act
-  double impulse = 0.0;                 ///< Λ_c of a contact, momentum over the unit of its row
+  std::size_t event;                 ///< number of it
+  Sample sample;                     ///< just before it
+  std::optional<Sample> after = {};  ///< what it made of it; none where it does not act
+  double impulse = 0.0;              ///< Λ_c of a contact, momentum over the unit of its row
 };
 
 /// Finds events between the points of a run.

@@ -1,10 +1,10 @@
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/runs/event_actions.hpp>
 #include <diracstep/core/runs/event_search.hpp>
-#include <algorithm>
-#include <cmath>
 #include <functional>
 #include <map>
 #include <memory>
@@ -307,7 +307,8 @@ void EventSteps<Stepper>::add_left(std::size_t number, std::vector<EventSearch::
   const Event& event = events()[number];
   if (!event.contact || std::ranges::find(left, number, &EventSearch::Left::event) != left.end()) return;
   const double rate = EventActions::contact_rate(event, after_);
-  if (std::abs(rate) > round_off * after_.v.template lpNorm<Eigen::Infinity>()) left.push_back({number, rate});
+  if (std::abs(rate) > round_off * after_.v.template lpNorm<Eigen::Infinity>())
+    left.push_back({number, rate});
 }
 
 template <class Stepper>
@@ -316,8 +317,8 @@ StepReport EventSteps<Stepper>::make_true(EventHit hit, std::vector<EventSearch:
   const double t = hit.sample.time;
   stepper().restart(t, hit.sample.q, hit.sample.p, hit.sample.v);  // where the motion ends if it cannot act
   if (const double when = zeno_[hit.event].met(t, std::abs(t - began_at_)); std::isfinite(when))
-    return failed("event '" + event.name + "' is met ever faster and infinitely often before t = " +
-                  to_text(when, 10) +
+    return failed("event '" + event.name +
+                  "' is met ever faster and infinitely often before t = " + to_text(when, 10) +
                   " (Zeno), which steps cannot pass; let a second event, with a condition on the speed, end "
                   "it: set, or on = [a row that keeps the contact]");
   EventActions::Outcome outcome = actions_.act(event, hit.sample, scene());

@@ -19,8 +19,8 @@ namespace diracstep {
 ///
 ///       p⁺ = p⁻ + A_cᵀ Λ_c + Aᵀ Λ,   A_c v⁺ + b_c = −e (A_c v⁻ + b_c),   A v⁺ + b = 0,   p = ∂L/∂v(q, v)
 ///
-/// Without `restitution` there is no Λ_c: what was set off the distribution, or off a row that was switched on,
-/// is moved onto it by impulses of the rows, as a plastic impact does.
+/// Without `restitution` there is no Λ_c: what was set off the distribution, or off a row that was switched
+/// on, is moved onto it by impulses of the rows, as a plastic impact does.
 struct Event {
   enum class Direction { both, rising, falling };
   struct Setting {
@@ -32,8 +32,8 @@ struct Event {
   std::string name;
   PointFunction at = {};  ///< empty for an event of a clock
   Direction direction = Direction::both;
-  bool stop = false;            ///< the run ends there
-  double every = 0.0;           ///< in place of `at`: at the start and each so much time later
+  bool stop = false;             ///< the run ends there
+  double every = 0.0;            ///< in place of `at`: at the start and each so much time later
   PointFunction condition = {};  ///< happens only where this is above 0; empty: always
   std::vector<Setting> set = {};
   std::vector<std::string> on = {}, off = {};               ///< names of rows

@@ -36,9 +36,9 @@ struct Symbols {
   std::map<std::string, FormulaText, std::less<>> definitions;
   std::map<std::string, int, std::less<>> inputs;  ///< numbers of tables in the graph
   std::vector<Loop> loops;
-  std::vector<std::string> rows;    ///< that are not repeated
+  std::vector<std::string> rows;         ///< that are not repeated
   std::set<std::string> inputs_of_time;  ///< inputs that a formula reads at the time
-  std::vector<std::string> forces;  ///< of these rows, as far as formulas read them
+  std::vector<std::string> forces;       ///< of these rows, as far as formulas read them
 
   void add(Family family) {
     family_numbers.emplace(family.name, static_cast<int>(families.size()));

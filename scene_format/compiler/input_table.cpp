@@ -25,7 +25,11 @@ std::vector<double> bends(const std::vector<double>& x, const std::vector<double
 LookupTable table_of(const SceneDocument::Input& input) {
   using Kind = SceneDocument::Input::Kind;
   const std::vector<double>&x = input.times, &y = input.values;
-  LookupTable table{input.kind == Kind::step ? 0 : input.kind == Kind::linear ? 1 : 3, x, {y.front(), 0, 0, 0}};
+  LookupTable table{input.kind == Kind::step     ? 0
+                    : input.kind == Kind::linear ? 1
+                                                 : 3,
+                    x,
+                    {y.front(), 0, 0, 0}};
   const auto add = [&](double c0, double c1, double c2, double c3) {
     table.coefficients.insert(table.coefficients.end(), {c0, c1, c2, c3});
   };

@@ -70,7 +70,17 @@ class Kernel {
   std::size_t size() const { return code_.size(); }
 
  private:
-  enum class From : unsigned char { computed, literal, known, instance, coordinate, multiplier, force, time, scale };
+  enum class From : unsigned char {
+    computed,
+    literal,
+    known,
+    instance,
+    coordinate,
+    multiplier,
+    force,
+    time,
+    scale
+  };
   struct Instruction {
     From from;
     NodeData data;  ///< a, b: earlier instructions, or where a leaf is read from; c: column

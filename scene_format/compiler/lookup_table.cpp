@@ -69,8 +69,8 @@ static double diracstep_table(const double* knots, const double* parts, long siz
 
 std::string LookupTable::source(const std::string& name) const {
   return fmt::format(
-      "static const double {0}_knots[] = {{{1:.17g}}};\nstatic const double {0}_parts[] = {{{2:.17g}}};\n", name,
-      fmt::join(knots, ", "), fmt::join(coefficients, ", "));
+      "static const double {0}_knots[] = {{{1:.17g}}};\nstatic const double {0}_parts[] = {{{2:.17g}}};\n",
+      name, fmt::join(knots, ", "), fmt::join(coefficients, ", "));
 }
 
 }  // namespace diracstep::scene_compiler

@@ -17,7 +17,8 @@ struct LookupTable {
   /// Its derivative of this order, 0 to 3.
   double value(double u, int order) const;
 
-  /// value() in C for the tables of generated sources, and this table as two arrays NAME_knots and NAME_parts.
+  /// value() in C for the tables of generated sources, and this table as two arrays NAME_knots and
+  /// NAME_parts.
   static const char* source_of_value();
   std::string source(const std::string& name) const;
 };

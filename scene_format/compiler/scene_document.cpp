@@ -451,7 +451,8 @@ class DocumentReader : TableReader {
 
   void require_moment(const toml::table& event, const SceneDocument::Event& stated) const {
     if (stated.when.has_value() == event.contains("every"))
-      fail(stated.place, "[[events]] needs one of 'when', a formula that changes its sign, and 'every', a time");
+      fail(stated.place,
+           "[[events]] needs one of 'when', a formula that changes its sign, and 'every', a time");
     if (stated.when) return;
     if (!(stated.every > 0.0 && std::isfinite(stated.every)))
       fail(place_of(event.get("every")->source()), "'every': expected a time above 0");

@@ -468,8 +468,9 @@ class SceneCompiler {
       break;
     }
     if (!gap && event.restitution)
-      fail(event.when->start, what + " is an impact: its 'when' is the gap, a formula in coordinates and t "
-                                     "without velocities");
+      fail(event.when->start, what +
+                                  " is an impact: its 'when' is the gap, a formula in coordinates and t "
+                                  "without velocities");
     if (!gap) return;
     SceneFunction contact{FunctionKind::rows, true};
     Piece single;

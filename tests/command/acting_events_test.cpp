@@ -52,7 +52,8 @@ set = { n = "n + 1" }
 /// Falls for t1 = √(2h/g), and after impact k for 2 t1 e^k; the impulses are m (1 + e) √(2gh) e^k.
 TEST_F(ActingEvents, ABallBouncesByItsClosedForm) {
   const double g = 9.81, e = 0.8, falls = std::sqrt(2.0 / g), speed = std::sqrt(2.0 * g);
-  for (const char* steps : {"--step 0.01", "--step 0.5", "--adaptive", "--method damped/radau:3 --adaptive --eps 1e-10"}) {
+  for (const char* steps :
+       {"--step 0.01", "--step 0.5", "--adaptive", "--method damped/radau:3 --adaptive --eps 1e-10"}) {
     const Json json = result(scene(ball) + " " + steps);
     ASSERT_EQ(json["events"].size(), 6U) << steps;
     double t = falls;
@@ -82,9 +83,10 @@ TEST_F(ActingEvents, ABallThatComesToRestIsToldOrHeldByARow) {
   EXPECT_NE(plastic.err.find("closes again at once"), std::string::npos) << plastic.err;
 
   text.replace(text.find("e = 0  "), 7, "e = 0.5");
-  text += "if = \"v_y < -1e-3\"\n[[rows]]\nname = \"ground\"\nequation = \"y = 0\"\non = false\n"
-          "[[events]]\nname = \"rest\"\nwhen = \"y\"\ndirection = \"falling\"\nif = \"v_y > -1e-3\"\n"
-          "on = \"ground\"\n";
+  text +=
+      "if = \"v_y < -1e-3\"\n[[rows]]\nname = \"ground\"\nequation = \"y = 0\"\non = false\n"
+      "[[events]]\nname = \"rest\"\nwhen = \"y\"\ndirection = \"falling\"\nif = \"v_y > -1e-3\"\n"
+      "on = \"ground\"\n";
   for (const char* steps : {"--step 0.01", "--adaptive"}) {
     const Json json = result(scene(text) + " " + steps);
     EXPECT_EQ(json["events"].back()["name"], "rest") << steps;
@@ -95,7 +97,8 @@ TEST_F(ActingEvents, ABallThatComesToRestIsToldOrHeldByARow) {
 }
 
 /// A ray in an ellipse keeps its energy and L² − (a² − b²) v_y², the product of its angular momenta about the
-/// two foci; 10⁴ reflections.  Times near 2e4 have a round-off of 4e-12, by which the points of reflection are off.
+/// two foci; 10⁴ reflections.  Times near 2e4 have a round-off of 4e-12, by which the points of reflection
+/// are off.
 TEST_F(ActingEvents, ABilliardInAnEllipseKeepsBothInvariants) {
   const std::string file = scene(R"toml(name = "billiard"
 lagrangian = "(v_x^2 + v_y^2)/2"
@@ -329,8 +332,8 @@ TEST_F(ActingEvents, AResumedRunHasTheBytesOfTheWhole) {
   for (const char* text : {stick_slip, ball}) {
     const std::string what = "run " + scene(text) + " --step 0.01";
     ASSERT_EQ(run(what + " --end 2 --out '" + path("whole.csv") + "'").status, 0);
-    ASSERT_EQ(
-        run(what + " --end 1.2 --out '" + path("k.csv") + "' --checkpoint '" + path("c") + "'").status, 0);
+    ASSERT_EQ(run(what + " --end 1.2 --out '" + path("k.csv") + "' --checkpoint '" + path("c") + "'").status,
+              0);
     const Outcome rest = run(what + " --end 2 --out '" + path("k.csv") + "' --resume '" + path("c") + "'");
     ASSERT_EQ(rest.status, 0) << rest.err;
     EXPECT_EQ(contents(path("k.csv")), contents(path("whole.csv")));
@@ -383,9 +386,9 @@ TEST_F(ActingEvents, ATableFromAFileIsTheSameAsOneInTheScene) {
 }
 
 TEST_F(ActingEvents, ATableAtAnotherArgumentNeedNotCoverTheTime) {
-  const std::string file =
-      scene("name = \"motor\"\nlagrangian = \"v_x^2/2\"\n[coordinates]\nx = {}\n[inputs]\ntorque = { times = "
-            "[0, 10], values = [2, 0] }\n[force]\nx = \"torque(v_x)\"\n[span]\nend = 30\nstep = 0.1\n");
+  const std::string file = scene(
+      "name = \"motor\"\nlagrangian = \"v_x^2/2\"\n[coordinates]\nx = {}\n[inputs]\ntorque = { times = "
+      "[0, 10], values = [2, 0] }\n[force]\nx = \"torque(v_x)\"\n[span]\nend = 30\nstep = 0.1\n");
   EXPECT_NEAR(result(file)["end"]["v"]["x"].get<double>(), 10.0 * (1.0 - std::exp(-6.0)), 1e-9);
 }
 
