@@ -6,7 +6,6 @@
 #include <diracstep/command/interrupt.hpp>
 #include <diracstep/command/progress.hpp>
 #include <diracstep/command/run_control.hpp>
-#include <diracstep/core/runs/event_search.hpp>
 #include <diracstep/core/runs/run.hpp>
 #include <diracstep/core/runs/run_checks.hpp>
 #include <diracstep/core/runs/step_loop.hpp>
@@ -35,44 +34,55 @@ Sample start_of(const Scene& scene) {
 
 class Run {
  public:
-  Run(long steps, Integrator& integrator, const Keeping& keeping, RunResult& result)
+  Run(long steps, EventSteps<Integrator>& motion, const Keeping& keeping, RunResult& result)
       : steps_(steps),
-        integrator_(integrator),
+        motion_(motion),
         keeping_(keeping),
         result_(result),
-        doubt_(integrator, steps - integrator.work().steps),
-        events_(keeping.events, integrator.scene().by_hamiltonian()),
         every_look_(std::max(1L, steps / points_looked_at)),
         next_checkpoint_(Clock::now() + between_checkpoints),
-        progress_(static_cast<double>(integrator.work().steps) / static_cast<double>(steps)) {
-    if (integrator.work().steps > 0) doubt_.see(start_of(integrator.scene()));
+        progress_(static_cast<double>(taken()) / static_cast<double>(steps)) {
+    begin_checks();
+    if (taken() > 0 && std::ranges::none_of(motion.events(), &Event::acts))
+      checks_->see(start_of(motion.scene()));
     const auto before_here = [&](double t) { return ahead_of_here(t) < -same_time; };
     next_time_ = std::ranges::find_if_not(keeping.times, before_here);
   }
 
   void go() {
-    const long first = integrator_.work().steps;
+    const long first = taken();
     if (first == 0 || wanted(first)) keep();
     keep_chosen_times();
-    look_for_events();
-    CheckedSteps steps{integrator_, &doubt_};
     const StepReport last = step_while(
-        steps, [&](long k) { return first + k < steps_ && result_.failure.empty(); },
+        *this, [&](long k) { return first + k < steps_ && result_.failure.empty(); },
         [&](long k) { return visit(first + k); });
     if (!last.ok())
       result_.failure = last.failure;
-    else if (result_.failure.empty() && !events_.stopped() && integrator_.work().steps < steps_)
-      result_.failure = fmt::format("{} at t = {:.10g}", interruption(), integrator_.time());
-    if (events_.stopped())
-      end_at(events_.hits().back().sample);
-    else if (integrator_.time() != kept_time_)
+    else if (result_.failure.empty() && !motion_.stopped() && taken() < steps_)
+      result_.failure = fmt::format("{} at t = {:.10g}", interruption(), motion_.time());
+    if (motion_.stopped())
+      end_at(motion_.hits().back());
+    else if (motion_.time() != kept_time_)
       keep();
-    result_.events = events_.events();
-    result_.hits = events_.hits();
-    result_.stopped = events_.stopped();
-    result_.work = integrator_.work();
-    if (result_.failure.empty() && !result_.stopped) doubt_.finish(integrator_);
-    result_.doubt = doubt_.text();
+    take_events(motion_, result_);
+    result_.work = motion_.work();
+    if (result_.failure.empty() && !motion_.stopped()) checks_->finish(motion_.stepper());
+    end_checks();
+    result_.doubt = joined_doubts(doubts_);
+  }
+
+  /// With the checks around it, which begin anew where an event has acted.
+  StepReport step() {
+    checks_->before_step(motion_.stepper());
+    StepReport report = motion_.step();
+    if (motion_.acted()) {
+      end_checks();
+      begin_checks();
+      if (report.ok() && !motion_.stopped()) look();
+    } else if (report.ok()) {
+      checks_->after_step(motion_.stepper());
+    }
+    return report;
   }
 
  private:
@@ -80,8 +90,7 @@ class Run {
   /// checkpoint is saved before the point is kept: a run that goes on from it does not keep the point twice.
   bool visit(long k) {
     if (keeping_.sensitivities != nullptr) keeping_.sensitivities->follow_step();
-    look_for_events();
-    if (events_.stopped()) return false;
+    if (motion_.stopped()) return false;
     const bool stopped = interrupted();
     if (k == steps_ || stopped || checkpoint_due(k)) save();
     if (wanted(k))
@@ -97,40 +106,37 @@ class Run {
     return k == steps_ || (keeping_.file != nullptr && keeping_.times.empty() && k % keeping_.every == 0);
   }
 
-  /// Between the last node and this one.
-  void look_for_events() {
-    if (events_.empty()) return;
-    Sample here;
-    const auto read = [&](double t, Sample& sample) {
-      return sample_at(integrator_, t, keeping_.momentum, sample);
-    };
-    StepReport report;
-    report.solve = integrator_.sample(keeping_.momentum, here);
-    if (report.ok()) report = events_.see(here, read);
-    if (!report.ok() && result_.failure.empty())
-      result_.failure = fmt::format("looking for events before t = {:g}: {}", integrator_.time(),
-                                    report.failure.empty() ? describe(report.solve.status) : report.failure);
+  long taken() const { return motion_.work().steps; }
+  const Integrator& integrator() const { return motion_.stepper(); }
+
+  void begin_checks() { checks_.emplace(motion_.stepper(), steps_ - taken()); }
+  /// What they say, once each.
+  void end_checks() {
+    std::string text = checks_->text();
+    if (doubts_.empty() || text.empty()) doubts_.push_back(std::move(text));
+    std::erase(doubts_, "");
   }
 
   /// The point at which an event ends the run is the last one of its file.
-  void end_at(const Sample& sample) {
+  void end_at(const EventHit& hit) {
+    const Sample& sample = hit.after ? *hit.after : hit.sample;
     if (keeping_.file != nullptr) keeping_.file->write(sample);
     result_.end = sample;
   }
 
   /// In steps of this run.
-  double ahead_of_here(double t) const { return (t - integrator_.time()) / integrator_.options().step; }
+  double ahead_of_here(double t) const { return (t - motion_.time()) / integrator().options().step; }
 
   /// The chosen times from this node to the next one; those at the next one are read there.
   void keep_chosen_times() {
     if (keeping_.file == nullptr) return;
-    const bool last = integrator_.work().steps >= steps_;
+    const bool last = taken() >= steps_;
     for (; next_time_ != keeping_.times.end() && result_.failure.empty(); ++next_time_) {
       if (ahead_of_here(*next_time_) >= 1.0 - same_time && !last) return;
       const bool at_node = std::abs(ahead_of_here(*next_time_)) <= same_time;
       Sample sample;
       const StepReport report =
-          sample_at(integrator_, at_node ? integrator_.time() : *next_time_, keeping_.momentum, sample);
+          sample_at(motion_.stepper(), at_node ? motion_.time() : *next_time_, keeping_.momentum, sample);
       if (!report.ok()) {
         result_.failure = report.failure;
         return;
@@ -150,28 +156,30 @@ class Run {
     if (keeping_.checkpoint.empty()) return;
     const TrajectoryFile::Mark mark =
         keeping_.file != nullptr ? keeping_.file->sync() : TrajectoryFile::Mark{};
-    write_checkpoint(keeping_.checkpoint, {keeping_.identity, mark.lines, mark.bytes, integrator_.save()});
+    Snapshot state;
+    motion_.save(state);
+    write_checkpoint(keeping_.checkpoint, {keeping_.identity, mark.lines, mark.bytes, std::move(state)});
     next_checkpoint_ = Clock::now() + between_checkpoints;
   }
 
   void keep() {
     Sample sample;
-    const SolveReport report = integrator_.sample(keeping_.momentum, sample);
+    const SolveReport report = motion_.sample(sample);
     if (!report.ok()) {
       if (result_.failure.empty())
         result_.failure =
-            fmt::format("reading the state at t = {}: {}", integrator_.time(), describe(report.status));
+            fmt::format("reading the state at t = {}: {}", motion_.time(), describe(report.status));
       return;
     }
-    kept_time_ = integrator_.time();
-    doubt_.see(sample);
+    kept_time_ = motion_.time();
+    checks_->see(sample);
     if (keeping_.file != nullptr && keeping_.times.empty()) keeping_.file->write(sample);
     result_.end = std::move(sample);
   }
 
   /// At the energy only; a point that cannot be read is told of where it is kept.
   void look() {
-    if (integrator_.sample(Momentum::projected, looked_at_).ok()) doubt_.see(looked_at_);
+    if (motion_.stepper().sample(Momentum::projected, looked_at_).ok()) checks_->see(looked_at_);
   }
 
   void show(long k) {
@@ -180,11 +188,11 @@ class Run {
   }
 
   long steps_;
-  Integrator& integrator_;
+  EventSteps<Integrator>& motion_;
   const Keeping& keeping_;
   RunResult& result_;
-  RunChecks doubt_;
-  EventSearch events_;
+  std::optional<RunChecks> checks_;
+  std::vector<std::string> doubts_;
   long every_look_;
   Sample looked_at_;
   std::vector<double>::const_iterator next_time_;
@@ -195,8 +203,8 @@ class Run {
 
 }  // namespace
 
-void run_to(long steps, Integrator& integrator, const Keeping& keeping, RunResult& result) {
-  Run(steps, integrator, keeping, result).go();
+void run_to(long steps, EventSteps<Integrator>& motion, const Keeping& keeping, RunResult& result) {
+  Run(steps, motion, keeping, result).go();
 }
 
 }  // namespace diracstep::command

@@ -4,6 +4,7 @@
 #include <diracstep/command/files/trajectory_file.hpp>
 #include <diracstep/command/run_report.hpp>
 #include <diracstep/command/run_sensitivities.hpp>
+#include <diracstep/core/runs/event_steps.hpp>
 #include <optional>
 #include <string>
 #include <utility>
@@ -17,7 +18,6 @@ struct Keeping {
   long every = 1;  ///< each so many points go to the file
   /// In place of each so many: times in the direction of the steps, which may lie between nodes.
   std::vector<double> times = {};
-  std::vector<Event> events = {};                                  ///< that are looked for at each step
   TrajectoryFile* file = nullptr;                                  ///< none: only the end is read
   RunSensitivities* sensitivities = nullptr;                       ///< that follow each step, if any
   std::string checkpoint = {};                                     ///< path, or empty
@@ -25,9 +25,9 @@ struct Keeping {
   std::vector<std::pair<std::string, std::string>> identity = {};  ///< of the run, for the checkpoint
 };
 
-/// Steps from where the integrator stands to step number `steps`, to a failure or to Ctrl-C, and keeps points
-/// and checkpoints on the way.  A checkpoint stands before the point of its step is kept, and what it says of
-/// the trajectory is on the disk before it is.
-void run_to(long steps, Integrator& integrator, const Keeping& keeping, RunResult& result);
+/// Steps from where they stand to step number `steps`, to an event that stops them, to a failure or to
+/// Ctrl-C, and keeps points and checkpoints on the way.  A checkpoint stands before the point of its step is
+/// kept, and what it says of the trajectory is on the disk before it is.
+void run_to(long steps, EventSteps<Integrator>& motion, const Keeping& keeping, RunResult& result);
 
 }  // namespace diracstep::command

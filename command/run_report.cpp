@@ -142,11 +142,16 @@ std::string events_text(const RunResult& result) {
 
 Json events_json(const RunResult& result, const Scene& scene) {
   Json json = Json::array();
-  for (const EventHit& hit : result.hits)
+  for (const EventHit& hit : result.hits) {
     json.push_back({{"name", result.events[hit.event].name},
                     {"t", Json(hit.sample.time)},
                     {"q", by_name(scene.coordinates, hit.sample.q)},
                     {"v", by_name(scene.coordinates, hit.sample.v)}});
+    if (hit.after)
+      json.back()["after"] = {{"q", by_name(scene.coordinates, hit.after->q)},
+                              {"v", by_name(scene.coordinates, hit.after->v)}};
+    if (result.events[hit.event].restitution) json.back()["impulse"] = Json(hit.impulse);
+  }
   return json;
 }
 
@@ -231,10 +236,11 @@ double energy_change(const RunResult& result, const CatalogueScene& entry) {
 
 void compare_with_reference(RunResult& result, const CatalogueScene& entry, const Scene& scene) {
   if (!result.has_end()) return;
+  const Scene& at_end = result.scene_at_end ? *result.scene_at_end : scene;
   const bool known = entry.reference.at && entry.reference.at(result.end.time);
   ReferenceEnd reference{.kind = {}, .how = {}, .missing = "no reference", .q = {}, .p = {}};
   if (known) reference = reference_end(entry, result.end.time);
-  judge(result.check, scene, result.end, reference);
+  judge(result.check, at_end, result.end, reference);
 }
 
 std::string run_text(const RunResult& result, const CatalogueScene& entry, const IntegratorOptions& options) {
@@ -246,8 +252,9 @@ std::string run_text(const RunResult& result, const CatalogueScene& entry, const
                   name(result.momentum));
   if (result.variable) text += summary(*result.variable);
   if (result.has_end()) {
-    text += fmt::format("\nt = {:.10g}\n{}energy: {:.15g}, changed by {:.2e}\n", result.end.time,
-                        end_table(result.end, *entry.scene), result.end.energy, energy_change(result, entry));
+    text +=
+        fmt::format("\nt = {:.10g}\n{}energy: {:.15g}, changed by {:.2e}\n", result.end.time,
+                    end_table(result.end, entry.shown()), result.end.energy, energy_change(result, entry));
     text += invariants_text(result) + outputs_text(result) + events_text(result);
     text += sensitivities_text(result, *entry.scene);
     if (std::isfinite(result.check.error_q))
@@ -255,7 +262,7 @@ std::string run_text(const RunResult& result, const CatalogueScene& entry, const
           "error against the {} reference: q {:.2e}{}\n", entry.reference.kind, result.check.error_q,
           std::isfinite(result.check.error_p) ? fmt::format(", p {:.2e}", result.check.error_p)
                                               : std::string());
-    if (entry.scene->rows() > 0)
+    if (entry.shown().rows() > 0)
       text += fmt::format("largest residual of the constraint rows: {:.2e}\n", result.check.constraint);
   }
   text +=
@@ -276,7 +283,7 @@ std::string run_json(const RunResult& result, const CatalogueScene& entry, const
             {"status", status(result)}};
   for (const auto& [key, value] : entry.parameters) json["parameters"][key] = Json(value);
   json["doubt"] = result.doubt.empty() ? Json(nullptr) : Json(result.doubt);
-  json["end"] = end_json(result, *entry.scene);
+  json["end"] = end_json(result, entry.shown());
   json["error_q"] = Json(check.error_q);
   json["error_p"] = Json(check.error_p);
   json["constraint"] = Json(check.constraint);

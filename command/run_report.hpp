@@ -2,7 +2,7 @@
 
 #include <diracstep/command/run_sensitivities.hpp>
 #include <diracstep/command/variable_steps.hpp>
-#include <diracstep/core/runs/event_search.hpp>
+#include <diracstep/core/runs/event_steps.hpp>
 #include <diracstep/validation/studies/study_run.hpp>
 #include <optional>
 #include <string>
@@ -32,12 +32,21 @@ struct RunResult {
   std::vector<SensitivityColumn> sensitivities;         ///< of the end, where they were asked for
   std::vector<Event> events;                            ///< of the scene
   std::vector<EventHit> hits;                           ///< where they were met
+  std::shared_ptr<const Scene> scene_at_end;            ///< of the rows that are on there
   bool stopped = false;                                 ///< by the last of these
   std::string out;                                      ///< the file written, if any
   long lines = 0;                                       ///< points in it
 
   bool has_end() const { return end.q.size() > 0; }
 };
+
+template <class Stepper>
+void take_events(const EventSteps<Stepper>& motion, RunResult& result) {
+  result.events = motion.events();
+  result.hits = motion.hits();
+  result.stopped = motion.stopped();
+  if (!result.events.empty()) result.scene_at_end = std::make_shared<const Scene>(motion.scene());
+}
 
 /// Fills in `check`, the scene being the integrator's; its errors stay NaN where there is no reference at the
 /// end.

@@ -61,8 +61,7 @@ struct InputRange {
 /// A number of the user's own along a motion, a column of its file.
 struct Output {
   std::string name;
-  std::function<double(double t, ConstVectorRef q, ConstVectorRef v)>
-      at;  ///< p in place of v without a Lagrangian
+  PointFunction at;
 };
 
 /// Where a value of a start is from.
@@ -105,6 +104,10 @@ struct CatalogueScene {
   std::vector<Output> outputs = {};
   std::vector<InputRange> input_ranges = {};
   std::vector<Event> events = {};
+  /// The scene with the rows that are off at the start as well, where events switch some; else null.
+  std::shared_ptr<const Scene> all_rows = {};
+  /// Of the columns of its motions: all_rows or the scene itself.
+  const Scene& shown() const { return all_rows ? *all_rows : *scene; }
   std::optional<StatedStart> stated_start = {};  ///< none for scenes that are not from files
   Recommendation recommended = {};
   std::vector<SymbolNote> notes = {};  ///< coordinates, sizes and parameters

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/system/consistent_start.hpp>
+#include <diracstep/core/system/row_subset.hpp>
 #include <diracstep/files/input_file.hpp>
 #include <diracstep/scene_format/compiler/size_limits.hpp>
 #include <diracstep/scene_format/loader/defined_start.hpp>
@@ -329,27 +330,64 @@ void add_outputs(CatalogueScene& entry, const LoadedScenePtr& loaded) {
     if (std::ranges::find(names, name) != names.end())
       throw SceneError(program.document.file, program.document.outputs[i].place,
                        fmt::format("the output '{}' has the name of a coordinate", name));
-    entry.outputs.push_back({name, file_value(loaded, function)});
+    entry.outputs.push_back({name, file_point_value(loaded, function, entry.shown().row_names())});
   }
+}
+
+Event event_of(const CatalogueScene& entry, const LoadedScenePtr& loaded, const SceneDocument::Event& stated,
+               const EventProgram& program) {
+  using Stated = SceneDocument::Event::Direction;
+  const std::vector<std::string> rows = entry.shown().row_names();
+  const auto function = [&](const std::optional<SceneFunction>& of) {
+    return of ? file_point_value(loaded, *of, rows) : PointFunction{};
+  };
+  Event event;
+  event.name = stated.name;
+  event.at = function(program.when);
+  event.direction = stated.direction == Stated::both     ? Event::Direction::both
+                    : stated.direction == Stated::rising ? Event::Direction::rising
+                                                         : Event::Direction::falling;
+  event.stop = stated.stop;
+  event.every = stated.every;
+  event.condition = function(program.condition);
+  event.on = stated.on;
+  event.off = stated.off;
+  event.restitution = function(program.restitution);
+  if (program.contact) event.contact = file_rows(loaded, *program.contact);
+  for (std::size_t k = 0; k < program.set.size(); ++k)
+    for_each_value(*loaded, program.set[k], 0.0, [&](int index, double) {
+      event.set.push_back(
+          {index, program.set[k].role == Role::second, file_point_value(loaded, program.values[k], rows)});
+    });
+  return event;
 }
 
 void add_events(CatalogueScene& entry, const LoadedScenePtr& loaded) {
-  using Stated = SceneDocument::Event::Direction;
   const SceneProgram& program = *loaded->program;
-  for (std::size_t i = 0; i < program.events.size(); ++i) {
-    const SceneDocument::Event& stated = program.document.events[i];
-    const Event::Direction direction = stated.direction == Stated::both     ? Event::Direction::both
-                                       : stated.direction == Stated::rising ? Event::Direction::rising
-                                                                            : Event::Direction::falling;
-    entry.events.push_back({stated.name, file_value(loaded, program.events[i]), direction, stated.stop});
-  }
+  for (std::size_t i = 0; i < program.events.size(); ++i)
+    entry.events.push_back(event_of(entry, loaded, program.document.events[i], program.events[i]));
+}
+
+/// Leaves out the rows that are off at the start; the scene with all of them where events switch some.
+std::shared_ptr<const Scene> take_off_rows(const SceneDocument& document, Scene& scene) {
+  const bool switched = std::ranges::any_of(
+      document.events, [](const auto& event) { return !event.on.empty() || !event.off.empty(); });
+  std::vector<std::string> off;
+  for (const auto& row : document.rows)
+    if (!row.on) off.push_back(row.name);
+  if (!switched && off.empty()) return nullptr;
+  auto all = std::make_shared<const Scene>(scene);
+  scene = *without_rows(scene, off);
+  return all;
 }
 
 /// Throws SceneError where an input ends before the span does.
-void require_inputs_over_span(const SceneDocument& document, double start) {
+void require_inputs_over_span(const SceneProgram& program, double start) {
+  const SceneDocument& document = program.document;
   for (const auto& input : document.inputs)
     for (const double t : {start, document.t_end})
-      if (!input.hold && !(t >= input.times.front() && t <= input.times.back()))
+      if (!input.hold && program.symbols.inputs_of_time.contains(input.name) &&
+          !(t >= input.times.front() && t <= input.times.back()))
         throw SceneError(
             document.file, input.place,
             fmt::format("the input '{}' is given from t = {:g} to {:g}, and the scene is at t = {:g}; "
@@ -364,12 +402,12 @@ CatalogueScene load(const std::string& file, const std::string& text, const Para
   const LoadedScenePtr loaded = std::make_shared<const LoadedScene>(std::move(program), std::move(values));
   const SceneDocument& document = loaded->program->document;
   StatedStart stated = start_of(*loaded);
-  require_inputs_over_span(document, stated.start.time);
+  require_inputs_over_span(*loaded->program, stated.start.time);
   set_rates_of_states(loaded, stated);
   Scene scene = scene_of(loaded, stated.start);
-  require_defined_start(*loaded, scene);
-
   CatalogueScene entry;
+  entry.all_rows = take_off_rows(document, scene);
+  require_defined_start(*loaded, scene);
   entry.scene = std::make_shared<const Scene>(std::move(scene));
   project(*loaded, entry, stated);
   entry.stated_start = std::move(stated);
@@ -395,7 +433,8 @@ CatalogueScene load(const std::string& file, const std::string& text, const Para
   add_outputs(entry, loaded);
   add_events(entry, loaded);
   for (const auto& input : document.inputs)
-    if (!input.hold) entry.input_ranges.push_back({input.name, input.times.front(), input.times.back()});
+    if (!input.hold && loaded->program->symbols.inputs_of_time.contains(input.name))
+      entry.input_ranges.push_back({input.name, input.times.front(), input.times.back()});
   return entry;
 }
 

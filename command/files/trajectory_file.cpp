@@ -34,17 +34,13 @@ OutputFile opened(const std::string& path, OutputFile::Mode mode) {
 }  // namespace
 
 TrajectoryFile::TrajectoryFile(const std::string& path, const Scene& scene, std::vector<Output> further)
-    : rows_(scene.rows()),
-      by_momentum_(!scene.lagrangian),
-      further_(std::move(further)),
-      file_(opened(path, OutputFile::Mode::fresh)) {
+    : rows_(scene.rows()), further_(std::move(further)), file_(opened(path, OutputFile::Mode::fresh)) {
   put(header(scene, further_));
 }
 
 TrajectoryFile::TrajectoryFile(const std::string& path, const Scene& scene, Mark mark,
                                std::vector<Output> further)
     : rows_(scene.rows()),
-      by_momentum_(!scene.lagrangian),
       further_(std::move(further)),
       file_(opened(path, OutputFile::Mode::existing)),
       mark_(mark) {
@@ -73,8 +69,7 @@ void TrajectoryFile::write(const Sample& sample) {
   add(sample.lambda.head(rows_));
   fmt::format_to(std::back_inserter(line), ",{:.17g}", sample.energy);
   for (const Output& column : further_)
-    fmt::format_to(std::back_inserter(line), ",{:.17g}",
-                   column.at(sample.time, sample.q, by_momentum_ ? sample.p : sample.v));
+    fmt::format_to(std::back_inserter(line), ",{:.17g}", column.at(sample.point()));
   put(line += '\n');
   ++mark_.lines;
 }

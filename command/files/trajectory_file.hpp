@@ -46,7 +46,6 @@ class TrajectoryFile {
   void flush();
 
   Eigen::Index rows_;  ///< of the scene; an integrator may know more, which are left out
-  bool by_momentum_;   ///< without a Lagrangian the further columns are functions of p
   std::vector<Output> further_;
   OutputFile file_;
   std::string waiting_;

@@ -11,12 +11,14 @@
 #include <diracstep/command/run_identity.hpp>
 #include <diracstep/command/verbs.hpp>
 #include <diracstep/command/verbs/run_arguments.hpp>
+#include <diracstep/core/adaptive/adaptive_event_steps.hpp>
 #include <diracstep/core/adaptive/adaptive_run.hpp>
 #include <diracstep/core/adaptive/damping_survey.hpp>
 #include <diracstep/core/adaptive/error_control.hpp>
 #include <diracstep/core/adaptive/rate_monitor.hpp>
 #include <diracstep/core/adaptive/variable_run_checks.hpp>
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/runs/event_steps.hpp>
 #include <diracstep/core/runs/run.hpp>
 #include <diracstep/files/file_lock.hpp>
 #include <memory>
@@ -43,8 +45,12 @@ StepGrid fitted_steps(const CatalogueScene& entry, double end, double step, cons
 /// The columns of a trajectory that its scene does not have of itself.
 std::vector<Output> further_columns(const CatalogueScene& entry) {
   std::vector<Output> columns;
+  const bool by_momentum = !entry.scene->lagrangian;
   for (const Invariant& invariant : entry.invariants)
-    columns.push_back({"invariant_" + invariant.name, invariant.at});
+    columns.push_back(
+        {"invariant_" + invariant.name, [at = invariant.at, by_momentum](const MotionPoint& point) {
+           return at(point.t, point.q, by_momentum ? point.p : point.v);
+         }});
   columns.insert(columns.end(), entry.outputs.begin(), entry.outputs.end());
   return columns;
 }
@@ -60,19 +66,21 @@ void open_trajectory(std::optional<TrajectoryFile>& file, const RunArguments& op
     return void(file.emplace(options.out, *entry.scene, columns));
   }
   if (saved)
-    file.emplace(options.out, *entry.scene, TrajectoryFile::Mark{saved->points, saved->bytes},
+    file.emplace(options.out, entry.shown(), TrajectoryFile::Mark{saved->points, saved->bytes},
                  further_columns(entry));
   else
-    file.emplace(options.out, *entry.scene, further_columns(entry));
+    file.emplace(options.out, entry.shown(), further_columns(entry));
 }
 
-void go_on(const Checkpoint& saved, const RunArguments& options, Integrator& integrator) {
+void go_on(const Checkpoint& saved, const RunArguments& options, EventSteps<Integrator>& motion) {
   try {
-    integrator.restore(saved.state);
+    SnapshotReader reader(saved.state);
+    motion.restore(reader);
+    reader.require_end();
   } catch (const Misuse& misuse) {
     throw Misuse(fmt::format("--resume: '{}': {}", options.resume, misuse.what()));
   }
-  say(fmt::format("going on from step {}, t = {:g}", integrator.work().steps, integrator.time()));
+  say(fmt::format("going on from step {}, t = {:g}", motion.work().steps, motion.time()));
 }
 
 /// The times of --at, or those of --every-time from the start to the end; none where there are neither.
@@ -106,12 +114,13 @@ void require_within(const std::vector<double>& times, const Integrator& integrat
 
 /// Steps of one size to the end, from the start or from a checkpoint.
 void run_fixed(const RunArguments& options, const CatalogueScene& entry, const Session& session,
-               Integrator& integrator, long steps, std::optional<TrajectoryFile>& file, RunResult& result) {
+               EventSteps<Integrator>& motion, long steps, std::optional<TrajectoryFile>& file,
+               RunResult& result) {
+  const Integrator& integrator = motion.stepper();
   Keeping keeping{.momentum = result.momentum, .every = options.every};
   keeping.times = chosen_times(
       options, entry, entry.scene->start.time + static_cast<double>(steps) * integrator.options().step);
   require_within(keeping.times, integrator, steps);
-  keeping.events = entry.events;
   keeping.checkpoint = checkpoint_path(options);
   keeping.checkpoint_every = options.checkpoint_every;
   if (!keeping.checkpoint.empty())  // else nothing is saved or compared, and no plugin has to be read for it
@@ -121,7 +130,7 @@ void run_fixed(const RunArguments& options, const CatalogueScene& entry, const S
   if (!options.resume.empty()) {
     saved = read_checkpoint(options.resume);
     require_same_run(*saved, keeping.identity, options.resume);
-    go_on(*saved, options, integrator);
+    go_on(*saved, options, motion);
   }
   std::optional<RunSensitivities> derivatives;
   if (!options.sensitivities.empty())
@@ -130,7 +139,7 @@ void run_fixed(const RunArguments& options, const CatalogueScene& entry, const S
   open_trajectory(file, options, entry, saved, derivatives ? derivatives->columns() : std::vector<Output>{});
   if (file) keeping.file = &*file;
   if (derivatives) keeping.sensitivities = &*derivatives;
-  run_to(steps, integrator, keeping, result);
+  run_to(steps, motion, keeping, result);
   if (derivatives && result.failure.empty()) result.sensitivities = derivatives->read();
 }
 
@@ -139,37 +148,99 @@ void run_variable(const RunArguments& options, const CatalogueScene& entry, Adap
                   VariableRunChecks& checks, double end, TrajectoryFile* file, RunResult& result) {
   Progress progress;
   const double start = entry.scene->start.time;
-  EventSearch events(entry.events, !entry.scene->lagrangian);
-  StepReport searched;
-  long points = 0;
   const auto keep = [&](const Sample& sample) {
-    if (!events.empty()) {
-      searched = events.see(sample, [&](double t, Sample& between) {
-        return sample_at(integrator, t, result.momentum, between);
-      });
-      if (!searched.ok()) return false;
-    }
-    const Sample& shown = events.stopped() ? events.hits().back().sample : sample;
-    const bool due = events.empty() || events.stopped() || points % options.every == 0 || sample.time == end;
-    ++points;
-    if (file != nullptr && due) file->write(shown);
-    result.end = shown;
+    if (file != nullptr) file->write(sample);
+    result.end = sample;
     progress.show((sample.time - start) / (end - start), fmt::format("t = {:g}", sample.time));
-    return !events.stopped() && !interrupted();
+    return !interrupted();
   };
   const std::vector<double> times = chosen_times(options, entry, end);
-  const RunReport report = times.empty() ? run_until(integrator, end, result.momentum,
-                                                     events.empty() ? options.every : 1, keep, &checks)
-                                         : run_at(integrator, times, result.momentum, keep, &checks);
+  const RunReport report = times.empty()
+                               ? run_until(integrator, end, result.momentum, options.every, keep, &checks)
+                               : run_at(integrator, times, result.momentum, keep, &checks);
   result.failure = report.last.failure;
-  if (result.failure.empty() && !searched.ok()) result.failure = "looking for events: " + searched.failure;
   if (result.failure.empty() && interrupted())
     result.failure = fmt::format("{} at t = {:.10g}", interruption(), integrator.time());
-  result.events = events.events();
-  result.hits = events.hits();
-  result.stopped = events.stopped();
   result.work = integrator.work();
   result.doubt = checks.text();
+}
+
+using VariableMotion = EventSteps<AdaptiveIntegrator>;
+
+/// Variable steps through the events of a scene.  The checks of a run without are those of its first part,
+/// and begin anew behind each event that acts.
+class VariableEventRun {
+ public:
+  VariableEventRun(const RunArguments& options, VariableMotion& motion, std::function<Integrator()> side,
+                   double end, TrajectoryFile* file, RunResult& result)
+      : options_(options), motion_(motion), side_(std::move(side)), end_(end), file_(file), result_(result) {
+    begin_checks();
+  }
+
+  void go() {
+    Sample here;
+    if (const SolveReport solve = motion_.sample(here); solve.ok()) keep(here);
+    StepReport report;
+    bool at_end = false;
+    while (report.ok() && !motion_.stopped() && !at_end && !interrupted()) {
+      const double size = motion_.stepper().next_size(), left = (end_ - motion_.time()) / size;
+      report = left < 1.0 ? motion_.read_up_to(end_, here, at_end) : step();
+      if (!report.ok() || motion_.stopped()) break;
+      if (motion_.acted() && left < 1.0) renew_checks();
+      if (!at_end) report.solve = motion_.sample(here);
+      if (report.ok() && (at_end || ++points_ % options_.every == 0)) keep(here);
+    }
+    if (motion_.stopped()) {
+      const EventHit& last = motion_.hits().back();
+      keep(last.after ? *last.after : last.sample);
+    }
+    result_.failure = report.failure;
+    if (result_.failure.empty() && !report.ok()) result_.failure = describe(report.solve.status);
+    if (result_.failure.empty() && interrupted())
+      result_.failure = fmt::format("{} at t = {:.10g}", interruption(), motion_.time());
+    take_events(motion_, result_);
+    result_.work = motion_.work();
+    end_checks();
+    result_.doubt = joined_doubts(doubts_);
+  }
+
+ private:
+  StepReport step() {
+    checks_->before_step();
+    StepReport report = motion_.step();
+    if (motion_.acted())
+      renew_checks();
+    else if (report.ok())
+      checks_->after_step();
+    return report;
+  }
+  void renew_checks() {
+    end_checks();
+    begin_checks();
+  }
+  void begin_checks() { checks_.emplace(motion_.stepper(), side_()); }
+  void end_checks() {
+    if (std::string text = checks_->text(); doubts_.empty() && !text.empty())
+      doubts_.push_back(std::move(text));
+  }
+  void keep(const Sample& sample) {
+    checks_->see(sample);
+    if (file_ != nullptr) file_->write(sample);
+    result_.end = sample;
+  }
+
+  const RunArguments& options_;
+  VariableMotion& motion_;
+  std::function<Integrator()> side_;
+  double end_;
+  TrajectoryFile* file_;
+  RunResult& result_;
+  std::optional<VariableRunChecks> checks_;
+  std::vector<std::string> doubts_;
+  long points_ = 0;
+};
+
+void tell_control(const AdaptiveIntegrator& integrator, RunResult& result) {
   result.variable =
       VariableSteps{integrator.adaptive().eps, integrator.adaptive().control, integrator.control()};
   const std::string told = warning(*result.variable, result.work.steps);
@@ -190,23 +261,40 @@ IntegratorOptions run_once(const RunArguments& options, const CatalogueScene& en
   std::optional<TrajectoryFile> file;
   if (options.adaptive) {
     chosen.step = std::copysign(chosen.step, end - entry.scene->start.time);
-    AdaptiveIntegrator integrator(entry.scene, session.registry, session.solvers, chosen,
-                                  {.eps = options.eps.value_or(AdaptiveOptions{}.eps),
-                                   .control = step_control(options.control.value_or(usual_control)),
-                                   .end = end,
-                                   .smallest_step = options.smallest_step,
-                                   .max_steps = options.max_steps.value_or(AdaptiveOptions{}.max_steps)});
-    VariableRunChecks checks(integrator,
-                             {entry.scene, session.registry, session.solvers, integrator.options()});
+    const auto make = [&](const std::shared_ptr<const Scene>& scene) {
+      return std::make_unique<AdaptiveIntegrator>(
+          scene, session.registry, session.solvers, chosen,
+          AdaptiveOptions{.eps = options.eps.value_or(AdaptiveOptions{}.eps),
+                          .control = step_control(options.control.value_or(usual_control)),
+                          .end = end,
+                          .smallest_step = options.smallest_step,
+                          .max_steps = options.max_steps.value_or(AdaptiveOptions{}.max_steps)});
+    };
+    VariableMotion motion(entry.scene, entry.all_rows, entry.events, session.solvers, result.momentum, make);
+    const auto side = [&]() -> Integrator {
+      return {std::make_shared<const Scene>(motion.scene()), session.registry, session.solvers,
+              motion.stepper().options()};
+    };
     open_trajectory(file, options, entry, std::nullopt);
-    run_variable(options, entry, integrator, checks, end, file ? &*file : nullptr, result);
-    chosen = integrator.options();
+    TrajectoryFile* const points = file ? &*file : nullptr;
+    if (entry.events.empty()) {
+      VariableRunChecks checks(motion.stepper(), side());
+      run_variable(options, entry, motion.stepper(), checks, end, points, result);
+    } else {
+      VariableEventRun(options, motion, side, end, points, result).go();
+    }
+    tell_control(motion.stepper(), result);
+    chosen = motion.stepper().options();
   } else {
     const StepGrid grid = fitted_steps(entry, end, chosen.step, options);
     chosen.step = grid.step;
-    Integrator integrator(entry.scene, session.registry, session.solvers, chosen);
-    run_fixed(options, entry, session, integrator, grid.steps, file, result);
-    chosen = integrator.options();
+    const auto make = [&](const std::shared_ptr<const Scene>& scene) {
+      return std::make_unique<Integrator>(scene, session.registry, session.solvers, chosen);
+    };
+    EventSteps<Integrator> motion(entry.scene, entry.all_rows, entry.events, session.solvers, result.momentum,
+                                  make);
+    run_fixed(options, entry, session, motion, grid.steps, file, result);
+    chosen = motion.stepper().options();
   }
   finish(file, options, result);
   return chosen;
@@ -278,21 +366,25 @@ void require_inputs_until(const CatalogueScene& entry, double end) {
 /// Throws Misuse for runs that do not look for events, where the scene has some.
 void require_events_found(const CatalogueScene& entry, const RunArguments& options) {
   if (entry.events.empty()) return;
-  if (!checkpoint_path(options).empty())
-    throw Misuse("--checkpoint and --resume do not go with the events of the scene");
   if (options.error)
     throw Misuse("--error does not go with the events of the scene: name a method and a step");
   const bool times = !options.at.empty() || options.every_time,
-             stops = std::ranges::any_of(entry.events, &Event::stop);
-  if (times && (options.adaptive || stops))
-    throw Misuse("--at and --every-time go with fixed steps and with events that do not stop the run only");
+             ends = std::ranges::any_of(entry.events, [](const Event&e) { return e.stop || e.acts(); });
+  if (times && (options.adaptive || ends))
+    throw Misuse(
+        "--at and --every-time go with fixed steps and with events that neither stop the run nor change its "
+        "motion; --every N shows each N-th step");
 }
 
 void take_outputs(const CatalogueScene& entry, RunResult& result) {
   if (!result.has_end()) return;
-  const Vector& second = entry.scene->lagrangian ? result.end.v : result.end.p;
   for (const Output& output : entry.outputs)
-    result.outputs.emplace_back(output.name, output.at(result.end.time, result.end.q, second));
+    result.outputs.emplace_back(output.name, output.at(result.end.point()));
+  for (const auto& [name, value] : result.outputs)
+    if (!std::isfinite(value))
+      result.doubt =
+          joined_doubts({result.doubt, fmt::format("the output '{}' is not a finite number at t = {:g}", name,
+                                                   result.end.time)});
 }
 
 void report(const RunResult& result, const RunArguments& options, const CatalogueScene& entry,

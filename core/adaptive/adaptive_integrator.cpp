@@ -134,6 +134,13 @@ void AdaptiveIntegrator::reset() {
   throw Misuse("scene '" + main_.scene().name + "': " + rate_.failure);
 }
 
+void AdaptiveIntegrator::restart(double time, ConstVectorRef q, ConstVectorRef p, ConstVectorRef v) {
+  main_.restart(time, q, p, v);
+  v_ = v;
+  if (local_) return go_on_local_control();
+  if (!start_control()) throw Misuse("scene '" + main_.scene().name + "': " + rate_.failure);
+}
+
 double AdaptiveIntegrator::span() const {
   const double start = main_.scene().start.time;
   return std::abs(adaptive_.end.value_or(start + 100.0 * options_.step) - start);
@@ -267,17 +274,28 @@ StepReport AdaptiveIntegrator::sample_at(double t, Momentum momentum, Sample& sa
   const double size = t - time();
   if (!(std::abs(size) <= 2.0 * std::abs(next_size_)))
     throw Misuse("t = " + to_text(t) + " is more than two steps from the last node, t = " + to_text(time()));
+  if (size != 0.0)
+    return sample_from(time(), main_.position(), main_.momentum(), local_ ? main_.velocity_estimate() : v_, t,
+                       momentum, sample);
   StepReport report;
-  if (size == 0.0) {
-    report.solve = main_.sample(momentum, sample);
-  } else {
-    side_.restart(time(), main_.position(), main_.momentum(), local_ ? main_.velocity_estimate() : v_);
-    if (!local_) ++report_.side_steps;
-    report = local_ ? side_steps_to(t) : side_.step(size);
-    if (!report.ok()) return report;
-    report.solve = side_.sample(momentum, sample);
-    sample.time = t;
-  }
+  report.solve = main_.sample(momentum, sample);
+  if (!report.ok())
+    report.failure = "reading the state at t = " + to_text(t) + ": " + describe(report.solve.status);
+  return report;
+}
+
+StepReport AdaptiveIntegrator::sample_from(double node, ConstVectorRef q, ConstVectorRef p, ConstVectorRef v,
+                                           double t, Momentum momentum, Sample& sample) {
+  side_.restart(node, q, p, v);
+  if (!local_) ++report_.side_steps;
+  StepReport report;
+  if (local_)
+    report = side_steps_to(t);
+  else if (t != node)
+    report = side_.step(t - node);
+  if (!report.ok()) return report;
+  report.solve = side_.sample(momentum, sample);
+  sample.time = t;
   if (!report.ok())
     report.failure = "reading the state at t = " + to_text(t) + ": " + describe(report.solve.status);
   return report;

@@ -82,6 +82,10 @@ class AdaptiveIntegrator {
   /// Goes back to the scene's start.
   void reset();
 
+  /// Goes on from another point of a motion, as Integrator::restart(); the control begins anew there.  The
+  /// counts go on.  Throws Misuse where the monitor knows no rate there.
+  void restart(double time, ConstVectorRef q, ConstVectorRef p, ConstVectorRef v);
+
   /// One step of the main sequence.
   StepReport step();
 
@@ -102,11 +106,15 @@ class AdaptiveIntegrator {
   /// Reads the motion at another time by a side step from the current node, or by as many as their local
   /// error asks for.  Full order for times within about a step from there; throws Misuse beyond two steps.
   StepReport sample_at(double t, Momentum momentum, Sample& sample);
+  /// The same from another node, such as the one before.
+  StepReport sample_from(double node, ConstVectorRef q, ConstVectorRef p, ConstVectorRef v, double t,
+                         Momentum momentum, Sample& sample);
 
   std::vector<PlanLine> plan() const;
 
  private:
   void start_local_control();
+  void go_on_local_control();
   StepReport error_step();
   StepReport side_steps_to(double t);
   double up_to_landing(double size) const;

@@ -24,6 +24,13 @@ void AdaptiveIntegrator::start_local_control() {
   next_size_ = up_to_landing(sign_ * local_->first_size());
 }
 
+/// From a point that the motion has jumped to.
+void AdaptiveIntegrator::go_on_local_control() {
+  landing_ = 0;
+  while (landing_ < landings_.size() && sign_ * (landings_[landing_].resume - time()) <= 0.0) ++landing_;
+  next_size_ = up_to_landing(sign_ * std::min(std::abs(next_size_), local_->first_size()));
+}
+
 /// The size, or a part of what is left to the next time that a step has to end at.
 double AdaptiveIntegrator::up_to_landing(double size) const {
   if (landing_ == landings_.size()) return size;
@@ -55,7 +62,7 @@ StepReport AdaptiveIntegrator::error_step() {
 StepReport AdaptiveIntegrator::side_steps_to(double t) {
   LocalErrorControl beside = *local_;
   StepReport report;
-  double next = t - time();
+  double next = t - side_.time();
   while (report.ok() && !is_same_time(t, side_.time(), next_size_)) {
     const double left = t - side_.time();
     double size = std::abs(next) < std::abs(left) ? next : left;

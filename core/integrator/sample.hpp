@@ -1,6 +1,7 @@
 #pragma once
 
 #include <diracstep/core/numerics/types.hpp>
+#include <diracstep/core/system/motion_point.hpp>
 
 namespace diracstep {
 
@@ -22,6 +23,9 @@ struct Sample {
   Vector impulse;  ///< with Momentum::minus the impulses λ that the next step lets in at q, units of Λ times
                    ///< time; empty with the others
   double energy = 0.0;
+
+  /// What functions of the user's own read; the sample outlives it.
+  MotionPoint point() const { return {time, q, v, p, lambda}; }
 };
 
 }  // namespace diracstep

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/runs/event_search.hpp>
 #include <limits>
 
@@ -9,14 +10,20 @@ namespace {
 
 constexpr int most_readings = 100;
 constexpr double round_off_of_times = 4.0 * std::numeric_limits<double>::epsilon();
+constexpr double same_instant = 1e-9;  // in steps
 
 }  // namespace
 
-EventSearch::EventSearch(std::vector<Event> events, bool by_momentum)
-    : events_(std::move(events)), by_momentum_(by_momentum) {}
+EventSearch::EventSearch(std::vector<Event> events) : events_(std::move(events)), watches_(events_.size()) {}
 
-double EventSearch::value(std::size_t event, const Sample& sample) const {
-  return events_[event].at(sample.time, sample.q, by_momentum_ ? sample.p : sample.v);
+StepReport EventSearch::value(std::size_t event, const Sample& sample, double& value) const {
+  StepReport report;
+  value = events_[event].at(sample.point());
+  if (!std::isnan(value)) return report;
+  report.solve.status = SolveStatus::not_finite;
+  report.failure =
+      "the function of event '" + events_[event].name + "' is not a number at t = " + to_text(sample.time);
+  return report;
 }
 
 bool EventSearch::changes(std::size_t event, double from, double to) const {
@@ -26,39 +33,138 @@ bool EventSearch::changes(std::size_t event, double from, double to) const {
          (falling && direction != Event::Direction::rising);
 }
 
-StepReport EventSearch::see(const Sample& point, const Read& read) {
-  std::vector<EventHit> met;
+StepReport EventSearch::begin(const Sample& point) {
+  begun_ = true;
+  start_ = last_time_ = point.time;
   for (std::size_t k = 0; k < events_.size(); ++k) {
-    const double here = value(k, point);
-    if (last_.size() <= k) {
-      last_.push_back(here);
-      met_at_last_.push_back(false);
-      continue;
-    }
-    const bool change = changes(k, last_[k], here);
-    if (change && !met_at_last_[k]) {
-      EventHit hit{k, {}};
-      if (StepReport report = locate(k, here, point, read, hit); !report.ok()) return report;
-      met.push_back(std::move(hit));
-    }
-    met_at_last_[k] = change && here == 0.0;
-    if (here != 0.0) last_[k] = here;
+    if (!events_[k].at || !watches_[k].awake) continue;
+    if (StepReport report = value(k, point, watches_[k].last); !report.ok()) return report;
   }
-  const double sense = point.time >= last_time_ ? 1.0 : -1.0;
-  std::ranges::stable_sort(met, {}, [&](const EventHit& hit) { return sense * hit.sample.time; });
-  for (EventHit& hit : met) {
-    hits_.push_back(std::move(hit));
-    if (stopped()) break;
+  return {};
+}
+
+StepReport EventSearch::see(const Sample& point, const Read& read) {
+  met_.clear();
+  if (!begun_) return begin(point);
+  std::vector<double> here(events_.size(), 0.0);
+  for (std::size_t k = 0; k < events_.size(); ++k) {
+    if (!watches_[k].awake) continue;
+    StepReport report = events_[k].at ? value(k, point, here[k]) : tick(k, point, read);
+    if (report.ok() && events_[k].at) report = look(k, here[k], point, read);
+    if (!report.ok()) return report;
+  }
+  if (keep_first_that_acts(point)) return {};
+  for (std::size_t k = 0; k < events_.size(); ++k) {
+    Watch& watch = watches_[k];
+    if (!watch.awake || !events_[k].at) continue;
+    watch.met_at_last = here[k] == 0.0 && std::ranges::find(met_, k, &EventHit::event) != met_.end();
+    if (here[k] != 0.0) {
+      watch.last = here[k];
+      watch.left = false;
+    }
   }
   last_time_ = point.time;
   return {};
 }
 
+StepReport EventSearch::look(std::size_t event, double here, const Sample& point, const Read& read) {
+  const Watch& watch = watches_[event];
+  const double side = events_[event].direction == Event::Direction::rising ? -1.0 : 1.0;
+  if (watch.left && !(side * watch.last > 0.0) && side * here < 0.0) {
+    StepReport report;
+    report.solve.status = SolveStatus::refused;
+    report.failure = "the contact of event '" + events_[event].name +
+                     "' is not left after its impact and closes again at once; on = [a row that keeps it] "
+                     "would hold it";
+    return report;
+  }
+  if (watch.met_at_last || !changes(event, watch.last, here)) return {};
+  EventHit hit{event, {}};
+  const double at_point = watch.left ? here / (point.time - last_time_) : here;
+  StepReport report = locate({watch.last, at_point, watch.left}, point, read, hit);
+  if (report.ok()) met_.push_back(std::move(hit));
+  return report;
+}
+
+/// The times of a clock between the last point and this one.
+StepReport EventSearch::tick(std::size_t event, const Sample& point, const Read& read) {
+  Watch& watch = watches_[event];
+  const double step = point.time - last_time_;
+  for (double ticks = watch.ticks + 1.0;; ticks += 1.0) {
+    const double t = start_ + std::copysign(ticks * events_[event].every, step);
+    const double left = (point.time - t) / step;
+    if (!(left > -same_instant)) return {};
+    EventHit hit{event, point};
+    if (left > same_instant)
+      if (StepReport report = read(t, hit.sample); !report.ok()) return report;
+    met_.push_back(std::move(hit));
+    if (events_[event].acts()) return {};
+    watch.ticks = ticks;
+  }
+}
+
+/// Whether the last of them acts or stops the run; an event whose condition does not hold is none.
+bool EventSearch::keep_first_that_acts(const Sample& point) {
+  const double step = point.time - last_time_, sense = step >= 0.0 ? 1.0 : -1.0;
+  std::ranges::stable_sort(met_, {}, [&](const EventHit& hit) { return sense * hit.sample.time; });
+  std::vector<EventHit> kept;
+  bool acting = false;
+  for (const EventHit& hit : met_) {
+    const Event& event = events_[hit.event];
+    if (acting && std::abs(hit.sample.time - kept.back().sample.time) > same_instant * std::abs(step)) break;
+    if (event.condition && !(event.condition(hit.sample.point()) > 0.0)) continue;
+    acting = acting || event.acts() || event.stop;
+    kept.push_back(hit);
+  }
+  at_zero_.clear();
+  if (acting)
+    for (const EventHit& hit : met_)
+      if (std::abs(hit.sample.time - kept.back().sample.time) <= same_instant * std::abs(step))
+        at_zero_.push_back(hit.event);
+  met_ = std::move(kept);
+  return acting;
+}
+
+std::vector<std::size_t> EventSearch::go_on(const Sample& point, const std::vector<Left>& left,
+                                            const std::vector<bool>& awake) {
+  std::vector<std::size_t> due;
+  const double passed = std::abs(point.time - start_);
+  for (std::size_t k = 0; k < events_.size(); ++k) {
+    Watch& watch = watches_[k];
+    const bool woken = awake[k] && !watch.awake;
+    watch.awake = awake[k];
+    watch.met_at_last = false;
+    if (!events_[k].at) {
+      watch.ticks = std::floor(passed / events_[k].every * (1.0 + 1e-12) + same_instant);
+      continue;
+    }
+    if (!watch.awake) continue;
+    if (const auto found = std::ranges::find(left, k, &Left::event); found != left.end()) {
+      watch.left = true;
+      watch.last = found->rate;
+      continue;
+    }
+    const double here = events_[k].at(point.point());
+    if (woken) watch.last = 0.0;
+    if (here == 0.0 || std::isnan(here)) continue;
+    watch.left = false;
+    // What switches rows on is near its zero when they have just been switched off.
+    if (woken && !events_[k].on.empty()) continue;
+    watch.last = here;
+    const Event::Direction direction = events_[k].direction;
+    if (woken && ((direction == Event::Direction::rising && here > 0.0) ||
+                  (direction == Event::Direction::falling && here < 0.0)))
+      due.push_back(k);
+  }
+  last_time_ = point.time;
+  return due;
+}
+
 /// The Illinois method: the end of the bracket at or behind the zero is the hit.  A guess next to an end is
 /// taken a little inside, so that the bracket closes at once where the guesses have converged.
-StepReport EventSearch::locate(std::size_t event, double here, const Sample& point, const Read& read,
-                               EventHit& hit) const {
-  double before = last_time_, after = point.time, at_before = last_[event], at_after = here;
+StepReport EventSearch::locate(Bracket bracket, const Sample& point, const Read& read, EventHit& hit) const {
+  double before = last_time_, after = point.time;
+  auto& [at_before, at_after, divided] = bracket;
   hit.sample = point;
   const double smallest = round_off_of_times * std::max(std::abs(before), std::abs(after));
   int side = 0;
@@ -69,21 +175,51 @@ StepReport EventSearch::locate(std::size_t event, double here, const Sample& poi
     t = sense * std::clamp(sense * t, sense * before + smallest, sense * after - smallest);
     Sample between;
     if (StepReport report = read(t, between); !report.ok()) return report;
-    const double value_there = value(event, between);
-    if ((value_there < 0.0) == (at_before < 0.0) && value_there != 0.0) {
+    double there = 0.0;
+    if (StepReport report = value(hit.event, between, there); !report.ok()) return report;
+    if (divided) there /= t - last_time_;
+    if ((there < 0.0) == (at_before < 0.0) && there != 0.0) {
       before = t;
-      at_before = value_there;
+      at_before = there;
       if (side == -1) at_after *= 0.5;
       side = -1;
     } else {
       after = t;
-      at_after = value_there;
+      at_after = there;
       hit.sample = std::move(between);
       if (side == 1) at_before *= 0.5;
       side = 1;
     }
   }
   return {};
+}
+
+void EventSearch::save(Snapshot& to) const {
+  to.section("search for events");
+  to.put("start of the search", start_);
+  to.put("last point", last_time_);
+  for (std::size_t k = 0; k < events_.size(); ++k) {
+    const Watch& watch = watches_[k];
+    to.put("value of event " + events_[k].name, watch.last);
+    to.put("met at the last point", watch.met_at_last);
+    to.put("left at the last point", watch.left);
+    to.put("ticks", watch.ticks);
+  }
+}
+
+void EventSearch::restore(SnapshotReader& from, const std::vector<bool>& awake) {
+  from.section("search for events");
+  begun_ = true;
+  start_ = from.number("start of the search");
+  last_time_ = from.number("last point");
+  for (std::size_t k = 0; k < events_.size(); ++k) {
+    Watch& watch = watches_[k];
+    watch.awake = awake[k];
+    watch.last = from.number("value of event " + events_[k].name);
+    watch.met_at_last = from.flag("met at the last point");
+    watch.left = from.flag("left at the last point");
+    watch.ticks = from.number("ticks");
+  }
 }
 
 }  // namespace diracstep

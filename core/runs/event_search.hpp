@@ -3,53 +3,86 @@
 #include <diracstep/core/integrator/integrator.hpp>
 #include <diracstep/core/system/event.hpp>
 #include <functional>
+#include <optional>
 #include <vector>
 
 namespace diracstep {
 
 /// Where an event was met.
 struct EventHit {
-  std::size_t event;  ///< number of it
-  Sample sample;
+  std::size_t event;                 ///< number of it
+  Sample sample;                     ///< just before it
+  std::optional<Sample> after = {};  ///< what it made of it; none where it does not act
+  double impulse = 0.0;              ///< Λ_c of a contact, momentum over the unit of its row
 };
 
 /// Finds events between the points of a run.
 ///
 /// A change of sign from one point to the next is followed to its time by a bracketed secant method on the
-/// motion between them, which is read by steps of the method (sample_at()): so the time has the order of the
-/// method and is solved to round-off.  Where the function vanishes at the start nothing is met there.  Two
-/// changes between neighbouring points cancel and are not seen.
+/// motion between them, which is read by steps of the method from the first of both: so the time has the
+/// order of the method and is solved to round-off.  Where the function vanishes at the start nothing is met
+/// there.  Two changes between neighbouring points cancel and are not seen, but for a contact that was just
+/// left: there g/(t − t_left) is looked at, which is the rate at t_left, so that a return within the same
+/// step is found.
 class EventSearch {
  public:
   /// Reads the motion at a time between the last two points.
   using Read = std::function<StepReport(double t, Sample& sample)>;
 
-  /// `by_momentum`: the functions are of (t, q, p).
-  EventSearch(std::vector<Event> events, bool by_momentum);
+  explicit EventSearch(std::vector<Event> events);
 
-  /// The next point of the run.  Events before it are added to hits(), in the order of time, up to the first
-  /// that stops the run.  The report of a reading that failed, else one that is ok().
+  /// The next point of the run.  met() are then the events before it in the order of time, up to the first
+  /// that acts or stops the run and those of the same time.  The report of a reading that failed, or of a
+  /// function that is not a number, else one that is ok().
   StepReport see(const Sample& point, const Read& read);
+  std::vector<EventHit>& met() { return met_; }
+  /// The events whose functions vanish where the last of met() acts, whether their conditions hold or not.
+  const std::vector<std::size_t>& at_zero() const { return at_zero_; }
+
+  /// Where a run goes on after events that acted: `left` names a contact and the rate at which it was left.
+  struct Left {
+    std::size_t event;
+    double rate;
+  };
+  /// From this point on those events are looked for that are awake.  The numbers of those that are due at
+  /// once: they were asleep, and what they wait for has happened.
+  std::vector<std::size_t> go_on(const Sample& point, const std::vector<Left>& left,
+                                 const std::vector<bool>& awake);
 
   bool empty() const { return events_.empty(); }
   const std::vector<Event>& events() const { return events_; }
-  const std::vector<EventHit>& hits() const { return hits_; }
-  /// The last hit ends the run.
-  bool stopped() const { return !hits_.empty() && events_[hits_.back().event].stop; }
+
+  void save(Snapshot& to) const;
+  void restore(SnapshotReader& from, const std::vector<bool>& awake);
 
  private:
-  double value(std::size_t event, const Sample& sample) const;
+  struct Watch {
+    bool awake = true;
+    double last = 0.0;         ///< value at the last point where it was not 0
+    bool met_at_last = false;  ///< the last point was the zero: the change of sign behind it is none
+    bool left = false;         ///< a contact that was left at the last point, at the rate `last`
+    double ticks = 0.0;        ///< of a clock so far
+  };
+  /// An event's function between two points, bracketed.
+  struct Bracket {
+    double at_before, at_after;
+    bool divided;  ///< by the time since the last point
+  };
+
+  StepReport begin(const Sample& point);
+  StepReport value(std::size_t event, const Sample& sample, double& value) const;
   bool changes(std::size_t event, double from, double to) const;
-  StepReport locate(std::size_t event, double value, const Sample& point, const Read& read,
-                    EventHit& hit) const;
+  StepReport look(std::size_t event, double here, const Sample& point, const Read& read);
+  StepReport tick(std::size_t event, const Sample& point, const Read& read);
+  StepReport locate(Bracket bracket, const Sample& point, const Read& read, EventHit& hit) const;
+  bool keep_first_that_acts(const Sample& point);
 
   std::vector<Event> events_;
-  bool by_momentum_;
-  double last_time_ = 0.0;
-  std::vector<double> last_;  ///< values at the last point; empty before the first
-  std::vector<bool>
-      met_at_last_;  ///< the last point was the zero, so that the change of sign behind it is none
-  std::vector<EventHit> hits_;
+  std::vector<Watch> watches_;
+  bool begun_ = false;
+  double start_ = 0.0, last_time_ = 0.0;
+  std::vector<EventHit> met_;
+  std::vector<std::size_t> at_zero_;
 };
 
 }  // namespace diracstep

@@ -154,6 +154,7 @@ class EquilibriumSearch {
     const double forces =
         std::max(here.jacobian.topRows(k).norm(), size_ > 0.0 ? here.residual.head(n).norm() / size_ : 0.0);
     if (!(masses > 0.0 && forces > 0.0)) return here;
+    constexpr double not_away = 0.9, growth = 1.5;  // along a stiff valley forces stay as they are for long
     double time = 0.1 * masses / forces;
     for (; iterations_ < max_path_steps; ++iterations_) {
       Columns jacobian = here.jacobian;
@@ -161,7 +162,8 @@ class EquilibriumSearch {
       factor(jacobian);
       Point next = evaluate(here.q + correction(residual_along(here.allowed, here.residual)));
       if (!next.residual.allFinite()) return here;
-      time *= std::min(10.0, here.residual.norm() / next.residual.norm());
+      const double falls = here.residual.norm() / next.residual.norm();
+      time *= std::min(10.0, falls > not_away ? growth * falls : falls);
       here = std::move(next);
       if (newton_step(here).lpNorm<Eigen::Infinity>() <= 1e-4 * size_) return here;
     }

@@ -86,12 +86,14 @@ void ForceBalance::evaluate_rows() {
   rows_.evaluate(t_, q_);
   one_forms = rows_.pattern().full(rows_.coefficients());
   velocity = rows_.offsets();
-  velocity.head(on_positions).setZero();
+  // At rest the time stands still, and rows on positions that it moves ask for no velocity.
+  const double passing = v_.lpNorm<Eigen::Infinity>() > 0.0 ? 1.0 : 0.0;
+  velocity.head(on_positions) *= passing;
   velocity += one_forms * v_;
   Vector derivative(rows_.pattern().nonzeros());
   rows_.distribution().derivative(t_, q_, v_, 1.0, derivative);
   row_derivative = rows_.pattern().full(derivative);
-  rows_.distribution().derivative(t_, q_, v_, 0.0, derivative);
+  rows_.distribution().derivative(t_, q_, v_, passing, derivative);
   row_derivative.topRows(on_positions) = rows_.pattern().full(derivative).topRows(on_positions);
   const Vector kept = one_forms * (q_ - scene_.start.q) + (t_ - scene_.start.time) * rows_.offsets();
   int row = 0;

@@ -83,6 +83,11 @@ void Evaluator::compute(std::size_t place) {
     default:
       break;
   }
+  if (data.op == Op::table) {
+    const LookupTable& table = program_.graph.tables()[static_cast<std::size_t>(data.c / LookupTable::width)];
+    value = table.value(static_cast<double>(values_[at(data.a)]), data.c % LookupTable::width);
+    return;
+  }
   const long double b = arity(data.op) == 2 ? values_[at(data.b)] : 0.0L;
   value = computed(data, values_[at(data.a)], b);
 }

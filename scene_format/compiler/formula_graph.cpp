@@ -112,6 +112,11 @@ Node FormulaGraph::where(Node condition, Node value) {
   return data.value < 0.0 ? number(0.0) : multiply(number(0.5), value);
 }
 
+Node FormulaGraph::table(int number, int order, Node u) {
+  if (order > tables_[static_cast<std::size_t>(number)].degree) return this->number(0.0);
+  return insert({Op::table, u, none, LookupTable::width * number + order});
+}
+
 Node FormulaGraph::negative(Node a) {
   if ((*this)[a].op == Op::negative) return (*this)[a].a;
   return fold({Op::negative, a});
@@ -271,6 +276,8 @@ Node FormulaGraph::partial(Node node, bool second) {
     case Op::sign:
     case Op::floor:
       return number(0.0);
+    case Op::table:
+      return table(f.c / LookupTable::width, f.c % LookupTable::width + 1, a);
     case Op::hypot:
       return divide(second ? b : a, node);
     default:
@@ -337,6 +344,8 @@ Node FormulaGraph::rebuild(const NodeData& node) {
       return raise(node.a, node.b);
     case Op::where:
       return where(node.a, node.b);
+    case Op::table:
+      return insert(node);
     default:
       return fold(node);
   }

@@ -1,11 +1,14 @@
 #pragma once
 
 #include <cstddef>
+#include <deque>
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/scene_format/compiler/lookup_table.hpp>
 #include <diracstep/scene_format/compiler/size_limits.hpp>
 #include <span>
 #include <string>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 namespace diracstep::scene_compiler {
@@ -20,7 +23,7 @@ enum class Op : unsigned char {
   time,
   scale,       ///< s in ∂(A w + s b)/∂q
   coordinate,  ///< a = family of coordinates, b = index or none, c = Role
-  multiplier,  ///< a = output of a piece
+  multiplier,  ///< a = output of a piece; where c = 1 number of a force
   list,        ///< (a, b): two indices
   sum,         ///< of a over the loop numbered b
   negative,
@@ -52,6 +55,7 @@ enum class Op : unsigned char {
   max,
   hypot,
   floor,
+  table,     ///< c = number of a LookupTable times 4, plus the order of its derivative
   where,     ///< b where a > 0, b/2 where a = 0, else 0: derivatives of min and max
   kepler_E,  ///< from here on for references only, without derivatives
   sn,
@@ -111,6 +115,8 @@ class FormulaGraph {
     return insert({Op::coordinate, family, index, static_cast<int>(role)});
   }
   Node multiplier(int output) { return insert({Op::multiplier, output}); }
+  /// The force of a row, by its number in Symbols::forces.
+  Node force(int number) { return insert({Op::multiplier, number, none, 1}); }
   Node list(Node first, Node second) { return insert({Op::list, first, second}); }
   Node sum(Node body, int loop) { return insert({Op::sum, body, loop}); }
 
@@ -124,6 +130,13 @@ class FormulaGraph {
   /// `value` where condition > 0, half of it where condition = 0, else 0, and then nothing of `value` is
   /// left.
   Node where(Node condition, Node value);
+  int add_table(LookupTable table) {
+    tables_.push_back(std::move(table));
+    return static_cast<int>(tables_.size()) - 1;
+  }
+  const std::deque<LookupTable>& tables() const { return tables_; }
+  /// A table, or its derivative of an order, at u.
+  Node table(int number, int order, Node u);
   /// Any other operation of one or two arguments.
   Node apply(Op op, Node a, Node b = none);
 
@@ -159,6 +172,7 @@ class FormulaGraph {
   bool may_gather(Node a, Node b) const;
 
   bool as_written_;
+  std::deque<LookupTable> tables_;  // kernels read them in place
   SizeLimits limits_;
   std::vector<NodeData> nodes_;
   std::vector<Known> known_;

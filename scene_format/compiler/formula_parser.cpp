@@ -152,7 +152,7 @@ class FormulaParser::Reader : FormulaScanner {
   Node named(std::size_t place, const std::string& name) {
     if (const auto local = context_.locals.find(name); local != context_.locals.end()) return local->second;
     if (const auto input = symbols_.inputs.find(name); input != symbols_.inputs.end())
-      return located(read_input(place, input->second), place);
+      return located(read_input(place, name, input->second), place);
     if (peek() == '(') return call(place, name);
     if (name == "pi") return graph_.number(std::numbers::pi);
     const std::vector<int> inner_first(context_.loops.rbegin(), context_.loops.rend());
@@ -168,7 +168,19 @@ class FormulaParser::Reader : FormulaScanner {
     if (const Node node = coordinate(place, name, Role::position); node != none) return node;
     if (name.size() > 2 && name[1] == '_' && (name[0] == 'v' || name[0] == 'p'))
       if (const Node node = coordinate(place, name, Role::second); node != none) return node;
+    if (const Node node = force(name); node != none) return node;
     fail(place, "unknown name '" + name + "' in " + context_.what + suggestion(name, known_names()));
+  }
+
+  /// lambda_ROW.
+  Node force(const std::string& name) {
+    constexpr std::string_view prefix = "lambda_";
+    if (!context_.motion || !name.starts_with(prefix)) return none;
+    const std::string row = name.substr(prefix.size());
+    if (std::ranges::find(symbols_.rows, row) == symbols_.rows.end()) return none;
+    auto found = std::ranges::find(symbols_.forces, row);
+    if (found == symbols_.forces.end()) found = symbols_.forces.insert(found, row);
+    return graph_.force(static_cast<int>(found - symbols_.forces.begin()));
   }
 
   Node parameter(std::size_t place, int id) {
@@ -196,6 +208,8 @@ class FormulaParser::Reader : FormulaScanner {
     if (id == none) return none;
     if (role == Role::position && !context_.positions)
       fail(place, "the coordinate '" + name + "' may not stand in " + context_.what);
+    if (role == Role::second && name[0] != context_.second && context_.motion)
+      role = Role::direction;  // where functions of the motion find the other one of v and p
     if (role == Role::second && name[0] != context_.second)
       fail(place, "'" + name + "' may not stand in " + context_.what +
                       (context_.second != 0 ? std::string("; expected ") + context_.second + '_' + base
@@ -224,7 +238,7 @@ class FormulaParser::Reader : FormulaScanner {
   Node definition(std::size_t place, const std::string& name, const FormulaText& text) {
     std::string key = name + ' ' + context_.second + (context_.positions ? 'q' : ' ') +
                       (context_.time ? 't' : ' ') + (context_.sums ? 's' : ' ') +
-                      (context_.reference ? 'r' : ' ') + (context_.mechanics ? 'm' : ' ');
+                      (context_.reference ? 'r' : ' ') + (context_.mechanics ? 'm' : ' ') + (context_.motion ? 'M' : ' ');
     for (const int loop : context_.loops) key += ' ' + std::to_string(loop);
     const auto found = parser_.defined_.find(key);
     if (found != parser_.defined_.end()) return found->second;
@@ -350,7 +364,7 @@ class FormulaParser::Reader : FormulaScanner {
   }
 
   /// An input at the time, or at what stands in parentheses behind its name.
-  Node read_input(std::size_t place, const InputTable& table) {
+  Node read_input(std::size_t place, const std::string& name, int table) {
     Node u = none;
     if (take('(')) {
       u = expression();
@@ -360,20 +374,8 @@ class FormulaParser::Reader : FormulaScanner {
         fail(place, "an input is a function of the time t, which may not stand in " + context_.what);
       u = graph_.time();
     }
-    const auto from = [&](double start) { return graph_.subtract(u, graph_.number(start)); };
-    Node value =
-        graph_.where(graph_.negative(from(table.parts.front().from)), graph_.number(table.value_before));
-    for (std::size_t k = 0; k < table.parts.size(); ++k) {
-      const InputTable::Part& part = table.parts[k];
-      const double to = k + 1 < table.parts.size() ? table.parts[k + 1].from : table.last;
-      Node polynomial = graph_.number(0.0);
-      const std::vector<double> highest_first(part.coefficients.rbegin(), part.coefficients.rend());
-      for (const double c : highest_first)
-        polynomial = graph_.add(graph_.multiply(polynomial, from(part.from)), graph_.number(c));
-      value = graph_.add(value,
-                         graph_.where(from(part.from), graph_.where(graph_.negative(from(to)), polynomial)));
-    }
-    return graph_.add(value, graph_.where(from(table.last), graph_.number(table.value_after)));
+    if (u == graph_.time()) symbols_.inputs_of_time.insert(name);
+    return graph_.table(table, 0, u);
   }
 
   int loop() {
@@ -454,6 +456,8 @@ class FormulaParser::Reader : FormulaScanner {
       if (context_.positions) names.push_back(family.name);
       if (context_.second != 0) names.push_back(std::string(1, context_.second) + '_' + family.name);
     }
+    if (context_.motion)
+      for (const auto& row : symbols_.rows) names.push_back("lambda_" + row);
     for (const auto& parameter : symbols_.parameters) names.push_back(parameter.name);
     for (const auto& [name, text] : symbols_.definitions) names.push_back(name);
     for (const auto& [name, table] : symbols_.inputs) names.push_back(name);

@@ -4,6 +4,7 @@
 #include <diracstep/scene_format/compiler/formula_scanner.hpp>
 #include <functional>
 #include <map>
+#include <set>
 #include <string>
 #include <string_view>
 #include <unordered_map>
@@ -17,17 +18,6 @@ struct Loop {
   std::string variable;
   Node first = none;
   Node last = none;
-};
-
-/// An input from a table: its value between and at the points, by polynomials Σ c_k (u − from)^k from each
-/// point to the next.  Before the first and after the last point it keeps their values.
-struct InputTable {
-  struct Part {
-    double from;
-    std::vector<double> coefficients;
-  };
-  std::vector<Part> parts;
-  double last = 0.0, value_before = 0.0, value_after = 0.0;
 };
 
 /// What the names in a formula may stand for.
@@ -45,8 +35,11 @@ struct Symbols {
   std::vector<Family> families;
   std::vector<Parameter> parameters;  ///< sizes first
   std::map<std::string, FormulaText, std::less<>> definitions;
-  std::map<std::string, InputTable, std::less<>> inputs;
+  std::map<std::string, int, std::less<>> inputs;  ///< numbers of tables in the graph
   std::vector<Loop> loops;
+  std::vector<std::string> rows;         ///< that are not repeated
+  std::set<std::string> inputs_of_time;  ///< inputs that a formula reads at the time
+  std::vector<std::string> forces;       ///< of these rows, as far as formulas read them
 
   void add(Family family) {
     family_numbers.emplace(family.name, static_cast<int>(families.size()));
@@ -78,6 +71,7 @@ struct Context {
   char second = 0;         ///< 'v' or 'p': velocities or momenta
   bool time = false;
   bool sums = false;
+  bool motion = false;          ///< velocities and momenta, and forces lambda_ROW of rows
   bool reference = false;       ///< Kepler's and Jacobi's functions
   bool mechanics = false;       ///< of the equations of motion: parameters may be coordinates
   std::vector<int> loops = {};  ///< loop variables in force

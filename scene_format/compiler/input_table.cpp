@@ -22,23 +22,30 @@ std::vector<double> bends(const std::vector<double>& x, const std::vector<double
 
 }  // namespace
 
-InputTable table_of(const SceneDocument::Input& input) {
+LookupTable table_of(const SceneDocument::Input& input) {
   using Kind = SceneDocument::Input::Kind;
   const std::vector<double>&x = input.times, &y = input.values;
-  InputTable table{{}, x.back(), y.front(), y.back()};
+  LookupTable table{input.kind == Kind::step     ? 0
+                    : input.kind == Kind::linear ? 1
+                                                 : 3,
+                    x,
+                    {y.front(), 0, 0, 0}};
+  const auto add = [&](double c0, double c1, double c2, double c3) {
+    table.coefficients.insert(table.coefficients.end(), {c0, c1, c2, c3});
+  };
   const std::vector<double> bend =
       input.kind == Kind::cubic ? bends(x, y) : std::vector<double>(x.size(), 0.0);
   for (std::size_t k = 0; k + 1 < x.size(); ++k) {
     const double h = x[k + 1] - x[k], slope = (y[k + 1] - y[k]) / h;
     if (input.kind == Kind::step)
-      table.parts.push_back({x[k], {y[k]}});
+      add(y[k], 0.0, 0.0, 0.0);
     else if (input.kind == Kind::linear)
-      table.parts.push_back({x[k], {y[k], slope}});
+      add(y[k], slope, 0.0, 0.0);
     else
-      table.parts.push_back({x[k],
-                             {y[k], slope - h * (2.0 * bend[k] + bend[k + 1]) / 6.0, bend[k] / 2.0,
-                              (bend[k + 1] - bend[k]) / (6.0 * h)}});
+      add(y[k], slope - h * (2.0 * bend[k] + bend[k + 1]) / 6.0, bend[k] / 2.0,
+          (bend[k + 1] - bend[k]) / (6.0 * h));
   }
+  add(y.back(), 0.0, 0.0, 0.0);
   return table;
 }
 

@@ -16,7 +16,7 @@ int Constants::add(Node node) {
 
 Kernel::Kernel(FormulaGraph& graph, const std::vector<Store>& stores, const PieceLayout& layout,
                Constants& known, Constants& instance)
-    : width_(layout.width()) {
+    : tables_(&graph.tables()), width_(layout.width()) {
   std::vector<Node> roots;
   for (const Store& store : stores)
     if (!graph.is_number(store.value, 0.0)) {
@@ -47,8 +47,8 @@ Kernel::Kernel(FormulaGraph& graph, const std::vector<Store>& stores, const Piec
       from = From::coordinate;
       data.a = layout.slots.at(graph.coordinate(data.a, data.b, Role::position));
     } else if (data.op == Op::multiplier) {
-      from = From::multiplier;
-      data.a += layout.slot_count;
+      from = data.c == 1 ? From::force : From::multiplier;
+      if (data.c != 1) data.a += layout.slot_count;
     } else if (data.op == Op::time) {
       from = From::time;
     } else if (data.op == Op::scale) {
@@ -89,6 +89,9 @@ void Kernel::run(const KernelCall& call, int instance_width, int position_width)
         case From::multiplier:
           values[k] = call.multipliers[slots[data.a]];
           break;
+        case From::force:
+          values[k] = call.multipliers[data.a];
+          break;
         case From::time:
           values[k] = call.t;
           break;
@@ -96,6 +99,11 @@ void Kernel::run(const KernelCall& call, int instance_width, int position_width)
           values[k] = call.s;
           break;
         case From::computed:
+          if (data.op == Op::table) {
+            const auto number = static_cast<std::size_t>(data.c / LookupTable::width);
+            values[k] = (*tables_)[number].value(value(data.a), data.c % LookupTable::width);
+            break;
+          }
           values[k] = computed(data, value(data.a), arity(data.op) == 2 ? value(data.b) : 0.0);
           break;
       }
@@ -199,6 +207,8 @@ std::string Kernel::expression(const Instruction& instruction, const CoordinateN
       return coordinate(data.c, data.a);
     case From::multiplier:
       return fmt::format("multipliers[slots[{}]]", data.a);
+    case From::force:
+      return fmt::format("multipliers[{}]", data.a);
     case From::time:
       return "call->t";
     case From::scale:
@@ -219,6 +229,12 @@ std::string Kernel::expression(const Instruction& instruction, const CoordinateN
       return a + " / " + b;
     case Op::power:
       return power_text(a, data.c);
+    case Op::table: {
+      const int number = data.c / LookupTable::width;
+      return fmt::format("diracstep_table(table{0}_knots, table{0}_parts, {1}, {2}, {3})", number,
+                         (*tables_)[static_cast<std::size_t>(number)].knots.size(), a,
+                         data.c % LookupTable::width);
+    }
     default:
       break;
   }
@@ -251,6 +267,12 @@ std::string Kernel::instructions(const CoordinateName& coordinate) const {
   return text;
 }
 
+void Kernel::add_tables(std::set<int>& numbers) const {
+  for (const Instruction& instruction : code_)
+    if (instruction.data.op == Op::table && instruction.from == From::computed)
+      numbers.insert(instruction.data.c / LookupTable::width);
+}
+
 std::string Kernel::source(const std::string& name, int instance_width, int position_width) const {
   std::set<std::string> pointers, tables;  // those that are used: no compiler shall warn
   std::string body =
@@ -260,7 +282,8 @@ std::string Kernel::source(const std::string& name, int instance_width, int posi
     if (from == From::known) pointers.insert("const double* const known = call->known;");
     if (from == From::instance)
       tables.insert(fmt::format("const double* const instance = call->instance + i * {};", instance_width));
-    if (from == From::multiplier) pointers.insert("const double* const multipliers = call->multipliers;");
+    if (from == From::multiplier || from == From::force)
+      pointers.insert("const double* const multipliers = call->multipliers;");
     if (from == From::coordinate)
       pointers.insert(fmt::format("const double* const in{0} = call->in[{0}];", code_[k].data.c));
     if (from == From::coordinate || from == From::multiplier)

@@ -1,8 +1,10 @@
 #pragma once
 
 #include <array>
+#include <deque>
 #include <diracstep/scene_format/compiler/formula_graph.hpp>
 #include <functional>
+#include <set>
 #include <span>
 #include <string>
 #include <unordered_map>
@@ -66,6 +68,8 @@ class Kernel {
   void run(const KernelCall& call, int instance_width, int position_width) const;
   /// A C function of this name.
   std::string source(const std::string& name, int instance_width, int position_width) const;
+  /// Adds the numbers of the tables that it reads.
+  void add_tables(std::set<int>& numbers) const;
   std::size_t size() const { return code_.size(); }
 
   /// Whether it reads coordinates and what is known of the parameters, nothing else.
@@ -79,13 +83,24 @@ class Kernel {
   const std::vector<Store>& stores() const { return stores_; }
 
  private:
-  enum class From : unsigned char { computed, literal, known, instance, coordinate, multiplier, time, scale };
+  enum class From : unsigned char {
+    computed,
+    literal,
+    known,
+    instance,
+    coordinate,
+    multiplier,
+    force,
+    time,
+    scale
+  };
   struct Instruction {
     From from;
     NodeData data;  ///< a, b: earlier instructions, or where a leaf is read from; c: column
   };
   std::string expression(const Instruction& instruction, const CoordinateName& coordinate) const;
 
+  const std::deque<LookupTable>* tables_;  ///< of the graph, which outlives the kernel
   std::vector<Instruction> code_;
   std::vector<Store> stores_;  ///< their values are numbers of instructions
   int width_;

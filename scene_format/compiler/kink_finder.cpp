@@ -45,6 +45,13 @@ void KinkFinder::look_at(Node node, const Source& source) {
       return add_switch(found_.kinks,
                         graph_.apply(Op::sin, graph_.multiply(graph_.number(std::numbers::pi), data.a)), node,
                         "a jump", source);
+    case Op::table:
+      for (const double knot : graph_.tables()[static_cast<std::size_t>(data.c / LookupTable::width)].knots)
+        if (graph_[data.a].op == Op::time)
+          found_.knots.insert(knot);
+        else
+          add_switch(found_.kinks, graph_.subtract(data.a, graph_.number(knot)), node, "a table", source);
+      return;
     case Op::min:
     case Op::max:
       return add_switch(found_.kinks, graph_.subtract(data.a, data.b), node,

@@ -40,7 +40,7 @@ bool PieceBuilder::has_kink(const Piece& piece) const {
   return std::ranges::any_of(graph_.reachable(piece.outputs), [&](Node node) {
     const Op op = graph_[node].op;
     const bool kink = op == Op::abs || op == Op::sign || op == Op::min || op == Op::max || op == Op::where ||
-                      op == Op::floor;
+                      op == Op::floor || op == Op::table;
     return kink && varies(node);
   });
 }

@@ -2,11 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/files/csv_table.hpp>
 #include <diracstep/scene_format/compiler/circuit_reader.hpp>
 #include <diracstep/scene_format/compiler/netlist_reader.hpp>
 #include <diracstep/scene_format/compiler/scene_document.hpp>
 #include <diracstep/scene_format/compiler/size_limits.hpp>
 #include <diracstep/scene_format/compiler/table_reader.hpp>
+#include <filesystem>
 #include <initializer_list>
 #include <set>
 
@@ -192,23 +195,47 @@ class DocumentReader : TableReader {
       require_new_name(item.key, item.place);
       const std::string what = "input '" + item.key + "'";
       const toml::table& entry = table(item, "wind = { times = [0, 1, 2], values = [0, 3, 1] }");
-      check_keys(entry, what, {"times", "values", "kind", "hold", "unit", "meaning"});
-      SceneDocument::Input input{item.key,
-                                 input_kind(entry),
-                                 list(entry, "times", what, item.place),
-                                 list(entry, "values", what, item.place),
-                                 flag(entry, "hold"),
-                                 item.place};
+      check_keys(entry, what, {"times", "values", "file", "column", "kind", "hold", "unit", "meaning"});
+      SceneDocument::Input input{item.key, input_kind(entry), {}, {}, flag(entry, "hold"), item.place};
+      const bool in_file = entry.contains("file");
+      if (in_file == (entry.contains("times") || entry.contains("values")))
+        fail(item.place, what + " needs 'times' and 'values', or a 'file'");
+      if (in_file) {
+        read_table_file(entry, what, input);
+      } else {
+        input.times = list(entry, "times", what, item.place);
+        input.values = list(entry, "values", what, item.place);
+      }
       if (input.times.size() != input.values.size() || input.times.size() < 2 ||
           input.times.size() > most_points)
         fail(item.place, fmt::format("{} has {} times and {} values; expected as many of both, from 2 to {}",
                                      what, input.times.size(), input.values.size(), most_points));
       for (std::size_t k = 1; k < input.times.size(); ++k)
         if (!(input.times[k] > input.times[k - 1]))
-          fail(place_of((*entry.get("times")->as_array())[k].source()),
+          fail(place_of((in_file ? *entry.get("file") : (*entry.get("times")->as_array())[k]).source()),
                fmt::format("{}: the time {:g} does not lie behind {:g}; expected them in ascending order",
                            what, input.times[k], input.times[k - 1]));
       document_.inputs.push_back(std::move(input));
+    }
+  }
+
+  /// Times from the first column of a CSV file and values from the column named, or from the second.
+  void read_table_file(const toml::table& entry, const std::string& what, SceneDocument::Input& input) const {
+    const std::string name = required_string(entry, "file", what), column = string(entry, "column");
+    const Place place = place_of(entry.get("file")->source());
+    const std::filesystem::path path(name);
+    if (path.is_absolute() || std::ranges::find(path, "..") != path.end())
+      fail(place, what + ": 'file' is a path below the folder of the scene, without '..'");
+    const std::string full = (std::filesystem::path(document_.file).parent_path() / path).string();
+    try {
+      const CsvTable table = read_csv(full, what, size_limits().file_bytes);
+      const std::size_t second = column.empty() ? 1 : table.column(column);
+      for (const auto& line : table.lines) {
+        input.times.push_back(line.at(0));
+        input.values.push_back(line.at(second));
+      }
+    } catch (const Misuse& misuse) {
+      fail(place, misuse.what());
     }
   }
 
@@ -225,7 +252,8 @@ class DocumentReader : TableReader {
       const std::string what = "state '" + item.key + "'";
       const toml::table& entry = table(item, "e = { rate = \"th_wanted - th\", start = 0 }");
       check_keys(entry, what, {"rate", "start", "unit", "meaning"});
-      document_.states.push_back({item.key, required_formula(entry, "rate", what), item.place});
+      document_.states.push_back(
+          {item.key, optional_formula(entry, "rate").value_or(FormulaText{"0", item.place}), item.place});
       if (const auto start = optional_formula(entry, "start"))
         document_.start.push_back({{item.key, item.place}, {*start}, false});
       add_coordinate({item.key, string(entry, "unit"), string(entry, "meaning"), {}, false, item.place});
@@ -243,13 +271,16 @@ class DocumentReader : TableReader {
 
   void read_rows(const toml::table& root) {
     for (const toml::table* row : tables(root, "rows")) {
-      check_keys(*row, "[[rows]]", {"name", "equation", "for", "compliance"});
+      check_keys(*row, "[[rows]]", {"name", "equation", "for", "compliance", "on"});
       const Place place = place_of(row->source());
       const std::string name = string(*row, "name", fmt::format("row{}", document_.rows.size() + 1));
       if (!is_name(name)) fail(place, fmt::format("'{}' is no name for a row", name));
       if (!row_names_.insert(name).second) fail(place, fmt::format("two rows are named '{}'", name));
       document_.rows.push_back({name, required_formula(*row, "equation", "[[rows]]"),
-                                optional_formula(*row, "for"), place, optional_formula(*row, "compliance")});
+                                optional_formula(*row, "for"), place, optional_formula(*row, "compliance"),
+                                !row->contains("on") || flag(*row, "on")});
+      if (!document_.rows.back().on && document_.rows.back().loops)
+        fail(place, "a repeated row cannot be switched: on = false is for single ones");
       if (document_.rows.back().compliance) add_extension(document_.rows.back());
     }
   }
@@ -359,27 +390,92 @@ class DocumentReader : TableReader {
   }
 
   void read_events(const toml::table& root) {
-    using Direction = SceneDocument::Event::Direction;
     std::set<std::string> names;
     for (const toml::table* event : tables(root, "events")) {
-      check_keys(*event, "[[events]]", {"name", "when", "direction", "action"});
+      check_keys(*event, "[[events]]",
+                 {"name", "when", "every", "direction", "action", "if", "set", "restitution", "on", "off"});
       const Place place = place_of(event->source());
       const std::string name = required_string(*event, "name", "[[events]]");
       if (!is_name(name)) fail(place, fmt::format("'{}' is no name for an event", name));
       if (!names.insert(name).second) fail(place, fmt::format("two events are named '{}'", name));
-      const std::string direction = string(*event, "direction", "both"),
-                        action = string(*event, "action", "record");
-      if (direction != "both" && direction != "rising" && direction != "falling")
-        fail(place_of(event->get("direction")->source()),
-             "'direction': expected \"rising\", \"falling\" or \"both\"");
+      const std::string action = string(*event, "action", "record");
       if (action != "record" && action != "stop")
-        fail(place_of(event->get("action")->source()), "'action': expected \"record\" or \"stop\"");
-      document_.events.push_back({name, required_formula(*event, "when", "[[events]]"),
-                                  direction == "both"     ? Direction::both
-                                  : direction == "rising" ? Direction::rising
-                                                          : Direction::falling,
-                                  action == "stop"});
+        fail(place_of(event->get("action")->source()),
+             "'action': expected \"record\" or \"stop\"; what an event changes stands under set, "
+             "restitution, on and off");
+      SceneDocument::Event stated;
+      stated.name = name;
+      stated.when = optional_formula(*event, "when");
+      stated.stop = action == "stop";
+      stated.every = number(*event, "every").value_or(0.0);
+      stated.condition = condition(*event);
+      stated.restitution = optional_formula(*event, "restitution");
+      stated.on = row_names(*event, "on");
+      stated.off = row_names(*event, "off");
+      stated.place = place;
+      if (event->contains("set"))
+        for (const Item& item : items(*event, "set")) stated.set.push_back(entry(item));
+      stated.direction = direction(*event, stated.restitution.has_value());
+      require_moment(*event, stated);
+      document_.events.push_back(std::move(stated));
     }
+  }
+
+  /// A contact is approached from one side: from above 0 where nothing is said.
+  SceneDocument::Event::Direction direction(const toml::table& event, bool contact) const {
+    using Direction = SceneDocument::Event::Direction;
+    const std::string direction = string(event, "direction", contact ? "falling" : "both");
+    if (direction != "rising" && direction != "falling" && (contact || direction != "both"))
+      fail(place_of(event.get("direction")->source()),
+           contact ? "'direction' of an impact: expected \"falling\" or \"rising\", from the free side"
+                   : "'direction': expected \"rising\", \"falling\" or \"both\"");
+    return direction == "both"     ? Direction::both
+           : direction == "rising" ? Direction::rising
+                                   : Direction::falling;
+  }
+
+  void require_moment(const toml::table& event, const SceneDocument::Event& stated) const {
+    if (stated.when.has_value() == event.contains("every"))
+      fail(stated.place,
+           "[[events]] needs one of 'when', a formula that changes its sign, and 'every', a time");
+    if (stated.when) return;
+    if (!(stated.every > 0.0 && std::isfinite(stated.every)))
+      fail(place_of(event.get("every")->source()), "'every': expected a time above 0");
+    if (event.contains("direction") || stated.restitution)
+      fail(stated.place, "an event with 'every' has neither a direction nor a restitution");
+  }
+
+  /// "a > b and c < d" as a formula above 0 where it holds.
+  std::optional<FormulaText> condition(const toml::table& event) const {
+    auto text = optional_formula(event, "if");
+    if (!text) return text;
+    const std::string before = "if(";
+    text->text = before + text->text + ", 1, 0)";
+    text->start.column -= static_cast<decltype(text->start.column)>(before.size());
+    return text;
+  }
+
+  /// A list of names of rows, or one.
+  std::vector<std::string> row_names(const toml::table& event, const char* key) const {
+    const toml::node* node = event.get(key);
+    std::vector<std::string> names;
+    if (node == nullptr) return names;
+    const auto add = [&](const toml::node& one) {
+      if (!one.is_string()) fail(place_of(one.source()), fmt::format("'{}': expected names of rows", key));
+      names.push_back(one.as_string()->get());
+      const auto found = std::ranges::find(document_.rows, names.back(), &SceneDocument::Row::name);
+      if (found == document_.rows.end())
+        fail(place_of(one.source()), fmt::format("'{}': there is no row '{}'", key, names.back()));
+      if (found->loops)
+        fail(place_of(one.source()),
+             fmt::format("'{}': the row '{}' is repeated; rows that are switched are single ones", key,
+                         names.back()));
+    };
+    if (const toml::array* list = node->as_array())
+      for (const toml::node& one : *list) add(one);
+    else
+      add(*node);
+    return names;
   }
 
   void read_recommended(const toml::table& root) {

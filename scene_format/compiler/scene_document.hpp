@@ -43,6 +43,7 @@ struct SceneDocument {
     std::optional<FormulaText> loops;
     Place place;
     std::optional<FormulaText> compliance = {};                    ///< of a spring in place of the row
+    bool on = true;  ///< at the start
     std::string extension() const { return "extension_" + name; }  ///< its coordinate then
   };
   /// "x = …", "v_x = […]": a value, or one for each element of a repeated coordinate.
@@ -82,9 +83,15 @@ struct SceneDocument {
   struct Event {
     enum class Direction { both, rising, falling };
     std::string name;
-    FormulaText when;
+    std::optional<FormulaText> when;  ///< none: an event of a clock
     Direction direction = Direction::both;
     bool stop = false;
+    double every = 0.0;
+    std::optional<FormulaText> condition;  ///< above 0 where it holds
+    std::vector<Entry> set;
+    std::optional<FormulaText> restitution;
+    std::vector<std::string> on, off;  ///< rows
+    Place place;
   };
   struct Output {
     std::string name;

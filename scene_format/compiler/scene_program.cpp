@@ -7,6 +7,7 @@
 #include <diracstep/scene_format/compiler/piece_builder.hpp>
 #include <diracstep/scene_format/compiler/scene_program.hpp>
 #include <diracstep/scene_format/compiler/sum_terms.hpp>
+#include <set>
 
 namespace diracstep::scene_compiler {
 
@@ -39,9 +40,8 @@ class SceneCompiler {
     compile_invariants();
     for (const auto& output : document_.outputs)
       program_.outputs.push_back(
-          {output.name, value_function(output.formula, "output '" + output.name + "'")});
-    for (const auto& event : document_.events)
-      program_.events.push_back(value_function(event.when, "event '" + event.name + "'"));
+          {output.name, motion_function(output.formula, "output '" + output.name + "'")});
+    for (const auto& event : document_.events) compile_event(event);
     write_source();
     program_.kinks = KinkFinder(program_, builder_).find();
   }
@@ -66,7 +66,10 @@ class SceneCompiler {
     for (const auto& parameter : document_.parameters)
       symbols_.add(Symbols::Parameter{parameter.name, parameter.array});
     symbols_.definitions = document_.definitions;
-    for (const auto& input : document_.inputs) symbols_.inputs.emplace(input.name, table_of(input));
+    for (const auto& row : document_.rows)
+      if (!row.loops) symbols_.rows.push_back(row.name);
+    for (const auto& input : document_.inputs)
+      symbols_.inputs.emplace(input.name, graph_.add_table(table_of(input)));
     for (const auto& coordinate : document_.coordinates) {
       Symbols::Family family{coordinate.name, {}, coordinate.cyclic};
       if (coordinate.loops)
@@ -504,7 +507,18 @@ class SceneCompiler {
 
   /// A formula in t, q and v, or p where there is no Lagrangian, that is computed and not differentiated.
   SceneFunction value_function(const FormulaText& formula, const std::string& what) {
-    const Node node = parser_.formula(formula, mechanics(what, program_.lagrangian ? 'v' : 'p'));
+    return value_function(formula, what, mechanics(what, program_.lagrangian ? 'v' : 'p'));
+  }
+
+  /// The same of v, p and the forces of rows.
+  SceneFunction motion_function(const FormulaText& formula, const std::string& what) {
+    Context context = mechanics(what, program_.lagrangian ? 'v' : 'p');
+    context.motion = true;
+    return value_function(formula, what, context);
+  }
+
+  SceneFunction value_function(const FormulaText& formula, const std::string& what, const Context& context) {
+    const Node node = parser_.formula(formula, context);
     SceneFunction function{FunctionKind::phase};
     for (Term& term : terms_.of(node, {}, what, formula.start)) {
       Piece piece;
@@ -515,8 +529,78 @@ class SceneCompiler {
     return function;
   }
 
+  void compile_event(const SceneDocument::Event& event) {
+    const std::string what = "event '" + event.name + "'";
+    EventProgram& program = program_.events.emplace_back();
+    if (event.when) program.when = motion_function(*event.when, what);
+    if (event.condition) program.condition = motion_function(*event.condition, "'if' of " + what);
+    for (const auto& entry : event.set) {
+      if (entry.array) fail(entry.key.start, "'set' takes one formula for each component, not an array");
+      const FormulaText zero{"0", entry.key.start};
+      program.set.push_back(named_value({entry.key, {zero}}, {.what = "'set' of " + what}));
+      require_settable(program.set.back());
+      program.values.push_back(motion_function(entry.values[0], "'set' of " + what));
+    }
+    if (event.restitution)
+      program.restitution = motion_function(*event.restitution, "the restitution of " + what);
+    if (event.when) compile_contact(event, program, what);
+  }
+
+  /// `when` as a row, where it is a function of coordinates and t.
+  void compile_contact(const SceneDocument::Event& event, EventProgram& program, const std::string& what) {
+    Context context = mechanics(what, program_.lagrangian ? 'v' : 'p');
+    context.motion = true;
+    Row row{{event.name, {}, event.when->start}, parser_.formula(*event.when, context)};
+    bool gap = false;
+    for (const Node node : graph_.reachable(std::span(&row.node, 1))) {
+      const NodeData& data = graph_[node];
+      const bool position = data.op == Op::coordinate && data.c == static_cast<int>(Role::position);
+      gap = gap || position;
+      if ((data.op != Op::coordinate || position) && data.op != Op::multiplier) continue;
+      gap = false;
+      break;
+    }
+    if (!gap && event.restitution)
+      fail(event.when->start, what +
+                                  " is an impact: its 'when' is the gap, a formula in coordinates and t "
+                                  "without velocities");
+    if (!gap) return;
+    SceneFunction contact{FunctionKind::rows, true};
+    Piece single;
+    add_row(contact, single, row);
+    if (!single.outputs.empty()) {
+      const std::vector<Node> offsets = require_linear(contact, single);
+      builder_.add_rows(contact, std::move(single), offsets);
+    }
+    program.contact = std::move(contact);
+  }
+
+  void require_settable(const NamedValue& value) const {
+    const auto& family = symbols_.families[static_cast<std::size_t>(value.family)];
+    if (!family.loops.empty() && value.index == none)
+      fail(value.place, "'set' takes one component, such as " + family.name + "[1]");
+    if (value.role == Role::second && value.momentum == program_.lagrangian.has_value())
+      fail(value.place, program_.lagrangian ? "'set' takes velocities v_… where there is a Lagrangian"
+                                            : "'set' takes momenta p_… beside a Hamiltonian alone");
+    const std::size_t first = symbols_.families.size() - document_.states.size();
+    if (value.role == Role::second && static_cast<std::size_t>(value.family) >= first)
+      fail(value.place, fmt::format("v_{} is the rate of a state and is not set", family.name));
+  }
+
+  /// Those that kernels read.
+  std::string source_of_tables() const {
+    std::set<int> numbers;
+    for (const SceneFunction* function : program_.functions())
+      for (const Piece& piece : function->pieces)
+        for (const Kernel& kernel : piece.kernels) kernel.add_tables(numbers);
+    std::string text = numbers.empty() ? "" : LookupTable::source_of_value();
+    for (const int number : numbers)
+      text += graph_.tables()[static_cast<std::size_t>(number)].source(fmt::format("table{}", number));
+    return text;
+  }
+
   void write_source() {
-    std::string body = kernel_prelude(), table;
+    std::string body = kernel_prelude() + source_of_tables(), table;
     int number = 0;
     for (const SceneFunction* function : program_.functions())
       for (const Piece& piece : function->pieces)

@@ -6,6 +6,7 @@
 #include <diracstep/scene_format/compiler/scene_document.hpp>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -101,6 +102,15 @@ struct KinkProgram {
   SceneFunction events{FunctionKind::rows};       ///< functions of the time whose zeros are instants,
   SceneFunction widths{FunctionKind::rows};       ///< and how wide each is there, row by row
   SceneFunction phase_rates{FunctionKind::rows};  ///< of sines of the time
+  std::set<double> knots;  ///< of tables of the time: kinks at times that need not be looked for
+};
+
+/// [[events]], as in the document.
+struct EventProgram {
+  std::optional<SceneFunction> when, condition, restitution;
+  std::optional<SceneFunction> contact;  ///< `when` as a holonomic row
+  std::vector<NamedValue> set;           ///< the components that are set,
+  std::vector<SceneFunction> values;     ///< and to what
 };
 
 /// A scene file compiled: everything but the numbers.
@@ -124,7 +134,7 @@ struct SceneProgram {
   std::vector<InvariantProgram> invariants;
   std::vector<OutputProgram> outputs;
   std::vector<StateProgram> states;
-  std::vector<SceneFunction> events;  ///< as in the document
+  std::vector<EventProgram> events;  ///< as in the document
   KinkProgram kinks;
   std::string source;  ///< C for all kernels
   std::string name;    ///< of the source, by its content; the table in it is diracstep_kernels_NAME

@@ -86,6 +86,19 @@ std::vector<std::pair<std::string, std::string>> scene_definition(const SceneDoc
   for (const auto& entry : document.start) all.add("start of", entry);
   all.add("start projected", document.project ? "yes" : "no");
   for (const FormulaText& guess : document.guesses) all.add("guess " + formula(guess), "yes");
+  for (const auto& row : document.rows)
+    if (!row.on) all.add("row off at the start " + row.name, "yes");
+  for (const auto& event : document.events) {
+    const std::string of = " of event " + event.name;
+    all.add("when" + of, event.when);
+    all.add("kind" + of, fmt::format("{}, {}, every {:.17g}", static_cast<int>(event.direction),
+                                     event.stop ? "stops" : "goes on", event.every));
+    all.add("if" + of, event.condition);
+    all.add("restitution" + of, event.restitution);
+    for (const auto& entry : event.set) all.add("set" + of + ',', entry);
+    for (const std::string& name : event.on) all.add("on" + of, name);
+    for (const std::string& name : event.off) all.add("off" + of, name);
+  }
   all.add("redundant rows dropped", document.drop_redundant_rows ? "yes" : "no");
   return all.take();
 }

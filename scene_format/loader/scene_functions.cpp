@@ -347,4 +347,32 @@ ValueFunction file_value(const LoadedScenePtr& scene, const SceneFunction& of) {
   };
 }
 
+PointFunction file_point_value(const LoadedScenePtr& scene, const SceneFunction& of,
+                               const std::vector<std::string>& rows) {
+  auto function = std::make_shared<const LoadedFunction>(scene, of);
+  std::vector<Eigen::Index> places;  // of the forces that formulas read, -1 where there is none
+  for (const std::string& name : scene->program->symbols.forces) {
+    const auto found = std::ranges::find(rows, name);
+    places.push_back(found == rows.end() ? -1 : found - rows.begin());
+  }
+  const bool by_momentum = !scene->program->lagrangian;
+  return [function, places, by_momentum](const MotionPoint& at) {
+    double sum = 0.0;
+    std::vector<double> forces;
+    for (const Eigen::Index place : places)
+      forces.push_back(place >= 0 && place < at.lambda.size() ? at.lambda[place] : 0.0);
+    const Vector &second = by_momentum ? at.p : at.v, &other = by_momentum ? at.v : at.p;
+    KernelCall call = call_at(at.t, at.q.data(), second.data());
+    call.in[2] = other.data();
+    call.multipliers = forces.data();
+    call.out[0] = &sum;
+    function->run(0, call);
+    return sum;
+  };
+}
+
+std::shared_ptr<const ConstraintRows> file_rows(const LoadedScenePtr& scene, const SceneFunction& of) {
+  return std::make_shared<FileRows>(LoadedFunction(scene, of));
+}
+
 }  // namespace diracstep

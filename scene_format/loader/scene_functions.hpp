@@ -1,5 +1,6 @@
 #pragma once
 
+#include <diracstep/core/system/motion_point.hpp>
 #include <diracstep/core/system/scene.hpp>
 #include <diracstep/scene_format/loader/loaded_scene.hpp>
 #include <functional>
@@ -17,5 +18,12 @@ ConstraintBlocks file_constraints(const LoadedScenePtr& scene);
 /// output.
 using ValueFunction = std::function<double(double t, ConstVectorRef q, ConstVectorRef y)>;
 ValueFunction file_value(const LoadedScenePtr& scene, const scene_compiler::SceneFunction& of);
+/// The same of all that a point of a motion has, its forces being those of rows of these names; rows that are
+/// not among them have none.
+PointFunction file_point_value(const LoadedScenePtr& scene, const scene_compiler::SceneFunction& of,
+                               const std::vector<std::string>& rows);
+/// A function of rows as constraints.
+std::shared_ptr<const ConstraintRows> file_rows(const LoadedScenePtr& scene,
+                                                const scene_compiler::SceneFunction& of);
 
 }  // namespace diracstep

@@ -5,6 +5,7 @@
 #include <diracstep/scene_format/loader/scene_kinks.hpp>
 #include <limits>
 #include <numbers>
+#include <set>
 
 namespace diracstep {
 
@@ -50,7 +51,8 @@ class FileKinks final : public Kinks {
         ramps_(std::move(ramps)),
         events_(scene, scene->program->kinks.events),
         widths_(scene, scene->program->kinks.widths),
-        phase_rates_(scene, scene->program->kinks.phase_rates) {}
+        phase_rates_(scene, scene->program->kinks.phase_rates),
+        knots_(scene->program->kinks.knots) {}
 
   void evaluate(double t, ConstVectorRef q, ConstVectorRef v, VectorRef g) const override {
     kinks_.evaluate(t, q.data(), v.data(), g.data());
@@ -60,12 +62,10 @@ class FileKinks final : public Kinks {
   std::vector<Instant> instants(double first, double last) const override {
     if (first > last) std::swap(first, last);
     std::vector<Instant> found;
-    if (events_.rows() == 0 || !(last > first)) return found;
-    const auto changes = [&](Eigen::Index r, double a, double b) {
-      if (found.size() < most_instants) add(found, r, zero(r, a, events_.at(a)[r], b, events_.at(b)[r]));
-    };
-    const auto values = [this](double t, Vector& g) { g = events_.at(t); };
-    SignChanges(events_.rows(), values, changes).look(first, last, sample_count(first, last), true);
+    if (!(last > first)) return found;
+    if (events_.rows() > 0) look_for_events(first, last, found);
+    for (auto knot = knots_.lower_bound(first); knot != knots_.end() && *knot <= last; ++knot)
+      if (found.size() < most_instants) found.push_back({*knot, 0.0});
     std::ranges::sort(found, {}, [](const Instant& i) { return std::pair(i.time, i.width); });
     const auto same = [](const Instant& a, const Instant& b) {
       return std::abs(a.time - b.time) <= 16.0 * round_off * std::abs(a.time) && a.width == b.width;
@@ -75,6 +75,13 @@ class FileKinks final : public Kinks {
   }
 
  private:
+  void look_for_events(double first, double last, std::vector<Instant>& found) const {
+    const auto changes = [&](Eigen::Index r, double a, double b) {
+      if (found.size() < most_instants) add(found, r, zero(r, a, events_.at(a)[r], b, events_.at(b)[r]));
+    };
+    const auto values = [this](double t, Vector& g) { g = events_.at(t); };
+    SignChanges(events_.rows(), values, changes).look(first, last, sample_count(first, last), true);
+  }
   static std::vector<Kind> kinds(const Values& kinks, const Values& ramps) {
     std::vector<Kind> kinds(static_cast<std::size_t>(kinks.rows()), Kind::kink);
     kinds.resize(kinds.size() + static_cast<std::size_t>(ramps.rows()), Kind::ramp);
@@ -118,6 +125,7 @@ class FileKinks final : public Kinks {
   }
 
   Values kinks_, ramps_, events_, widths_, phase_rates_;
+  const std::set<double>& knots_;  ///< of the program, which the functions above keep
 };
 
 }  // namespace
@@ -125,7 +133,8 @@ class FileKinks final : public Kinks {
 std::shared_ptr<const Kinks> file_kinks(const LoadedScenePtr& scene) {
   const KinkProgram& program = scene->program->kinks;
   Values kinks(scene, program.kinks), ramps(scene, program.ramps);
-  if (kinks.rows() == 0 && ramps.rows() == 0 && program.events.groups.empty()) return nullptr;
+  if (kinks.rows() == 0 && ramps.rows() == 0 && program.events.groups.empty() && program.knots.empty())
+    return nullptr;
   return std::make_shared<FileKinks>(scene, std::move(kinks), std::move(ramps));
 }
 

@@ -46,6 +46,23 @@ z = "-r*cos(angle)"
 end = 10.0
 step = 0.01  # a coarse but sensible step
 
+# [inputs]  # tables of the time; the name stands for the value, push(x) for that at another argument
+# push = { times = [0, 1, 2], values = [0, 3, 0] }  # or file = "push.csv"; kind = "linear", "cubic", "step"
+
+# [states]  # first-order states; without a rate they hold what events set
+# e = { rate = "x - 0.1", start = 0 }
+
+# [[events]]  # where a formula changes its sign, or every = 0.1 for a clock
+# name = "low"
+# when = "z + 0.4"
+# direction = "falling"  # "rising", "both"
+# action = "stop"        # "record"
+# if = "v_z < 0"         # happens only where this holds
+# restitution = 0.8      # an impact on the contact 'when'; set = { e = "0" }; on, off = ["hoop"] switch rows
+
+# [outputs]  # columns of --out: coordinates, v_, p_ and lambda_hoop, the force of a row
+# pull = "lambda_hoop"
+
 [recommended]
 method = "type1/midpoint"
 order = 4

@@ -64,6 +64,26 @@ TEST_F(EquilibriumVerb, RowsThatMoveAreTold) {
   }
 }
 
+/// A governor driven at a constant rate by a row: cos θ = g/(W² l), as where it turns by itself.
+TEST_F(EquilibriumVerb, ARowThatDrivesKeepsItsVelocityAlongAMotion) {
+  std::ofstream(path("governor.toml"))
+      << "name = \"governor\"\nlagrangian = \"l^2*(v_th^2 + v_ph^2*sin(th)^2) + 2*9.81*l*cos(th)\"\n"
+         "[coordinates]\nph = {}\nth = {}\n[parameters]\nl = 0.4\n[[rows]]\nname = \"motor\"\n"
+         "equation = \"v_ph = 7\"\n[start]\nth = 0.8\nv_ph = 7\n[span]\nend = 1\nstep = 0.01\n";
+  const Json json = found("'" + path("governor.toml") + "' --along");
+  EXPECT_EQ(json["v"]["ph"].get<double>(), 7.0);
+  EXPECT_NEAR(json["q"]["th"].get<double>(), std::acos(9.81 / (49.0 * 0.4)), 1e-12);
+}
+
+/// Along a stiff valley the forces stay as large as they are until its end.
+TEST_F(EquilibriumVerb, AStiffSpringPendulumHangs) {
+  for (const std::string k : {"1e2", "1e4", "1e6"}) {
+    const Json json = found("stiff_spring_pendulum --set k=" + k);
+    EXPECT_NEAR(json["q"]["x"].get<double>(), 0.0, 1e-10) << k;
+    EXPECT_NEAR(json["q"]["y"].get<double>(), -1.0 - 9.81 / std::stod(k), 1e-10) << k;
+  }
+}
+
 TEST_F(EquilibriumVerb, LinearBicycleHasThePublishedEigenvalues) {
   const Json json = found(examples + "bicycle_linear.toml");
   expect_eigenvalues(json, at_5);

@@ -231,9 +231,9 @@ struct Place {
 };
 
 /// Lines through the points, through others near them, and through some farther off.
-std::vector<Place> places(const std::vector<MotionPoint>& points) {
+std::vector<Place> places(const std::vector<ExaminedPoint>& points) {
   std::vector<Place> all;
-  for (const MotionPoint& point : points) {
+  for (const ExaminedPoint& point : points) {
     const Eigen::Index n = point.q.size();
     const double q_size = std::max(point.q.lpNorm<Eigen::Infinity>(), 1e-2);
     const double y_size = std::max(point.y.lpNorm<Eigen::Infinity>(), 1e-2);
@@ -261,8 +261,8 @@ Finding finding(const std::string& what, const Deviation& deviation) {
                       derivative_tolerance)};
 }
 
-std::vector<MotionPoint> with_start(const Scene& scene, const std::vector<MotionPoint>& motion) {
-  std::vector<MotionPoint> points{
+std::vector<ExaminedPoint> with_start(const Scene& scene, const std::vector<ExaminedPoint>& motion) {
+  std::vector<ExaminedPoint> points{
       {scene.start.time, scene.start.q, scene.start.v.size() > 0 ? scene.start.v : scene.start.p}};
   points.insert(points.end(), motion.begin(), motion.end());
   return points;
@@ -270,7 +270,7 @@ std::vector<MotionPoint> with_start(const Scene& scene, const std::vector<Motion
 
 }  // namespace
 
-std::vector<Finding> examine_derivatives(const Scene& scene, const std::vector<MotionPoint>& motion) {
+std::vector<Finding> examine_derivatives(const Scene& scene, const std::vector<ExaminedPoint>& motion) {
   Deviations d;
   for (const Place& place : places(with_start(scene, motion)))
     examine_line(scene, place.line, place.may_be_undefined, d);
@@ -291,7 +291,7 @@ std::vector<Finding> examine_derivatives(const Scene& scene, const std::vector<M
   return findings;
 }
 
-Finding examine_legendre_transform(const Scene& scene, const std::vector<MotionPoint>& motion) {
+Finding examine_legendre_transform(const Scene& scene, const std::vector<ExaminedPoint>& motion) {
   constexpr double allowed = 1e-8;
   double largest = 0.0;
   const Eigen::Index n = scene.dimension();

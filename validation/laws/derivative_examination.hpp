@@ -14,7 +14,7 @@ struct Finding {
 };
 
 /// A point of a motion; y is the velocity where the scene has a Lagrangian, else the momentum.
-struct MotionPoint {
+struct ExaminedPoint {
   double t;
   Vector q, y;
 };
@@ -25,11 +25,11 @@ struct MotionPoint {
 /// functions are defined there.  Where the scene says that a function has a kink on the way of the
 /// differences, these are taken from one side of it.  Each difference has several step sizes, of which the
 /// best agreement counts.  Agreement is to 1e-5 of the terms.
-std::vector<Finding> examine_derivatives(const Scene& scene, const std::vector<MotionPoint>& motion = {});
+std::vector<Finding> examine_derivatives(const Scene& scene, const std::vector<ExaminedPoint>& motion = {});
 
 /// Whether H, given beside L, is its Legendre transform up to a constant at the start and the points of
 /// `motion`:
 ///   ∂H/∂p(t, q, p) = v,   ∂H/∂q(t, q, p) = −∂L/∂q(t, q, v)   at p = ∂L/∂v(t, q, v),   to 1e-8 of the terms.
-Finding examine_legendre_transform(const Scene& scene, const std::vector<MotionPoint>& motion);
+Finding examine_legendre_transform(const Scene& scene, const std::vector<ExaminedPoint>& motion);
 
 }  // namespace diracstep

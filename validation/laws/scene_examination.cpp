@@ -130,7 +130,7 @@ DefaultMethod method_of_a_run(const CatalogueScene& entry, const Registry& regis
 /// velocities read from momenta; points of the motion at steps 1, 4 and 16 go into `motion`.
 void examine_steps(const CatalogueScene& entry, const Registry& registry, const SolverFactory& solvers,
                    const DefaultMethod& method, std::vector<Finding>& findings,
-                   std::vector<MotionPoint>& motion) {
+                   std::vector<ExaminedPoint>& motion) {
   Finding steps{"regularity of the steps", false, ""};
   std::optional<Finding> reading;
   double condition = 0.0;
@@ -227,7 +227,7 @@ Examination examine(const CatalogueScene& entry, const Registry& registry, const
   std::vector<Finding>& findings = examination.findings;
   findings = {examine_dimensions(*scene), examine_start(*scene), examine_rank(*scene)};
   std::vector<Finding> steps;
-  std::vector<MotionPoint> motion;
+  std::vector<ExaminedPoint> motion;
   const DefaultMethod method = method_of_a_run(entry, registry, solvers);
   examine_steps(entry, registry, solvers, method, steps, motion);
   for (Finding& finding : examine_derivatives(*entry.scene, motion)) findings.push_back(std::move(finding));

@@ -24,7 +24,8 @@ CatalogueScene driven(const std::string& u, const std::string& inputs = "") {
 }
 
 double input_at(const CatalogueScene& entry, double t) {
-  return entry.outputs.at(0).at(t, Vector::Ones(1), Vector::Zero(1));
+  const Vector q = Vector::Ones(1), v = Vector::Zero(1), none;
+  return entry.outputs.at(0).at({t, q, v, v, none});
 }
 
 constexpr double switched_on = 1.234, last_time = 3.0;  // no step of a test ends at the first

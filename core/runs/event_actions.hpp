@@ -1,0 +1,61 @@
+#pragma once
+
+#include <diracstep/core/integrator/sample.hpp>
+#include <diracstep/core/runs/event_search.hpp>
+#include <diracstep/core/system/event.hpp>
+#include <diracstep/core/system/scene.hpp>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace diracstep {
+
+/// What events make of a point of a motion, and which rows of the scene are on.
+class EventActions {
+ public:
+  /// `start` holds the rows that are on at the start, `all` in addition those that are off; null where no row
+  /// is ever switched.  Both need a Lagrangian or a Hamiltonian that is not degenerate.  Throws Misuse where
+  /// an event names a row, a coordinate or a contact that `all` has not.
+  EventActions(const std::shared_ptr<const Scene>& start, const std::shared_ptr<const Scene>& all,
+               SolverFactory solvers, const std::vector<Event>& events);
+
+  /// By event.  One that would only switch on rows that are on, or off rows that are off, sleeps.
+  std::vector<bool> awake() const;
+
+  /// A point after an event, with a momentum and velocity that fulfil the rows that are on.
+  struct Outcome {
+    std::string failure;  ///< empty, or why there is none
+    Vector q, p, v;
+    double impulse = 0.0;   ///< Λ_c
+    double rate = 0.0;      ///< A_c v⁺ + b_c, at which a contact is left
+    bool switched = false;  ///< other rows are on than before
+  };
+  /// `current` is the scene as the steps take it, with the rows that are on before.  Rows that the event
+  /// switches are switched where it succeeds.
+  Outcome act(const Event& event, const Sample& at, const Scene& current);
+
+  /// A_c v + b_c.
+  static double contact_rate(const Event& event, const Sample& at);
+
+  /// The scene of the rows that are on, starting at a point.
+  std::shared_ptr<const Scene> scene_from(double t, const Vector& q, const Vector& v) const;
+  /// By row of `all`.
+  const std::vector<bool>& on() const { return on_; }
+  void set_on(const std::vector<bool>& on) { on_ = on; }
+
+  /// The forces of all rows, 0 where they are off; `names` are those that `lambda` has values of.
+  Vector forces_of_all(const std::vector<std::string>& names, const Vector& lambda) const;
+
+ private:
+  std::shared_ptr<const Scene> without(const std::vector<bool>& on) const;
+  std::size_t row(const std::string& name) const;
+
+  std::shared_ptr<const Scene> start_, all_;
+  bool by_momentum_;  ///< what is set are momenta
+  SolverFactory solvers_;
+  const std::vector<Event>& events_;
+  std::vector<std::string> names_;  ///< of all rows
+  std::vector<bool> on_;
+};
+
+}  // namespace diracstep

@@ -1,0 +1,396 @@
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/runs/event_actions.hpp>
+#include <diracstep/core/runs/event_search.hpp>
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace diracstep {
+
+namespace detail {
+
+/// Where a step starts.
+struct Node {
+  double time;
+  Vector q, p, v;
+};
+
+/// What EventSteps needs of a stepper.
+template <class Stepper>
+struct Stepping;
+
+template <>
+struct Stepping<Integrator> {
+  static constexpr bool on_a_grid = true;
+  static const Integrator& integrator(const Integrator& stepper) { return stepper; }
+  static double size(const Integrator& stepper) { return stepper.options().step; }
+  static StepReport step_to(Integrator& stepper, double t) { return stepper.step(t - stepper.time()); }
+  /// The motion at a time behind a node, by a step of another integrator of the same scene.
+  static StepReport read(Integrator& beside, const Node& from, double t, Momentum momentum, Sample& sample) {
+    beside.restart(from.time, from.q, from.p, from.v);
+    StepReport report;
+    if (t != from.time) report = beside.step(t - from.time);
+    if (report.ok()) report.solve = beside.sample(momentum, sample);
+    sample.time = t;
+    return report;
+  }
+};
+
+/// Watches one event: whether it comes ever faster.
+class ZenoWatch {
+ public:
+  /// The event was met at t; `scale` is the time that has passed.  The time at which it would have been met
+  /// infinitely often where that is about to happen, else NaN.
+  double met(double t, double scale) {
+    const double gap = std::abs(t - last_);
+    shrinking_ = std::isfinite(gap) && gap < slowest * gap_ ? shrinking_ + 1 : 0;
+    const double ratio = gap / gap_, left = (t - last_) * ratio / (1.0 - ratio);
+    last_ = t;
+    gap_ = gap;
+    return shrinking_ >= 3 && gap < part * scale ? t + left : std::nan("");
+  }
+
+ private:
+  static constexpr double slowest = 0.9999, part = 1e-9;
+  double last_ = std::nan(""), gap_ = std::nan("");
+  int shrinking_ = 0;
+};
+
+}  // namespace detail
+
+/// The steps of an Integrator or an AdaptiveIntegrator through the events of a scene.
+///
+/// A step in which an event acts is taken up to its time, the event is made true (Event), and the motion goes
+/// on from there with nothing of the steps before it: so the order of the method holds across events.  Steps
+/// of one size go on to the node that they were to end at; variable steps go on with their control begun
+/// anew.  Where rows are switched another integrator takes over, made for the scene of the rows that are on.
+///
+/// Events that accumulate at a time (Zeno) end the run with a failure that says so.
+template <class Stepper>
+class EventSteps {
+  using Stepping = detail::Stepping<Stepper>;
+
+ public:
+  /// Makes the stepper of a scene, from its start.
+  using Make = std::function<std::unique_ptr<Stepper>(const std::shared_ptr<const Scene>&)>;
+
+  /// `start` and `all` as EventActions takes them; `momentum` as points are read.  Throws Misuse as it does,
+  /// and as `make` does.
+  EventSteps(std::shared_ptr<const Scene> start, const std::shared_ptr<const Scene>& all,
+             std::vector<Event> events, const SolverFactory& solvers, Momentum momentum, Make make)
+      : make_(std::move(make)),
+        momentum_(momentum),
+        search_(std::move(events)),
+        actions_(start, all, solvers, search_.events()),
+        zeno_(search_.events().size()) {
+    take(std::move(start));
+    began_at_ = time();
+  }
+  EventSteps(const EventSteps&) = delete;
+  EventSteps& operator=(const EventSteps&) = delete;
+  ~EventSteps() = default;
+
+  /// The next step, to the next node of fixed steps, or to a node or an event that acts of variable ones; or
+  /// to an event that stops the run.
+  StepReport step();
+
+  /// The motion at a time that the next step would pass, where no event acts before it; else the run goes to
+  /// the first that does, and `reached` is false.
+  StepReport read_up_to(double t, Sample& sample, bool& reached);
+
+  /// With the forces of all rows, those that are off 0.
+  SolveReport sample(Sample& sample) {
+    const SolveReport report = stepper().sample(momentum_, sample);
+    if (report.ok()) show_all_rows(sample);
+    return report;
+  }
+  double time() const { return current_->stepper->time(); }
+  /// The one that steps now; another after rows were switched.
+  Stepper& stepper() { return *current_->stepper; }
+  const Stepper& stepper() const { return *current_->stepper; }
+  const Scene& scene() const { return Stepping::integrator(stepper()).scene(); }
+  /// Of all steppers; parts of a fixed step count as one.
+  Work work() const;
+
+  const std::vector<Event>& events() const { return search_.events(); }
+  const std::vector<EventHit>& hits() const { return hits_; }
+  /// The last hit ends the run; it is where the motion ends.
+  bool stopped() const { return stopped_; }
+  /// Whether an event acted in the last step.
+  bool acted() const { return acted_; }
+
+  /// Fixed steps: all that the next ones depend on, as Integrator::save; hits so far are not kept.
+  void save(Snapshot& to) const;
+  void restore(SnapshotReader& from);
+
+ private:
+  struct Mode {
+    std::shared_ptr<const Scene> scene;  ///< that the stepper was made for
+    std::unique_ptr<Stepper> stepper, beside;
+  };
+
+  void take(std::shared_ptr<const Scene> scene) {
+    current_ = &modes_[actions_.on()];
+    current_->scene = std::move(scene);
+    current_->beside.reset();
+    current_->stepper = make_(current_->scene);
+  }
+  Stepper& beside() {
+    if constexpr (!Stepping::on_a_grid) return stepper();
+    if (!current_->beside) current_->beside = make_(current_->scene);
+    return *current_->beside;
+  }
+  void show_all_rows(Sample& sample) const {
+    if (!search_.empty()) sample.lambda = actions_.forces_of_all(scene().row_names(), sample.lambda);
+  }
+  detail::Node node() const {
+    const Integrator& at = Stepping::integrator(stepper());
+    return {at.time(), at.position(), at.momentum(), at.velocity_estimate()};
+  }
+  StepReport read(const detail::Node& from, double t, Sample& sample) {
+    StepReport report = Stepping::read(beside(), from, t, momentum_, sample);
+    if (report.ok()) show_all_rows(sample);
+    return report;
+  }
+  StepReport begin();
+  StepReport look(const detail::Node& from, const Sample& point);
+  StepReport act(std::vector<EventHit> met);
+  StepReport make_true(EventHit hit, std::vector<EventSearch::Left>& left);
+  void add_left(std::size_t number, std::vector<EventSearch::Left>& left) const;
+  StepReport failed(std::string failure) const {
+    StepReport report;
+    report.solve.status = SolveStatus::refused;
+    report.time = time();
+    report.failure = std::move(failure);
+    return report;
+  }
+
+  static constexpr int most_at_once = 100;  // events at one time
+
+  Make make_;
+  Momentum momentum_;
+  EventSearch search_;
+  EventActions actions_;
+  std::vector<detail::ZenoWatch> zeno_;
+  std::map<std::vector<bool>, Mode> modes_;
+  Mode* current_ = nullptr;
+  std::vector<EventHit> hits_;
+  double began_at_ = 0.0;
+  bool begun_ = false, acted_ = false, stopped_ = false;
+  long steps_ = 0, acts_ = 0;
+  Sample after_;  ///< the last event that acted
+};
+
+/// Clocks act at the start.
+template <class Stepper>
+StepReport EventSteps<Stepper>::begin() {
+  begun_ = true;
+  Sample here;
+  StepReport report;
+  report.solve = sample(here);
+  if (!report.ok()) return failed(std::string("reading the start: ") + describe(report.solve.status));
+  if (report = search_.see(here, {}); !report.ok()) return report;
+  (void)search_.go_on(here, {}, actions_.awake());
+  std::vector<EventHit> due;
+  for (std::size_t k = 0; k < events().size(); ++k)
+    if (events()[k].every > 0.0 && (!events()[k].condition || events()[k].condition(here.point()) > 0.0))
+      due.push_back({k, here});
+  if (std::ranges::any_of(due, [&](const EventHit& hit) { return events()[hit.event].acts(); }))
+    return act(std::move(due));
+  hits_ = std::move(due);
+  return {};
+}
+
+template <class Stepper>
+StepReport EventSteps<Stepper>::step() {
+  acted_ = false;
+  if (search_.empty()) return stepper().step();
+  if (!begun_)
+    if (StepReport report = begin(); !report.ok()) return report;
+  const double size = Stepping::size(stepper()), end = time() + size;
+  for (bool first = true;; first = false) {
+    const detail::Node from = node();
+    StepReport report;
+    if constexpr (Stepping::on_a_grid)
+      report = first ? stepper().step() : Stepping::step_to(stepper(), end);
+    else
+      report = stepper().step();
+    if (!report.ok()) return report;
+    Sample here;
+    report.solve = sample(here);
+    if (!report.ok()) return failed(std::string("reading the state: ") + describe(report.solve.status));
+    const long before = acts_;
+    if (report = look(from, here); !report.ok()) return report;
+    const bool ends_here = stopped_ || acts_ == before || !Stepping::on_a_grid;
+    if (ends_here || std::abs(end - time()) <= 1e-9 * std::abs(size)) {
+      ++steps_;
+      return report;
+    }
+  }
+}
+
+template <class Stepper>
+StepReport EventSteps<Stepper>::read_up_to(double t, Sample& sample, bool& reached) {
+  acted_ = false;
+  reached = true;
+  StepReport report;
+  if (!begun_ && !search_.empty())
+    if (report = begin(); !report.ok()) return report;
+  const detail::Node from = node();
+  if (report = read(from, t, sample); !report.ok() || search_.empty()) return report;
+  const long before = acts_;
+  report = look(from, sample);
+  reached = !stopped_ && acts_ == before;
+  return report;
+}
+
+/// For events from a node to a point; those that are met are made true.
+template <class Stepper>
+StepReport EventSteps<Stepper>::look(const detail::Node& from, const Sample& point) {
+  const auto between = [&](double t, Sample& sample) { return read(from, t, sample); };
+  if (StepReport report = search_.see(point, between); !report.ok()) {
+    if (report.failure.empty()) report.failure = describe(report.solve.status);
+    report.failure = "looking for events before t = " + to_text(point.time) + ": " + report.failure;
+    return report;
+  }
+  if (search_.met().empty()) return {};
+  const auto acts = [&](const EventHit& hit) { return events()[hit.event].acts(); };
+  if (std::ranges::any_of(search_.met(), acts)) return act(std::move(search_.met()));
+  for (EventHit& hit : search_.met()) {
+    stopped_ = stopped_ || events()[hit.event].stop;
+    hits_.push_back(std::move(hit));
+    if (stopped_) break;
+  }
+  return {};
+}
+
+/// Makes events true that were met; those at the end are of one time.
+template <class Stepper>
+StepReport EventSteps<Stepper>::act(std::vector<EventHit> met) {
+  std::vector<EventSearch::Left> left;
+  int made = 0;
+  while (!met.empty()) {
+    for (EventHit& hit : met) {
+      const Event& event = events()[hit.event];
+      stopped_ = stopped_ || event.stop;
+      if (!event.acts()) {
+        hits_.push_back(std::move(hit));
+        continue;
+      }
+      if (++made > most_at_once)
+        return failed("more than 100 events act at t = " + to_text(hit.sample.time, 10) + ", the last '" +
+                      event.name + "': they call each other, and no time passes");
+      if (made > 1)  // at the same time: it sees what the others made
+        if (const SolveReport solve = sample(hit.sample); !solve.ok()) return failed(describe(solve.status));
+      if (StepReport report = make_true(std::move(hit), left); !report.ok()) return report;
+    }
+    met.clear();
+    const Sample& here = after_;
+    for (const std::size_t k : search_.at_zero()) add_left(k, left);
+    for (const std::size_t k : search_.go_on(here, left, actions_.awake()))
+      if (!events()[k].condition || events()[k].condition(here.point()) > 0.0) met.push_back({k, here});
+  }
+  return {};
+}
+
+/// Another event whose function of the configuration vanishes there as well.
+template <class Stepper>
+void EventSteps<Stepper>::add_left(std::size_t number, std::vector<EventSearch::Left>& left) const {
+  constexpr double round_off = 1e-12;
+  const Event& event = events()[number];
+  if (!event.contact || std::ranges::find(left, number, &EventSearch::Left::event) != left.end()) return;
+  const double rate = EventActions::contact_rate(event, after_);
+  if (std::abs(rate) > round_off * after_.v.template lpNorm<Eigen::Infinity>())
+    left.push_back({number, rate});
+}
+
+template <class Stepper>
+StepReport EventSteps<Stepper>::make_true(EventHit hit, std::vector<EventSearch::Left>& left) {
+  const Event& event = events()[hit.event];
+  const double t = hit.sample.time;
+  stepper().restart(t, hit.sample.q, hit.sample.p, hit.sample.v);  // where the motion ends if it cannot act
+  if (const double when = zeno_[hit.event].met(t, std::abs(t - began_at_)); std::isfinite(when))
+    return failed("event '" + event.name +
+                  "' is met ever faster and infinitely often before t = " + to_text(when, 10) +
+                  " (Zeno), which steps cannot pass; let a second event, with a condition on the speed, end "
+                  "it: set, or on = [a row that keeps the contact]");
+  EventActions::Outcome outcome = actions_.act(event, hit.sample, scene());
+  if (!outcome.failure.empty()) return failed(outcome.failure);
+  if (outcome.switched) {
+    const auto known = modes_.find(actions_.on());
+    if (known == modes_.end() || !known->second.stepper) try {
+        take(actions_.scene_from(t, outcome.q, outcome.v));
+      } catch (const Misuse& misuse) {
+        return failed("event '" + event.name + "' at t = " + to_text(t, 10) + ": " + misuse.what());
+      }
+    else
+      current_ = &known->second;
+  }
+  stepper().restart(t, outcome.q, outcome.p, outcome.v);
+  acted_ = true;
+  if (event.restitution && event.on.empty()) {
+    std::erase_if(left, [&](const EventSearch::Left& other) { return other.event == hit.event; });
+    left.push_back({hit.event, outcome.rate});
+  }
+  hit.impulse = outcome.impulse;
+  ++acts_;
+  if (const SolveReport solve = sample(after_); !solve.ok())
+    return failed("reading the state after event '" + event.name + "': " + describe(solve.status));
+  hit.after = after_;
+  hits_.push_back(std::move(hit));
+  return {};
+}
+
+template <class Stepper>
+Work EventSteps<Stepper>::work() const {
+  Work work;
+  for (const auto& [on, mode] : modes_)
+    if (mode.stepper) work.add(mode.stepper->work());
+  if (Stepping::on_a_grid && !search_.empty()) work.steps = steps_;
+  return work;
+}
+
+template <class Stepper>
+void EventSteps<Stepper>::save(Snapshot& to) const {
+  if (search_.empty()) return stepper().save(to);
+  to.section("events");
+  to.put("begun", begun_);
+  to.put("steps to nodes", static_cast<double>(steps_));
+  to.put("began at", began_at_);
+  for (const bool on : actions_.on()) to.put("row is on", on);
+  const Start& start = scene().start;
+  to.put("start of the rows' time", start.time);
+  to.put("start of the rows' position", start.q);
+  to.put("start of the rows' velocity", start.v);
+  search_.save(to);
+  stepper().save(to);
+}
+
+template <class Stepper>
+void EventSteps<Stepper>::restore(SnapshotReader& from) {
+  if (search_.empty()) return stepper().restore(from);
+  from.section("events");
+  begun_ = from.flag("begun");
+  steps_ = from.whole_number("steps to nodes", 1L << 53);
+  began_at_ = from.number("began at");
+  std::vector<bool> on = actions_.on();
+  const std::vector<bool> at_start = on;
+  for (std::size_t r = 0; r < on.size(); ++r) on[r] = from.flag("row is on");
+  actions_.set_on(on);
+  Start start = scene().start;
+  start.time = from.number("start of the rows' time");
+  from.read("start of the rows' position", start.q);
+  from.read("start of the rows' velocity", start.v);
+  if (on != at_start) take(actions_.scene_from(start.time, start.q, start.v));
+  search_.restore(from, actions_.awake());
+  stepper().restore(from);
+}
+
+}  // namespace diracstep

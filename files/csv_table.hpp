@@ -1,0 +1,23 @@
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+namespace diracstep {
+
+/// Numbers in columns.
+struct CsvTable {
+  std::vector<std::string> names;  ///< of the columns; empty where the file begins with numbers
+  std::vector<std::vector<double>> lines;
+
+  /// The number of a column; throws Misuse for a name that is none, with the known ones.
+  std::size_t column(const std::string& name) const;
+};
+
+/// Reads numbers separated by commas, two columns or more, the same in each line; a first line that is none
+/// of numbers names the columns.  Empty lines and lines that begin with # are skipped.  Throws Misuse as
+/// read_file() does, and for anything else, with the line.
+CsvTable read_csv(const std::string& path, const std::string& what, std::size_t limit);
+
+}  // namespace diracstep
