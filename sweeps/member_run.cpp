@@ -5,7 +5,7 @@
 #include <diracstep/core/adaptive/damping_survey.hpp>
 #include <diracstep/core/adaptive/error_control.hpp>
 #include <diracstep/core/numerics/near_names.hpp>
-#include <diracstep/core/runs/event_search.hpp>
+#include <diracstep/core/runs/event_steps.hpp>
 #include <diracstep/core/runs/run.hpp>
 #include <diracstep/core/system/consistent_start.hpp>
 #include <diracstep/sweeps/member_run.hpp>
@@ -68,6 +68,13 @@ std::optional<Guesses> guesses(const CatalogueScene& entry, bool project,
     return std::ranges::find(flags, true) == flags.end();
   };
   return none(movable.q) && none(movable.v) ? std::nullopt : std::optional(movable);
+}
+
+MemberResult result_of(const std::string& failure, const std::string& doubt, const CatalogueScene& entry,
+                       const Sample& end, const Recorded& recorded) {
+  if (!failure.empty()) return {MemberResult::Status::failed, failure, end.time, {}};
+  return {doubt.empty() ? MemberResult::Status::ok : MemberResult::Status::doubted, doubt, end.time,
+          recorded.numbers(entry, end)};
 }
 
 void require_inputs(const CatalogueScene& entry, double end) {
@@ -172,32 +179,50 @@ MemberResult MemberRuns::take_steps(const CatalogueScene& entry) const {
   const StepGrid grid = fit_steps(start, *sweep_.end, std::copysign(sweep_.step, *sweep_.end - start));
   IntegratorOptions options = options_;
   options.step = grid.step;
-  Integrator integrator(entry.scene, registry_, solvers_, options);
-  RunChecks checks(integrator, grid.steps);
   Recorded recorded(sweep_, entry);
-  EventSearch search(entry.events, !entry.scene->lagrangian);
-  StepReport searched;
+  return entry.events.empty() ? run_without_events(entry, options, grid.steps, recorded)
+                              : run_through_events(entry, options, grid.steps, recorded);
+}
+
+MemberResult MemberRuns::run_without_events(const CatalogueScene& entry, const IntegratorOptions& options,
+                                            long steps, Recorded& recorded) const {
+  Integrator integrator(entry.scene, registry_, solvers_, options);
+  RunChecks checks(integrator, steps);
   Sample end;
   const auto see = [&](const Sample& node) {
-    if (!search.empty()) {
-      searched = search.see(node, [&](double t, Sample& between) {
-        return sample_at(integrator, t, Momentum::projected, between);
-      });
-      if (!searched.ok()) return false;
-    }
-    end = search.stopped() ? search.hits().back().sample : node;
-    recorded.see(entry, end);
-    return !search.stopped();
+    recorded.see(entry, node);
+    end = node;
+    return true;
   };
-  const bool every_point = recorded.needs_every_point() || !search.empty();
-  const RunReport report =
-      run_steps(integrator, grid.steps, Momentum::projected, every_point ? 1 : grid.steps, see, &checks);
-  for (const EventHit& hit : search.hits()) recorded.see_event(entry.events[hit.event].name, hit.sample.time);
-  const std::string failure = !report.ok() ? report.last.failure : searched.failure;
-  if (!failure.empty()) return {MemberResult::Status::failed, failure, end.time, {}};
-  const std::string doubt = checks.text();
-  return {doubt.empty() ? MemberResult::Status::ok : MemberResult::Status::doubted, doubt, end.time,
-          recorded.numbers(entry, end)};
+  const RunReport report = run_steps(integrator, steps, Momentum::projected,
+                                     recorded.needs_every_point() ? 1 : steps, see, &checks);
+  return result_of(report.last.failure, checks.text(), entry, end, recorded);
+}
+
+/// Without the checks of a run: those of steps between events say little of the whole.
+MemberResult MemberRuns::run_through_events(const CatalogueScene& entry, const IntegratorOptions& options,
+                                            long steps, Recorded& recorded) const {
+  EventSteps<Integrator> motion(entry.scene, entry.all_rows, entry.events, solvers_, Momentum::projected,
+                                [&](const std::shared_ptr<const Scene>& scene) {
+                                  return std::make_unique<Integrator>(scene, registry_, solvers_, options);
+                                });
+  Sample end;
+  SolveReport read = motion.sample(end);
+  std::string failure;
+  for (long k = 0; k < steps && read.ok() && failure.empty() && !motion.stopped(); ++k) {
+    recorded.see(entry, end);
+    failure = motion.step().failure;
+    if (failure.empty() && !motion.stopped()) read = motion.sample(end);
+  }
+  if (failure.empty() && !read.ok()) failure = std::string("reading a point: ") + describe(read.status);
+  for (const EventHit& hit : motion.hits()) {
+    recorded.see(entry, hit.sample);
+    recorded.see_event(entry.events[hit.event].name, hit.sample.time);
+  }
+  if (motion.stopped())
+    end = motion.hits().back().after ? *motion.hits().back().after : motion.hits().back().sample;
+  recorded.see(entry, end);
+  return result_of(failure, "", entry, end, recorded);
 }
 
 MemberResult MemberRuns::search(const CatalogueScene& entry) const {

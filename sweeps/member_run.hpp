@@ -39,6 +39,10 @@ class MemberRuns {
   CatalogueScene scene_of(long number) const;
   MemberResult take(long number) const;
   MemberResult take_steps(const CatalogueScene& entry) const;
+  MemberResult run_without_events(const CatalogueScene& entry, const IntegratorOptions& options, long steps,
+                                  Recorded& recorded) const;
+  MemberResult run_through_events(const CatalogueScene& entry, const IntegratorOptions& options, long steps,
+                                  Recorded& recorded) const;
   MemberResult search(const CatalogueScene& entry) const;
   void take_recommendation();
   void choose_method();

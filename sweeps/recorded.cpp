@@ -15,7 +15,7 @@ std::vector<std::string> trajectory_columns(const CatalogueScene& entry) {
   std::vector<std::string> names = entry.scene->coordinates;
   for (const char* prefix : {"v_", "p_"})
     for (const std::string& name : entry.scene->coordinates) names.push_back(prefix + name);
-  for (const std::string& name : entry.scene->row_names()) names.push_back("lambda_" + name);
+  for (const std::string& name : entry.shown().row_names()) names.push_back("lambda_" + name);
   names.emplace_back("energy");
   for (const Invariant& invariant : entry.invariants) names.push_back("invariant_" + invariant.name);
   for (const Output& output : entry.outputs) names.push_back(output.name);
@@ -38,7 +38,7 @@ RecordedValue::RecordedValue(const CatalogueScene& entry, const std::string& nam
         "; there are its coordinates x, v_x, p_x, lambda_ROW, energy, invariant_NAME and its outputs");
   auto at = static_cast<std::size_t>(found - names.begin());
   const auto n = static_cast<std::size_t>(entry.scene->dimension());
-  const auto m = static_cast<std::size_t>(entry.scene->rows());
+  const auto m = static_cast<std::size_t>(entry.shown().rows());
   const std::pair<From, std::size_t> parts[] = {{From::position, n},
                                                 {From::velocity, n},
                                                 {From::momentum, n},
@@ -72,7 +72,7 @@ double RecordedValue::at(const CatalogueScene& entry, const Sample& sample) cons
     case From::invariant:
       return entry.invariants[index_].at(sample.time, sample.q, second(entry, sample));
     case From::output:
-      return entry.outputs[index_].at(sample.time, sample.q, second(entry, sample));
+      return entry.outputs[index_].at(sample.point());
   }
   return unmet;
 }
