@@ -135,7 +135,7 @@ void run_fixed(const RunArguments& options, const CatalogueScene& entry, const S
   std::optional<RunSensitivities> derivatives;
   if (!options.sensitivities.empty())
     derivatives.emplace(names("--sensitivities", options.sensitivities), options.scene,
-                        parameters(options.set), entry, session.registry, integrator);
+                        parameters(options.set), entry, session.registry, motion.stepper());
   open_trajectory(file, options, entry, saved, derivatives ? derivatives->columns() : std::vector<Output>{});
   if (file) keeping.file = &*file;
   if (derivatives) keeping.sensitivities = &*derivatives;
