@@ -5,6 +5,8 @@
 #include <diracstep/command/arguments.hpp>
 #include <diracstep/command/session.hpp>
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/scene_format/scene_file.hpp>
+#include <optional>
 
 namespace diracstep::command {
 
@@ -34,26 +36,31 @@ void load(Session& session, const std::filesystem::path& file) {
   session.plugins.push_back(std::move(plugin));
 }
 
-CatalogueScene made(const Session& session, const std::string& name, const Parameters& changes) {
-  for (const Plugin& plugin : session.plugins) {
-    if (std::ranges::find(plugin.scenes(), name) == plugin.scenes().end()) continue;
-    if (!changes.empty())
-      throw Misuse(fmt::format("scene '{}' of plugin '{}' has no parameter '{}'; it has none", name,
-                               plugin.name(), changes.begin()->first));
-    const PluginScene brought = plugin.scene(name);
-    CatalogueScene scene;
-    scene.scene = brought.scene;
-    scene.kind = "plugin";
-    scene.description = brought.description;
-    scene.source = "plugin " + plugin.name();
-    scene.t_end = brought.end_time;
-    scene.natural_step = brought.step;
-    scene.recommended.step = brought.step;
-    scene.recommended.end = brought.end_time;
-    scene.code = "callbacks of the plugin";
-    return scene;
-  }
-  return ::diracstep::make_scene(name, changes);
+/// The one that brings a scene; null where it is of the catalogue or a file.
+const Plugin* plugin_with(const Session& session, const std::string& scene) {
+  const auto has = [&](const Plugin& plugin) {
+    return std::ranges::find(plugin.scenes(), scene) != plugin.scenes().end();
+  };
+  const auto found = std::ranges::find_if(session.plugins, has);
+  return found == session.plugins.end() ? nullptr : &*found;
+}
+
+CatalogueScene scene_of(const Plugin& plugin, const std::string& name, const Parameters& changes) {
+  if (!changes.empty())
+    throw Misuse(fmt::format("scene '{}' of plugin '{}' has no parameter '{}'; it has none", name,
+                             plugin.name(), changes.begin()->first));
+  const PluginScene brought = plugin.scene(name);
+  CatalogueScene scene;
+  scene.scene = brought.scene;
+  scene.kind = "plugin";
+  scene.description = brought.description;
+  scene.source = "plugin " + plugin.name();
+  scene.t_end = brought.end_time;
+  scene.natural_step = brought.step;
+  scene.recommended.step = brought.step;
+  scene.recommended.end = brought.end_time;
+  scene.code = "callbacks of the plugin";
+  return scene;
 }
 
 }  // namespace
@@ -79,15 +86,21 @@ std::vector<std::string> scene_names(const Session& session) {
   return names;
 }
 
-CatalogueScene scene_as_asked(const Session& session, const std::string& name, const Parameters& changes) {
-  CatalogueScene entry = made(session, name, changes);
-  if (session.drop_redundant_rows) drop_redundant_rows(entry);
-  set_tolerances(entry, parameters(session.tolerances, "--tolerance"));
-  return entry;
+std::function<CatalogueScene(const Parameters&)> scene_maker(const Session& session,
+                                                             const std::string& name) {
+  std::optional<SceneFile> file;
+  const Plugin* const plugin = plugin_with(session, name);
+  if (plugin == nullptr) file.emplace(scene_source(name));
+  return [&session, name, plugin, file](const Parameters& changes) {
+    CatalogueScene entry = file ? file->load(changes) : scene_of(*plugin, name, changes);
+    if (session.drop_redundant_rows) drop_redundant_rows(entry);
+    set_tolerances(entry, parameters(session.tolerances, "--tolerance"));
+    return entry;
+  };
 }
 
 CatalogueScene make_scene(const Session& session, const std::string& name, const Parameters& changes) {
-  CatalogueScene entry = scene_as_asked(session, name, changes);
+  CatalogueScene entry = scene_maker(session, name)(changes);
   for (const std::string& change : entry.changes) say(entry.scene->name + ": " + change);
   return entry;
 }

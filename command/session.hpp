@@ -6,6 +6,7 @@
 #include <diracstep/plugins/loaded_plugin.hpp>
 #include <diracstep/scene_format/scene_catalogue.hpp>
 #include <diracstep/solvers/direct_solver.hpp>
+#include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -45,8 +46,8 @@ void load_plugins(Session& session);
 /// Misuse as diracstep::make_scene does.
 CatalogueScene make_scene(const Session& session, const std::string& name, const Parameters& changes = {});
 
-/// The same, and nothing is told.
-CatalogueScene scene_as_asked(const Session& session, const std::string& name, const Parameters& changes);
+/// Makes such scenes with many values of the parameters, and tells nothing.  The session must outlive it.
+std::function<CatalogueScene(const Parameters&)> scene_maker(const Session& session, const std::string& name);
 
 /// Names of the catalogue's scenes and of those of plugins.
 std::vector<std::string> scene_names(const Session& session);

@@ -51,8 +51,7 @@ namespace {
 
 /// The text of a scene by its name or the path of its file.
 std::string text_of_scene(const std::string& name) {
-  if (is_scene_file(name))
-    return read_file(name, "the scene file", scene_compiler::size_limits().file_bytes);
+  if (is_scene_file(name)) return read_file(name, "the scene file", scene_compiler::size_limits().file_bytes);
   std::string known;
   for (const ShippedScene& scene : shipped_scenes()) {
     if (scene.name == name) return {reinterpret_cast<const char*>(scene.text), scene.size};
@@ -65,8 +64,10 @@ std::string text_of_scene(const std::string& name) {
 }  // namespace
 
 CatalogueScene make_scene(const std::string& name, const Parameters& changes) {
-  return scene_from_text(name, text_of_scene(name), changes);
+  return scene_source(name).load(changes);
 }
+
+SceneFile scene_source(const std::string& name) { return {name, text_of_scene(name)}; }
 
 ParametricScene parametric_scene(const std::string& name, const CatalogueScene& entry,
                                  const std::vector<std::string>& parameters, const Parameters& changes) {

@@ -16,6 +16,7 @@
 #include <diracstep/sensitivities/moved_start.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
 #include <limits>
+#include <mutex>
 
 namespace diracstep {
 
@@ -395,11 +396,9 @@ void require_inputs_over_span(const SceneProgram& program, double start) {
                         input.name, input.times.front(), input.times.back(), t));
 }
 
-CatalogueScene load(const std::string& file, const std::string& text, const Parameters& changes,
-                    bool as_written) {
-  auto program = compile_scene(file, text, as_written);
-  ParameterValues values = parameter_values(program->document, changes);
-  const LoadedScenePtr loaded = std::make_shared<const LoadedScene>(std::move(program), std::move(values));
+CatalogueScene load(const std::shared_ptr<const CompiledScene>& compiled, const Parameters& changes) {
+  ParameterValues values = parameter_values(compiled->program->document, changes);
+  const LoadedScenePtr loaded = std::make_shared<const LoadedScene>(compiled, std::move(values));
   const SceneDocument& document = loaded->program->document;
   StatedStart stated = start_of(*loaded);
   require_inputs_over_span(*loaded->program, stated.start.time);
@@ -481,9 +480,10 @@ void move_start(const LoadedScene& loaded, const CatalogueScene& entry, Parametr
 ParametricScene load_parametric(const std::string& file, const std::string& text, const CatalogueScene& entry,
                                 const std::vector<std::string>& parameters, const Parameters& changes,
                                 bool as_written) {
-  auto program = compile_scene(file, text, as_written, parameters);
-  ParameterValues values = parameter_values(program->document, changes);
-  const LoadedScenePtr loaded = std::make_shared<const LoadedScene>(std::move(program), std::move(values));
+  const auto compiled =
+      std::make_shared<const CompiledScene>(compile_scene(file, text, as_written, parameters));
+  ParameterValues values = parameter_values(compiled->program->document, changes);
+  const LoadedScenePtr loaded = std::make_shared<const LoadedScene>(compiled, std::move(values));
   ParametricScene result{entry.scene, nullptr};
   result.parameters.resize(static_cast<Eigen::Index>(parameters.size()));
   for (std::size_t k = 0; k < parameters.size(); ++k)
@@ -522,12 +522,32 @@ ParametricScene parametric_scene_from_text(const std::string& file, const std::s
   }
 }
 
-CatalogueScene scene_from_text(const std::string& file, const std::string& text, const Parameters& changes) {
+struct SceneFile::Compiled {
+  std::string file, text;
+  std::shared_ptr<const CompiledScene> usual, as_written;
+  std::once_flag written;  ///< the latter, made where some values need it
+};
+
+SceneFile::SceneFile(std::string file, std::string text) : compiled_(std::make_shared<Compiled>()) {
+  compiled_->file = std::move(file);
+  compiled_->text = std::move(text);
+  compiled_->usual = std::make_shared<const CompiledScene>(compile_scene(compiled_->file, compiled_->text));
+}
+
+CatalogueScene SceneFile::load(const Parameters& changes) const {
   try {
-    return load(file, text, changes, false);
+    return diracstep::load(compiled_->usual, changes);
   } catch (const ConstantOutOfRange&) {
-    return load(file, text, changes, true);
+    std::call_once(compiled_->written, [&] {
+      compiled_->as_written =
+          std::make_shared<const CompiledScene>(compile_scene(compiled_->file, compiled_->text, true));
+    });
+    return diracstep::load(compiled_->as_written, changes);
   }
+}
+
+CatalogueScene scene_from_text(const std::string& file, const std::string& text, const Parameters& changes) {
+  return SceneFile(file, text).load(changes);
 }
 
 CatalogueScene scene_from_file(const std::string& path, const Parameters& changes) {

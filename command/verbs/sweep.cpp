@@ -118,9 +118,7 @@ void sweep(const SweepArguments& arguments, Session& session) {
   options.threads = arguments.threads;
   options.goes_on = [] { return !interrupted(); };
   catch_interrupts();
-  const auto scene = [&](const Parameters& changes) {
-    return scene_as_asked(session, wanted.scene, changes);
-  };
+  const auto scene = scene_maker(session, wanted.scene);
   const SweepReport report = shared(options, session.processes, [&] {
     return run_sweep(wanted, scene, session.registry, session.solvers, options);
   });

@@ -12,12 +12,13 @@ double constant(const SceneProgram& program, long double value) {
   return rounded;
 }
 
-LoadedScene::LoadedScene(std::unique_ptr<const SceneProgram> compiled, ParameterValues values)
-    : program(std::move(compiled)),
+LoadedScene::LoadedScene(std::shared_ptr<const CompiledScene> scene, ParameterValues values)
+    : compiled(std::move(scene)),
+      program(compiled->program.get()),
+      library(compiled->library),
+      stage_kernels(compiled->stage_kernels),
       parameters(std::move(values)),
-      layout(*program, parameters),
-      library(kernel_library(*program)),
-      stage_kernels(*program, library) {
+      layout(*program, parameters) {
   Evaluator evaluator(*program, parameters, program->known.nodes());
   evaluator.evaluate();
   for (std::size_t i = 0; i < program->known.nodes().size(); ++i)

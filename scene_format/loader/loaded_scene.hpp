@@ -14,17 +14,27 @@ struct ConstantOutOfRange {};
 /// The value as a double.  Throws ConstantOutOfRange where it loses its size, unless formulas are as written.
 double constant(const scene_compiler::SceneProgram& program, long double value);
 
-/// A scene file with its parameters set: all that its functions share.
-struct LoadedScene {
-  LoadedScene(std::unique_ptr<const scene_compiler::SceneProgram> compiled,
-              scene_compiler::ParameterValues values);
+/// A scene file compiled: what does not depend on the values of its parameters.
+struct CompiledScene {
+  explicit CompiledScene(std::unique_ptr<const scene_compiler::SceneProgram> scene)
+      : program(std::move(scene)), library(kernel_library(*program)), stage_kernels(*program, library) {}
 
   std::unique_ptr<const scene_compiler::SceneProgram> program;
+  KernelLibrary library;
+  StageKernelLibrary stage_kernels;
+};
+
+/// A scene file with its parameters set: all that its functions share.
+struct LoadedScene {
+  LoadedScene(std::shared_ptr<const CompiledScene> scene, scene_compiler::ParameterValues values);
+
+  std::shared_ptr<const CompiledScene> compiled;
+  const scene_compiler::SceneProgram* program;  ///< that of `compiled`, as the two below
+  const KernelLibrary& library;
+  const StageKernelLibrary& stage_kernels;
   scene_compiler::ParameterValues parameters;
   CoordinateLayout layout;
   std::vector<double> known;  ///< subexpressions of the parameters alone
-  KernelLibrary library;
-  StageKernelLibrary stage_kernels;
 };
 using LoadedScenePtr = std::shared_ptr<const LoadedScene>;
 
