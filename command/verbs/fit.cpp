@@ -34,7 +34,7 @@ struct FitArguments {
   bool json = false;
 };
 
-std::vector<std::string_view> cells(std::string_view line) {
+std::vector<std::string_view> fields_of(std::string_view line) {
   std::vector<std::string_view> parts;
   for (std::size_t begin = 0; begin <= line.size();) {
     const std::size_t end = std::min(line.find(',', begin), line.size());
@@ -73,7 +73,7 @@ Table read_table(const std::string& path) {
     begin = end + 1;
     ++number_of_line;
     if (line.empty() || line == "\r" || line.front() == '#') continue;
-    const auto parts = cells(line);
+    const auto parts = fields_of(line);
     if (table.names.empty()) {
       table.names.assign(parts.begin(), parts.end());
       continue;
