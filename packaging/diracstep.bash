@@ -13,7 +13,7 @@ _diracstep() {
     --momentum) words="plus minus projected" ;;
     --jacobian) words="automatic fresh per-step kept" ;;
     --solver) words="newton fixed-point automatic direct" ;;
-    --out | --plugin | --checkpoint | --resume | --compare) compopt -o default 2>/dev/null && return ;;
+    --out | --residuals | --plugin | --checkpoint | --resume | --compare) compopt -o default 2>/dev/null && return ;;
     *)
       case "$cur,$verb" in
         -*,*) words="$(diracstep ${verb:+"$verb"} --help 2>/dev/null | grep -o -e '--[a-z][a-z-]*' | sort -u)" ;;
