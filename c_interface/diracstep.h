@@ -266,6 +266,28 @@ DIRACSTEP_API int diracstep_solve(const diracstep_model *model, const diracstep_
                                   const diracstep_course *course, const diracstep_error *error,
                                   diracstep_points *points, diracstep_found *found);
 
+/* ---- Derivatives of a motion (docs/sensitivities.md) ---- */
+
+/* Of the end of a motion from where the integrator stands, by q0, by v0 with p0 = dL/dv, and by P parameters
+ * of the scene, which move its start as its file says.  Arrays that are NULL are not written. */
+typedef struct diracstep_derivatives {
+  long steps;                   /* that are taken */
+  int parameters;               /* P … */
+  const char *const *parameter; /* … and their names */
+  /* Without a cotangent: n x (2n + P), column by column: those of the end's q, v and projected p by q0, by v0
+   * and by the parameters. */
+  /* With one, for a function of the end: n numbers by q0 in `q`, n by v0 in `v`, and P in `by_parameters`. */
+  double *q, *v, *p, *by_parameters;
+  /* Writes the derivatives of the function by q, v and p at the end, zeros at first; 0, or else it fails. */
+  int (*cotangent)(void *data, const diracstep_state *end, double *q, double *v, double *p);
+  void *data;
+} diracstep_derivatives;
+
+/* Takes the steps and differentiates them.  Of steps of fixed size, without a pushed force, and of an
+ * integrator that was made with this model. */
+DIRACSTEP_API int diracstep_differentiate(const diracstep_model *model, diracstep_integrator *integrator,
+                                          const diracstep_derivatives *derivatives);
+
 /* ---- Ensembles ---- */
 
 /* Many starts of one scene, each of them consistent. */

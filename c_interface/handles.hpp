@@ -20,6 +20,8 @@ struct diracstep_model {
   std::vector<diracstep::Plugin> plugins;
   diracstep::CatalogueScene entry;                ///< its scene as given; null in a model for lists
   std::shared_ptr<const diracstep::Scene> scene;  ///< completed
+  std::string name, text;                         ///< what the scene was made from, where it is from a file
+  diracstep::Parameters changes;
 };
 
 /// Steps of fixed size or of varying size, and what the last run's checks found.

@@ -110,6 +110,9 @@ int diracstep_open(unsigned version, const diracstep_source* source, diracstep_m
     add_plugins(*made, from);
     if (has_scene(from)) {
       made->entry = scene_of(*made, from);
+      made->name = from.name != nullptr ? from.name : "text";
+      if (from.text != nullptr) made->text = from.text;
+      made->changes = named_values(from.parameters, from.parameter, "parameter");
       if (from.drop_redundant != 0) drop_redundant_rows(made->entry);
       set_tolerances(made->entry, named_values(from.tolerances, from.tolerance, "tolerance"));
       made->scene = completed(made->entry.scene);

@@ -2,6 +2,7 @@
 
 #include <CLI/App.hpp>
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <diracstep/command/arguments.hpp>
@@ -34,7 +35,7 @@ struct FitArguments {
   bool json = false;
 };
 
-std::vector<std::string_view> cells(std::string_view line) {
+std::vector<std::string_view> fields_of(std::string_view line) {
   std::vector<std::string_view> parts;
   for (std::size_t begin = 0; begin <= line.size();) {
     const std::size_t end = std::min(line.find(',', begin), line.size());
@@ -73,7 +74,7 @@ Table read_table(const std::string& path) {
     begin = end + 1;
     ++number_of_line;
     if (line.empty() || line == "\r" || line.front() == '#') continue;
-    const auto parts = cells(line);
+    const auto parts = fields_of(line);
     if (table.names.empty()) {
       table.names.assign(parts.begin(), parts.end());
       continue;
@@ -88,8 +89,13 @@ Table read_table(const std::string& path) {
   return table;
 }
 
-/// The columns that are coordinates or velocities v_NAME; momenta, forces and the energy of a trajectory are
-/// left alone, any other name is a mistake.
+/// Columns of a trajectory that nothing is fitted to.
+bool is_left_alone(const std::string& name) {
+  return name == "energy" || std::ranges::any_of(std::array{"p_", "lambda_", "invariant_", "d("},
+                                                 [&](const char* start) { return name.starts_with(start); });
+}
+
+/// The columns that are coordinates or velocities v_NAME; any other name is a mistake.
 FitData data_of(const Table& table, const std::string& path, const Scene& scene, const Parameters& sigma) {
   if (table.names.front() != "t")
     throw Misuse(fmt::format("'{}': the first column is '{}'; expected t", path, table.names.front()));
@@ -103,7 +109,7 @@ FitData data_of(const Table& table, const std::string& path, const Scene& scene,
     const std::string& name = table.names[c];
     const auto found = std::ranges::find(known, name);
     if (found == known.end()) {
-      if (name == "energy" || name.starts_with("p_") || name.starts_with("lambda_")) continue;
+      if (is_left_alone(name)) continue;
       throw Misuse(fmt::format("'{}': the column '{}' is no coordinate or velocity of scene '{}'{}", path,
                                name, scene.name, did_you_mean(name, known)));
     }

@@ -11,6 +11,7 @@ FOLDERS = {
     "core": "The mathematics of one step. Sees Eigen only.",
     "constraints": "Rows from formulas, circuits, and systems joined by rows.",
     "solvers": "SUNDIALS KINSOL behind the interface of a nonlinear solver.",
+    "sensitivities": "Derivatives of a motion by its start and by parameters, and fits.",
     "plugins": "The interface of plugins in C and C++, and what loads them.",
     "c_interface": "DiracStep for other languages.",
     "scene_format": "Scenes from text files, and the catalogue.",

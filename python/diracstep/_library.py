@@ -166,6 +166,14 @@ class Ensemble(Structure):
                 ("momentum", c_int), ("threads", c_int), ("stop", POINTER(c_int))]
 
 
+COTANGENT = CFUNCTYPE(c_int, c_void_p, POINTER(State), Numbers, Numbers, Numbers)
+
+
+class Derivatives(Structure):
+    _fields_ = [("steps", c_long), ("parameters", c_int), ("parameter", POINTER(c_char_p)), ("q", c_void_p),
+                ("v", c_void_p), ("p", c_void_p), ("by_parameters", c_void_p), ("cotangent", COTANGENT), ("data", c_void_p)]
+
+
 # Handles and columns go as plain addresses: a call then costs a fraction of a microsecond.
 _PROTOTYPES: dict[str, tuple[Any, list[Any]]] = {
     "message": (c_char_p, []),
@@ -187,6 +195,7 @@ _PROTOTYPES: dict[str, tuple[Any, list[Any]]] = {
     "restore": (c_int, [c_void_p, c_char_p, c_size_t]),
     "doubt": (c_char_p, [c_void_p]),
     "read_statistics": (c_int, [c_void_p, POINTER(Statistics)]),
+    "differentiate": (c_int, [c_void_p, c_void_p, POINTER(Derivatives)]),
     "run": (c_int, [c_void_p, POINTER(Course), POINTER(Points)]),
     "expect": (c_long, [c_void_p, POINTER(Course)]),
     "solve": (c_int, [c_void_p, POINTER(Options), POINTER(Course), POINTER(ErrorRequest), POINTER(Points),

@@ -6,7 +6,7 @@ import ctypes
 import threading
 import time
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn, Sequence
 
 import numpy as np
 
@@ -33,6 +33,25 @@ class State:
     p: np.ndarray  #: n numbers, the representative asked for
     lambda_: np.ndarray  #: m numbers: forces of the rows
     energy: float
+
+
+@dataclass(frozen=True, eq=False)
+class Jacobian:
+    """Derivatives of the end of a motion, one column for each of ``inputs``."""
+
+    inputs: tuple[str, ...]  #: "x(0)", "v_x(0)", and parameters
+    q: np.ndarray  #: n rows
+    v: np.ndarray  #: n rows
+    p: np.ndarray  #: n rows, of the projected momentum
+
+
+@dataclass(frozen=True, eq=False)
+class Gradient:
+    """Derivatives of a function of the end of a motion by its start and by parameters."""
+
+    q: np.ndarray  #: n numbers
+    v: np.ndarray  #: n numbers, with q held
+    parameters: dict[str, float]
 
 
 class Integrator:
@@ -103,6 +122,64 @@ class Integrator:
         with self._lock:
             self._check(c.lib.read(self._handle, momentum_from(momentum), ctypes.byref(read)))
         return State(read.time, q, v, p, force, read.energy)
+
+    def jacobian(self, steps: int, parameters: Sequence[str] = ()) -> Jacobian:
+        """Takes so many steps; the exact derivatives of their end by q, by v and by parameters of the scene where they began.
+
+        Parameters move the start as the scene's file says.
+        """
+        n, wanted = len(self.scene._coordinates), self._derivatives(steps, parameters)
+        inputs = 2 * n + len(parameters)
+        arrays = {name: np.empty((inputs, n)) for name in "qvp"}
+        for name, array in arrays.items():
+            setattr(wanted, name, array.ctypes.data)
+        self._differentiate(wanted)
+        names = [*(f"{name}(0)" for name in self.scene._coordinates), *(f"v_{name}(0)" for name in self.scene._coordinates),
+                 *parameters]
+        return Jacobian(tuple(names), **{name: array.T for name, array in arrays.items()})
+
+    def gradient(self, steps: int, cotangent: Any, parameters: Sequence[str] = ()) -> Gradient:
+        """Takes so many steps; the exact derivatives of a function of their end, by the adjoint: one way back, whatever the
+        number of parameters.
+
+        cotangent: the derivatives of the function by the end, a dict of arrays "q", "v" and "p" where they are not zero; or a
+        function that gives it for the end, a ``State``.
+        """
+        n, m = len(self.scene._coordinates), len(self.scene._rows)
+        kept = c.KeptException()
+
+        def write(_: Any, end: Any, q: Any, v: Any, p: Any) -> int:
+            try:
+                at = end.contents
+                numbers = [np.ctypeslib.as_array(ctypes.cast(address, c.Numbers), (size,)).copy() if size else np.empty(0)
+                           for address, size in ((at.q, n), (at.v, n), (at.p, n), (at.lambda_, m))]
+                given = cotangent(State(at.time, *numbers, at.energy)) if callable(cotangent) else cotangent
+                for name, to in (("q", q), ("v", v), ("p", p)):
+                    if name in given:
+                        np.ctypeslib.as_array(to, (n,))[:] = column(given[name], self.scene._coordinates, name)
+                return 0
+            except BaseException as error:  # noqa: BLE001  raised below
+                return kept.keep(error)
+
+        wanted = self._derivatives(steps, parameters)
+        q, v, by_parameters = np.empty(n), np.empty(n), np.empty(len(parameters))
+        wanted.q, wanted.v, wanted.by_parameters = q.ctypes.data, v.ctypes.data, by_parameters.ctypes.data
+        wanted.cotangent = c.COTANGENT(write)
+        try:
+            self._differentiate(wanted)
+        finally:
+            if (raised := kept.take()) is not None:
+                raise raised
+        return Gradient(q, v, dict(zip(parameters, by_parameters.tolist())))
+
+    @staticmethod
+    def _derivatives(steps: int, parameters: Sequence[str]) -> Any:
+        names = (ctypes.c_char_p * max(1, len(parameters)))(*(name.encode() for name in parameters))
+        return c.Derivatives(steps=whole(steps, "steps", 1), parameters=len(parameters), parameter=names)
+
+    def _differentiate(self, wanted: Any) -> None:
+        with self._lock:
+            self._check(c.lib.differentiate(self.scene._handle, self._handle, ctypes.byref(wanted)))
 
     def reset(self, q: Any = None, v: Any = None, t: float | None = None) -> None:
         """Starts anew: at the scene's start, or at a consistent point of one's own.  A column that is not given is the scene's;

@@ -1,5 +1,6 @@
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/sensitivities/detail/linear_factor.hpp>
+#include <vector>
 #ifdef DIRACSTEP_WITH_KLU
 #include <klu.h>
 #else
@@ -37,22 +38,33 @@ struct LinearFactor<Sparse>::Factors {
     klu_free_numeric(&numeric, &common);
     klu_free_symbolic(&symbolic, &common);
   }
+  /// The ordering is that of the pattern, which is the same from step to step.
+  void analyse(const Sparse& matrix, int* starts, int* rows) {
+    const std::vector<int> now_starts(starts, starts + matrix.outerSize() + 1),
+        now_rows(rows, rows + matrix.nonZeros());
+    klu_free_numeric(&numeric, &common);
+    if (symbolic != nullptr && now_starts == known_starts && now_rows == known_rows) return;
+    klu_free_symbolic(&symbolic, &common);
+    known_starts = now_starts;
+    known_rows = now_rows;
+    size = static_cast<int>(matrix.rows());
+    symbolic = klu_analyze(size, starts, rows, &common);
+    if (symbolic == nullptr) fail_singular();
+  }
 
   mutable klu_common common{};
   klu_symbolic* symbolic = nullptr;
   klu_numeric* numeric = nullptr;
   int size = 0;
+  std::vector<int> known_starts, known_rows;
 };
 
 void LinearFactor<Sparse>::compute(const Sparse& matrix) {
   Factors& f = *factors_;
-  f.clear();
-  f.size = static_cast<int>(matrix.rows());
   auto* const starts = const_cast<int*>(matrix.outerIndexPtr());  // KLU reads them only
   auto* const rows = const_cast<int*>(matrix.innerIndexPtr());
   auto* const values = const_cast<double*>(matrix.valuePtr());
-  f.symbolic = klu_analyze(f.size, starts, rows, &f.common);
-  if (f.symbolic == nullptr) fail_singular();
+  f.analyse(matrix, starts, rows);
   f.numeric = klu_factor(starts, rows, values, f.symbolic, &f.common);
   if (f.numeric == nullptr || f.common.status != KLU_OK) fail_singular();
 }

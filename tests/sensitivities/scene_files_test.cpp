@@ -103,21 +103,24 @@ TEST(SceneSensitivities, OfTheSleighAreThoseOfItsClosedForm) {
   }
 }
 
-/// l and c2 of the circuit by its closed form; the loop of c1 and c3 has a hidden row.
+/// All parameters of the circuit by its closed form; the loop of c1 and c3 has a hidden row.
 TEST(SceneSensitivities, OfADegenerateCircuitAreThoseOfItsClosedForm) {
   const double t = 2.0;
-  const auto current = [&](double l, double c2) {
-    const double w = std::sqrt((1.0 / c2 + 1.0 / 1.25) / l), amplitude = -1.0 / (l * w * w);
+  const Vector usual{{0.5, 1.0, 2.0, 0.25}};  // l, c1, c2, c3
+  const auto charge = [&](const Vector& x) {
+    const double both = x[1] + x[3], w = std::sqrt((1.0 / x[2] + 1.0 / both) / x[0]);
+    const double amplitude = -(1.0 + x[3] / x[1]) / (both * x[0] * w * w);
     return Vector{{amplitude * (1.0 - std::cos(w * t)), amplitude * w * std::sin(w * t)}};
   };
   const Derivatives found =
-      by_parameters("lc_circuit", {"l", "c2"}, {.method = "type1/gl:4", .step = 0.02}, 100);
-  const Vector by_l = difference([&](double d) { return current(0.5 + d, 2.0); }, 1e-3);
-  const Vector by_c2 = difference([&](double d) { return current(0.5, 2.0 + d); }, 1e-3);
-  EXPECT_NEAR(found.by.q(0, 0), by_l[0], 1e-10);
-  EXPECT_NEAR(found.by.v(0, 0), by_l[1], 1e-10);
-  EXPECT_NEAR(found.by.q(0, 1), by_c2[0], 1e-10);
-  EXPECT_NEAR(found.by.v(0, 1), by_c2[1], 1e-10);
+      by_parameters("lc_circuit", {"l", "c1", "c2", "c3"}, {.method = "type1/gl:4", .step = 0.02}, 100);
+  EXPECT_NEAR(found.end.q[0], charge(usual)[0], 1e-13);
+  for (int k = 0; k < 4; ++k) {
+    const Vector expected =
+        difference([&](double d) { return charge(usual + d * Vector::Unit(4, k)); }, 1e-3);
+    EXPECT_NEAR(found.by.q(0, k), expected[0], 1e-10) << "parameter " << k;
+    EXPECT_NEAR(found.by.v(0, k), expected[1], 1e-10) << "parameter " << k;
+  }
 }
 
 /// Order 2s: that of the motion.

@@ -44,8 +44,19 @@ TEST(RadauTableau, IsStifflyAccurateOfItsOrderForEveryNumberOfStages) {
   }
 }
 
+/// A holonomic scene with ∂²L/∂q∂v = 0, which a step need not look at.
+std::shared_ptr<const Scene> separable_on_sphere() {
+  Scene scene = *testing::holonomic_sphere();
+  scene.name = "separable, holonomic";
+  scene.lagrangian = lagrangian<3>([](const auto& q, const auto& v) {
+    return 0.5 * (v[0] * v[0] + v[1] * v[1] + 2.0 * v[2] * v[2]) - q[0] * q[0] * q[1] - q[2] * q[2];
+  });
+  return std::make_shared<const Scene>(scene);
+}
+
 TEST(RadauStep, JacobianAgreesWithDifferences) {
-  std::vector<std::shared_ptr<const Scene>> scenes{testing::driven(), laws::degenerate_circuit()};
+  std::vector<std::shared_ptr<const Scene>> scenes{testing::driven(), laws::degenerate_circuit(),
+                                                   separable_on_sphere()};
   for (const auto& plain : testing::every_constraint_class()) {
     scenes.push_back(plain);
     scenes.push_back(testing::forced(plain));

@@ -1,0 +1,105 @@
+#include <nlohmann/json.hpp>
+
+#include "run_command.hpp"
+
+/// run --sensitivities, and the verb fit.
+namespace diracstep::testing {
+namespace {
+
+using Json = nlohmann::json;
+
+class SensitivitiesOfRuns : public Command {
+ protected:
+  Json run_of(const std::string& arguments) const {
+    const Outcome outcome = run(arguments + " --json");
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+    return Json::parse(outcome.out);
+  }
+  double end_of_x(double a) const {
+    return run_of("run chaplygin_sleigh --end 2 --set a=" + std::to_string(a))["end"]["q"]["x"].get<double>();
+  }
+};
+
+TEST_F(SensitivitiesOfRuns, AreThoseOfDifferences) {
+  const Json json = run_of("run chaplygin_sleigh --end 2 --sensitivities a,v0,q0");
+  const double by_a = json["sensitivities"]["a"]["q"]["x"].get<double>();
+  EXPECT_NEAR(by_a, (end_of_x(0.201) - end_of_x(0.199)) / 0.002, 2e-4);
+  const Json& by_x = json["sensitivities"]["x(0)"];  // the motion does not depend on where it starts
+  EXPECT_NEAR(by_x["q"]["x"].get<double>(), 1.0, 1e-13);
+  EXPECT_NEAR(by_x["q"]["y"].get<double>(), 0.0, 1e-13);
+  EXPECT_NEAR(by_x["v"]["x"].get<double>(), 0.0, 1e-13);
+  EXPECT_TRUE(json["sensitivities"].contains("v_th(0)"));
+  EXPECT_EQ(json["end"], run_of("run chaplygin_sleigh --end 2")["end"]);  // the same bits
+}
+
+TEST_F(SensitivitiesOfRuns, StandInTheFilePointByPoint) {
+  const Outcome outcome =
+      run("run chaplygin_sleigh --end 1 --sensitivities a --json --out '" + path("sleigh.csv") + "'");
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  std::ifstream file(path("sleigh.csv"));
+  std::string header, line, last;
+  std::getline(file, header);
+  EXPECT_NE(header.find(",energy,d(x)/d(a),d(y)/d(a),d(th)/d(a),d(v_x)/d(a),"), std::string::npos) << header;
+  while (std::getline(file, line)) last = line;
+  std::vector<std::string> numbers;
+  for (std::istringstream fields(last); std::getline(fields, line, ',');) numbers.push_back(line);
+  ASSERT_GT(numbers.size(), 12u);
+  const Json by_a = Json::parse(outcome.out)["sensitivities"]["a"];
+  EXPECT_EQ(std::stod(numbers[12]), by_a["q"]["x"].get<double>());
+}
+
+TEST_F(SensitivitiesOfRuns, RefuseWhatTheyDoNotKnow) {
+  EXPECT_NE(run("run kepler_e06 --sensitivities nonsense").err.find("neither a parameter"),
+            std::string::npos);
+  for (const char* option : {"--adaptive", "--error 1e-3", "--at 1,2"}) {
+    const Outcome outcome = run(std::string("run kepler_e06 --sensitivities e ") + option);
+    EXPECT_EQ(outcome.status, 2) << option;
+  }
+}
+
+class FitVerb : public SensitivitiesOfRuns {
+ protected:
+  void SetUp() override {
+    Command::SetUp();
+    data_ = "'" + path("measured.csv") + "'";
+    const Outcome outcome = run("run chaplygin_sleigh --set a=0.22 --end 4 --every 5 --out " + data_);
+    ASSERT_EQ(outcome.status, 0) << outcome.err;
+  }
+  std::string data_;
+};
+
+TEST_F(FitVerb, FindsTheParametersOfARun) {
+  const Json json = run_of("fit chaplygin_sleigh " + data_ + " --parameters a,J --from a=0.3 --from J=0.2");
+  EXPECT_NEAR(json["parameters"]["a"]["value"].get<double>(), 0.22, 1e-12);
+  EXPECT_NEAR(json["parameters"]["J"]["value"].get<double>(), 0.1, 1e-12);
+  EXPECT_TRUE(json["converged"].get<bool>());
+  EXPECT_EQ(json["measured"], 17 * 6);
+  const Outcome outcome =
+      run("fit chaplygin_sleigh " + data_ + " --parameters a,J --residuals '" + path("left.csv") + "'");
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_NE(outcome.out.find("+- (95 %)"), std::string::npos) << outcome.out;
+  std::string header;
+  std::ifstream left(path("left.csv"));
+  std::getline(left, header);
+  EXPECT_EQ(header, "t,x,y,th,v_x,v_y,v_th");
+}
+
+TEST_F(FitVerb, RefusesDataThatAreNone) {
+  const auto refused = [&](const std::string& text, const std::string& message) {
+    std::ofstream(path("bad.csv")) << text;
+    const Outcome outcome = run("fit chaplygin_sleigh '" + path("bad.csv") + "' --parameters a");
+    EXPECT_EQ(outcome.status, 2) << text;
+    EXPECT_NE(outcome.err.find(message), std::string::npos) << outcome.err;
+  };
+  refused("t,z\n1,2\n", "no coordinate or velocity");
+  refused("x,t\n1,2\n", "expected t");
+  refused("t,x\n1,two\n", "not a number");
+  refused("t,x\n1\n", "fields");
+  refused("t,x\n", "no lines");
+  refused("t,x\n2,1\n1,1\n", "does not follow");
+  EXPECT_EQ(run("fit chaplygin_sleigh " + data_ + " --parameters mass").status, 2);
+  EXPECT_EQ(run("fit chaplygin_sleigh " + data_ + " --parameters a --sigma z=1").status, 2);
+}
+
+}  // namespace
+}  // namespace diracstep::testing
