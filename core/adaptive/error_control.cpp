@@ -128,6 +128,7 @@ ErrorControlReport solve_to_error(const std::shared_ptr<const Scene>& given, con
   report.reason = options.adaptive       ? "as asked for"
                   : damped               ? "by their local error, as the damping family allows"
                   : options.monitor.rate ? "a monitor is given"
+                  : !accelerates         ? "there are no accelerations to choose others by"
                                          : "max ω / min ω = " + to_text(survey.ratio(), 3);
   const bool may_pay = accelerates && !damped && survey.failure.empty() &&
                        (options.monitor.rate || survey.variable_steps_pay());

@@ -7,7 +7,6 @@
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/system/first_order_motions.hpp>
 #include <diracstep/core/system/hidden_rows.hpp>
-#include <diracstep/core/system/phase_space_velocity.hpp>
 #include <diracstep/core/system/saddle_point.hpp>
 #include <diracstep/solvers/detail/linear_solver.hpp>
 #include <diracstep/solvers/detail/shells.hpp>
