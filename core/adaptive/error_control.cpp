@@ -128,7 +128,7 @@ ErrorControlReport solve_to_error(const std::shared_ptr<const Scene>& given, con
   report.reason = options.adaptive          ? "as asked for"
                   : damped                  ? "by their local error, as the damping family allows"
                   : options.monitor.rate    ? "a monitor is given"
-                  : !accelerates            ? "L is linear in v: no accelerations to choose variable steps by"
+                  : !accelerates            ? "there are no accelerations to choose variable steps by"
                   : !survey.failure.empty() ? "how fast it changes is not known: " + survey.failure
                                             : "max ω / min ω = " + to_text(survey.ratio(), 3);
   const bool may_pay = accelerates && !damped && survey.failure.empty() &&

@@ -1,5 +1,6 @@
 #include <diracstep/core/integrator/integrator.hpp>
 #include <diracstep/core/integrator/step_sequence.hpp>
+#include <diracstep/core/system/first_order_motions.hpp>
 
 namespace diracstep {
 
@@ -30,13 +31,18 @@ std::vector<PlanLine> Integrator::plan() const {
     lines.push_back({"projection", "left out", "every momentum is that of a velocity"});
   } else {
     const ConstraintRule rule = options_.constraint_rule.value_or(method_.info.constraint_rule);
+    const bool first_order = first_order_motions(*scene_).exist() && !method_.info.damped;
     lines.push_back({"multipliers", std::to_string(m) + (method_.info.rows_inside ? " a node" : ""),
-                     method_.info.damped ? "all rows, and the rates of holonomic rows, at the Radau nodes"
+                     first_order           ? "all rows at the Gauss nodes: motions of first order"
+                     : method_.info.damped ? "all rows, and the rates of holonomic rows, at the Radau nodes"
                      : method_.info.rows_inside
                          ? "nonholonomic rows at the Gauss, holonomic rows at the Lobatto nodes"
                          : std::string("nonholonomic rows by the ") + rule.description() +
                                " rule, holonomic rows at the end of the step"});
-    if (method_.info.damped)
+    if (first_order)
+      lines.push_back(
+          {"projection", "at both ends", "onto holonomic rows; p = ∂L/∂v along motions of first order"});
+    else if (method_.info.damped)
       lines.push_back({"projection", "left out", "a step ends on all rows, with the momentum of a velocity"});
     else
       lines.push_back(

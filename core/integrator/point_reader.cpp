@@ -145,6 +145,13 @@ SolveReport PointReader::acceleration(double t, ConstVectorRef q, ConstVectorRef
 
 SolveReport PointReader::acceleration(double t, ConstVectorRef q, ConstVectorRef v, ConstVectorRef p,
                                       Vector& a, Vector& lambda) {
+  if (first_order_velocity_) {  // without accelerations, but not without forces of rows
+    a.resize(0);
+    Vector again = v;
+    const SolveReport report = velocity(t, q, p, again);
+    lambda = unknowns_.tail(scene_->rows());
+    return report;
+  }
   if (!hamiltonian_velocity_) return acceleration(t, q, v, a, lambda);
   if (!hamiltonian_acceleration_)
     hamiltonian_acceleration_ = std::make_unique<HamiltonianAccelerationProblem>(*scene_, full_);

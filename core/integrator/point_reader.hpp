@@ -4,7 +4,6 @@
 #include <diracstep/core/steps/state.hpp>
 #include <diracstep/core/system/first_order_motions.hpp>
 #include <diracstep/core/system/hamiltonian_point.hpp>
-#include <diracstep/core/system/phase_space_velocity.hpp>
 #include <diracstep/core/system/saddle_point.hpp>
 #include <diracstep/core/system/scene.hpp>
 #include <memory>

@@ -5,6 +5,7 @@
 #include <diracstep/core/system/consistent_start.hpp>
 #include <diracstep/core/system/contradictory_rows.hpp>
 #include <diracstep/core/system/first_order_motions.hpp>
+#include <diracstep/core/system/hamiltonian_point.hpp>
 #include <diracstep/core/system/hidden_rows.hpp>
 #include <diracstep/core/system/redundant_rows.hpp>
 #include <span>
@@ -79,6 +80,7 @@ PreparedScene prepared(std::shared_ptr<const Scene> given, const IntegratorOptio
     scene = with_rows_left_out(scene, dropped);
     result.lines.push_back({"dropped rows", joined(dropped), "redundant constraints at the start"});
   }
+  if (scene->by_hamiltonian()) require_regular_rows(*scene);
   const int own_rows = scene->rows();
   scene = with_hidden_rows(scene);
   if (scene->rows() > own_rows) {

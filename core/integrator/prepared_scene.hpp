@@ -15,7 +15,8 @@ struct PreparedScene {
 };
 
 /// Completes the scene, adds the rows that a degenerate Lagrangian hides, and, where the options ask for it,
-/// drops redundant rows and moves the start onto the constraints.  Throws Misuse for a bad scene, and for
+/// drops redundant rows and moves the start onto the constraints.  Throws Misuse for a bad scene, for rows
+/// and motions of first order that are not determined (require_regular_rows(), require_determined()), and for
 /// redundant rows or an inconsistent start unless the options say otherwise.
 PreparedScene prepared(std::shared_ptr<const Scene> given, const IntegratorOptions& options,
                        const SolverFactory& solvers);

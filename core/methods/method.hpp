@@ -47,9 +47,9 @@ struct StepChoices {
 using GeneratingFunctionFactory = std::function<std::unique_ptr<GeneratingFunction>(const Scene&)>;
 
 /// Makes the step of a method for such a scene.  Throws Misuse for another rule where the rows of the method
-/// hold inside the step, and for a degenerate scene (a Lagrangian linear in v) where the method is not one of
-/// the Gauss-Lobatto or the damping family, unless forced: one-sided and trapezoidal rules are unstable
-/// there.
+/// hold inside the step, and for a degenerate scene (a Lagrangian linear in v or in some of them) where the
+/// method is not one of the Gauss-Lobatto or the damping family, unless forced: one-sided and trapezoidal
+/// rules are unstable there.
 using StepFactory = std::function<std::unique_ptr<StepProblem>(const Scene&, const StepChoices&)>;
 
 /// A method ready for use.  A method that has a generating function S steps that S: on every scene without

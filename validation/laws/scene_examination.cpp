@@ -5,10 +5,12 @@
 #include <cmath>
 #include <diracstep/core/adaptive/damping_survey.hpp>
 #include <diracstep/core/integrator/integrator.hpp>
+#include <diracstep/core/integrator/point_reader.hpp>
 #include <diracstep/core/methods/default_method.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/steps/matrix_form.hpp>
 #include <diracstep/core/system/contradictory_rows.hpp>
+#include <diracstep/core/system/first_order_motions.hpp>
 #include <diracstep/core/system/redundant_rows.hpp>
 #include <diracstep/validation/laws/scene_examination.hpp>
 #include <optional>
@@ -179,6 +181,20 @@ void examine_steps(const CatalogueScene& entry, const Registry& registry, const 
   if (reading) findings.push_back(std::move(*reading));
 }
 
+/// With the velocities that are no data of a motion, or as it is where they are not found, which the steps
+/// tell.
+std::shared_ptr<const Scene> with_determined_start(std::shared_ptr<const Scene> scene,
+                                                   const SolverFactory& solvers) {
+  if (scene->start.v.size() != scene->dimension() || !first_order_motions(*scene).exist()) return scene;
+  auto copy = std::make_shared<Scene>(*scene);
+  try {
+    PointReader(scene, solvers, true).determine(copy->start);
+  } catch (const Misuse&) {
+    return scene;
+  }
+  return copy;
+}
+
 std::vector<std::string> advise(const CatalogueScene& entry, const DefaultMethod& choice,
                                 const Examination& examination) {
   const Scene& scene = *entry.scene;
@@ -223,7 +239,7 @@ bool Examination::passed() const { return std::ranges::all_of(findings, &Finding
 
 Examination examine(const CatalogueScene& entry, const Registry& registry, const SolverFactory& solvers) {
   Examination examination;
-  const auto scene = completed(entry.scene);
+  const auto scene = with_determined_start(completed(entry.scene), solvers);
   std::vector<Finding>& findings = examination.findings;
   findings = {examine_dimensions(*scene), examine_start(*scene), examine_rank(*scene)};
   std::vector<Finding> steps;

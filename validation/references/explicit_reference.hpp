@@ -1,6 +1,6 @@
 #pragma once
 
-#include <diracstep/core/system/phase_space_velocity.hpp>
+#include <diracstep/core/system/first_order_motions.hpp>
 #include <diracstep/core/system/saddle_point.hpp>
 #include <diracstep/solvers/detail/linear_solver.hpp>
 #include <diracstep/validation/references/reference_run.hpp>

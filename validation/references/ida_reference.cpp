@@ -5,8 +5,8 @@
 #include <cmath>
 #include <cstdlib>
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/system/first_order_motions.hpp>
 #include <diracstep/core/system/hidden_rows.hpp>
-#include <diracstep/core/system/phase_space_velocity.hpp>
 #include <diracstep/core/system/saddle_point.hpp>
 #include <diracstep/solvers/detail/linear_solver.hpp>
 #include <diracstep/solvers/detail/shells.hpp>
@@ -202,6 +202,21 @@ class IdaIntegration {
     return kinsol()(problem)->solve(v);
   }
 
+  /// The same for other motions of first order, and the forces of the rows.
+  SolveReport solve_first_order_velocity(const FirstOrderMotions& motions, VectorRef v) {
+    const Eigen::Index n = scene_.dimension(), m = scene_.rows();
+    FirstOrderVelocityProblem problem(scene_, motions);
+    Vector lq(n), p(n), x = Vector::Zero(n + m);
+    scene_.lagrangian->gradient(scene_.start.time, scene_.start.q, scene_.start.v, lq, p);
+    problem.begin(scene_.start.time, scene_.start.q, p);
+    x.head(n) = scene_.start.v;
+    const SolveReport report = kinsol()(problem)->solve(x);
+    v = x.head(n);
+    acceleration_.setZero();
+    acceleration_.tail(m) = x.tail(m);
+    return report;
+  }
+
   /// y and ẏ at the start: p = ∂L/∂v, Λ = M = 0, Ṁ = 0, of index 2 M = 0, and the rest from the acceleration
   /// system.
   std::string make_start() {
@@ -212,9 +227,11 @@ class IdaIntegration {
     rate.setZero();
     y.head(n) = start.q;
     y.segment(n, n) = start.v;
-    const bool linear_in_v = scene_.lagrangian->structure().phase_space();
-    const SolveReport report = linear_in_v ? solve_phase_space_velocity(y.segment(n, n))
-                                           : solve_acceleration(start.time, start.q, start.v);
+    const FirstOrderMotions motions = first_order_motions(scene_);
+    const bool linear_in_v = motions.exist(), alone = motions.u.cols() == 0 && m == 0 && !scene_.force;
+    const SolveReport report = !linear_in_v ? solve_acceleration(start.time, start.q, start.v)
+                               : alone      ? solve_phase_space_velocity(y.segment(n, n))
+                                            : solve_first_order_velocity(motions, y.segment(n, n));
     if (!report.ok())
       return std::string(linear_in_v ? "start: velocity: " : "start: acceleration and forces: ") +
              describe(report.status);

@@ -7,7 +7,6 @@
 #include <diracstep/core/steps/gauss_lobatto/points.hpp>
 #include <diracstep/core/steps/gauss_lobatto/rows.hpp>
 #include <diracstep/core/steps/gauss_lobatto/step_sums.hpp>
-#include <diracstep/core/system/hamiltonian_point.hpp>
 #include <diracstep/core/system/length_of_rows.hpp>
 
 namespace diracstep {
@@ -291,7 +290,6 @@ class HamiltonianStep final : public StepProblem {
 }  // namespace
 
 std::unique_ptr<StepProblem> hamiltonian_step(int s, const Scene& scene, bool dense) {
-  require_regular_rows(scene);
   return std::make_unique<HamiltonianStep>(s, scene, dense);
 }
 

@@ -28,7 +28,8 @@ namespace diracstep {
 /// It is the Galerkin Hamiltonian integrator of Leok and Zhang (IMA J. Numer. Anal. 31, 2011) on Gauss nodes,
 /// with the rows at the nodes of the Gauss–Lobatto SPARK methods (Jay, SIAM J. Numer. Anal. 45, 2007).
 ///
-/// Throws Misuse unless 1 ≤ s ≤ 20, and where A ∂²H/∂p² Aᵀ is singular at the start and near it.
+/// Throws Misuse unless 1 ≤ s ≤ 20.  That A ∂²H/∂p² Aᵀ is regular is asked where a scene is prepared
+/// (require_regular_rows()).
 std::unique_ptr<StepProblem> hamiltonian_step(int s, const Scene& scene, bool dense);
 
 }  // namespace diracstep

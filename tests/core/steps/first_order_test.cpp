@@ -120,7 +120,7 @@ struct Bowl {
   }
 };
 
-Three<LongReal> three(const LongVector& q) { return {q[0], q[1], q[2]}; }
+Three<LongReal> array_of(const LongVector& q) { return {q[0], q[1], q[2]}; }
 LongVector column_of(const Three<LongReal>& q) { return LongVector{{q[0], q[1], q[2]}}; }
 
 /// (v, Λ) of (Dθ − Dθᵀ) v = −∇H − ∂θ/∂t + f + AᵀΛ, A v + b = 0.
@@ -133,16 +133,16 @@ LongVector reduced(LongReal t, const LongVector& q) {
   qt << q, t;
   const LongMatrix d = testing::long_jacobian(theta, qt);
   const LongMatrix gradient = testing::long_jacobian(
-      [](const LongVector& at) { return LongVector::Constant(1, Energy()(three(at))); }, q);
-  const auto push = [&](const LongVector& v) { return column_of(Push()(three(q), three(v), t)); };
-  const LongVector rest = push(LongVector::Zero(3)), form = column_of(Rows().form(three(q), t));
+      [](const LongVector& at) { return LongVector::Constant(1, Energy()(array_of(at))); }, q);
+  const auto push = [&](const LongVector& v) { return column_of(Push()(array_of(q), array_of(v), t)); };
+  const LongVector rest = push(LongVector::Zero(3)), form = column_of(Rows().form(array_of(q), t));
   LongMatrix system = LongMatrix::Zero(4, 4);
   system.topLeftCorner(3, 3) = d.leftCols(3) - d.leftCols(3).transpose();
   for (int j = 0; j < 3; ++j) system.col(j).head(3) -= push(LongVector::Unit(3, j)) - rest;
   system.topRightCorner(3, 1) = -form;
   system.bottomLeftCorner(1, 3) = form.transpose();
   LongVector right(4);
-  right << -gradient.transpose() - d.col(3) + rest, -Rows().offset(three(q), t);
+  right << -gradient.transpose() - d.col(3) + rest, -Rows().offset(array_of(q), t);
   return system.fullPivLu().solve(right);
 }
 

@@ -80,6 +80,48 @@ TEST(Examination, DoesNotCallALagrangianLinearInVRegular) {
   EXPECT_NE(detail(vortices, "velocities from momenta").find("linear in v"), std::string::npos);
 }
 
+TEST(Examination, ADegenerateHamiltonianIsNoFault) {
+  const Examination examination = examined(R"toml(
+name = "linear_in_p"
+hamiltonian = "p_x*y - p_y*x + 0.1*x^2"
+[coordinates]
+x = {}
+y = {}
+[start]
+x = 1
+p_y = 0.3
+[span]
+end = 10
+step = 0.1
+)toml");
+  EXPECT_EQ(failures(examination), "");
+  EXPECT_EQ(detail(examination, "velocities from momenta"), "v = ∂H/∂p: nothing is inverted");
+}
+
+/// Velocities of motions of first order are no data, so that the start need not meet the row.
+TEST(Examination, MotionsOfFirstOrderWithARowAreNoFault) {
+  EXPECT_EQ(failures(examined(R"toml(
+name = "lifted"
+lagrangian = "(x*v_y - y*v_x)/2*(1 + 0.1*x^2) - (x^2 + y^2)/2 - 0.4*z^2"
+[coordinates]
+x = {}
+y = {}
+z = {}
+[[rows]]
+name = "lift"
+equation = "v_z = 0.3*cos(t) + 0.1*x - 0.2*y*v_x"
+[force]
+x = "-0.1*v_x"
+[start]
+x = 0.7
+y = 0.4
+[span]
+end = 5
+step = 0.1
+)toml")),
+            "");
+}
+
 std::string beside(const std::string& hamiltonian) {
   return "name = \"beside\"\nlagrangian = \"m*v_x^2/2 + t*v_x - k*x^4\"\nhamiltonian = \"" + hamiltonian +
          "\"\n[coordinates]\nx = {}\n[parameters]\nm = 2\nk = 0.25\n[start]\nx = 1\n[span]\nend = 1\nstep = "
