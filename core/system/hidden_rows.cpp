@@ -176,12 +176,25 @@ Vector force_of(const Scene& scene, const Point& at) {
   return f;
 }
 
+/// Whether a form on velocities vanishes on those that the rows allow, where these are linear, A v = 0.
+bool vanishes_on_rows(const Scene& scene, const Point& at, const Columns& form, const Columns& factor) {
+  if (scene.rows() == 0) return false;
+  ConstraintsAtPoint rows(scene.constraints, scene.dimension());
+  rows.evaluate(at.t, at.q);
+  Vector off(rows.rows());
+  rows.velocity_residual(Vector::Zero(scene.dimension()), off);
+  const Columns allowed = kernel(rows.pattern().full(rows.coefficients()));
+  return max_norm(off) == 0.0 && vanishes(form * allowed, factor);
+}
+
 /// What the equations at the top of the header take for granted.
 void require_described(const Scene& scene, const Columns& w, const Directions& split, const Point& at,
                        const FullDerivatives& d) {
   if (!vanishes(d.lqv * w, d.lqv) || !vanishes(w.transpose() * d.lvt, d.lvt))
     refuse(scene, w, "its momentum ∂L/∂v is not constant, which is not supported");
-  if (!vanishes(w.transpose() * d.lqv, d.lqv) || !vanishes(split.free.transpose() * d.fv, d.fv))
+  const Columns by_velocity = split.free.transpose() * d.fv;
+  const bool free = vanishes(by_velocity, d.fv) || vanishes_on_rows(scene, at, by_velocity, d.fv);
+  if (!vanishes(w.transpose() * d.lqv, d.lqv) || !free)
     refuse(scene, w, "the force along it depends on other velocities, which is not supported");
   if (!scene.force) return;
   const Vector rest = Vector::Zero(scene.dimension());
