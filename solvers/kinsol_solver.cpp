@@ -305,6 +305,8 @@ class KinsolSolver final : public NonlinearSolver {
       using Outcome = detail::JacobianFactors::Outcome;
       const double norm = solver.factors_.exact() ? 0.0 : solver.scaled_norm();
       const Outcome outcome = solver.factors_.prepare(solver.map(x), norm);
+      if (!solver.factors_.exact() && solver.row_scales_ == nullptr)
+        require(KINSetScaledStepTol(solver.memory(), solver.step_tolerance()), "KINSetScaledStepTol");
       solver.not_finite_ = outcome == Outcome::not_finite;
       solver.singular_ = outcome == Outcome::singular;
       return outcome == Outcome::ready ? 0 : -1;

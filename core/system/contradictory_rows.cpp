@@ -4,6 +4,7 @@
 #include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/core/system/contradictory_rows.hpp>
 #include <diracstep/core/system/redundant_rows.hpp>
+#include <iterator>
 #include <sstream>
 
 namespace diracstep {
@@ -33,6 +34,7 @@ class RowsBesideOthers {
   }
 
   std::vector<std::string> combined(int row, double t, const Vector& q) {
+    if (those_.empty()) return {};
     rows_.evaluate(t, q);
     const Columns a = rows_.pattern().full(rows_.coefficients());
     return names_in(Eigen::CompleteOrthogonalDecomposition<Columns>(one_forms_of_others(a))
@@ -149,6 +151,7 @@ class RowsBesideOthers {
 
 std::string contradiction(const Scene& scene, const Start& start, const std::vector<std::string>& dependent) {
   if (dependent.empty() || scene.rows() > most_rows) return {};
+  if (std::ssize(dependent) >= scene.rows()) return {};  // rows whose one-forms vanish, and no others
   RowsBesideOthers rows(scene, dependent);
   std::vector<double> times{start.time};
   for (int k = -12; k <= 12; ++k) times.push_back(start.time + std::pow(10.0, 0.5 * k));

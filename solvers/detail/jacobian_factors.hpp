@@ -28,9 +28,9 @@ class JacobianFactors {
   /// Whether Newton's method converges quadratically with these factors.
   bool exact() const { return policy_ == JacobianPolicy::fresh || constant_; }
   /// How small beside the unknowns a correction is that ends Newton's method, where `asked` ends it with
-  /// exact factors.  With a Jacobian of another point the error falls by a mere factor in each iteration, so
-  /// that the last correction has to be small itself.
-  double step_tolerance(double asked) const { return exact() ? asked : std::min(asked, 1e-14); }
+  /// exact factors or with those of its own point.  With a Jacobian of another point the error falls by a
+  /// mere factor in each iteration, so that the last correction has to be small itself.
+  double step_tolerance(double asked) const { return exact() || current() ? asked : std::min(asked, 1e-14); }
   /// Whether the last iteration took a Jacobian of its own point.
   bool current() const { return current_point_; }
   /// Drops every factor and pivot.

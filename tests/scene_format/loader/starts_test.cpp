@@ -26,6 +26,28 @@ std::string refusal(const std::string& text, const Parameters& changes = {}) {
   return {};
 }
 
+/// A row that vanishes where there is no other: there is nothing that it could contradict.
+TEST(Starts, OnARowThatVanishesAreRefused) {
+  const std::string refused = refusal(R"toml(
+name = "vanishing"
+lagrangian = "v_x^2/2 + v_y^2/2"
+[coordinates]
+x = {}
+y = {}
+[[rows]]
+name = "blade"
+equation = "x*v_x + x*v_y = 0"
+[start]
+x = 0
+y = 0
+v_y = 1
+[span]
+end = 1
+step = 0.1
+)toml");
+  EXPECT_NE(refused.find("redundant constraints at the start: 'blade'"), std::string::npos) << refused;
+}
+
 const std::string four_bar = R"toml(
 name = "four_bar"
 lagrangian = "(rate(x2)^2 + rate(y2)^2 + rate(x3)^2 + rate(y3)^2)/2 - 9.81*(y2 + y3)"
