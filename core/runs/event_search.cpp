@@ -149,9 +149,9 @@ std::vector<std::size_t> EventSearch::go_on(const Sample& point, const std::vect
       continue;
     }
     const double here = events_[k].at(point.point());
-    if (woken) watch.last = 0.0;
-    if (here == 0.0 || std::isnan(here)) continue;
+    watch.last = 0.0;  // what it was before is none of this motion's
     watch.left = false;
+    if (std::isnan(here)) continue;
     // What switches rows on is near its zero when they have just been switched off.
     if (woken && !events_[k].on.empty()) continue;
     watch.last = here;
