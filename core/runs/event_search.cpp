@@ -11,6 +11,7 @@ namespace {
 constexpr int most_readings = 100;
 constexpr double round_off_of_times = 4.0 * std::numeric_limits<double>::epsilon();
 constexpr double same_instant = 1e-9;  // in steps
+constexpr double round_off_of_values = 1e-13;
 
 }  // namespace
 
@@ -68,7 +69,10 @@ StepReport EventSearch::see(const Sample& point, const Read& read) {
 }
 
 StepReport EventSearch::look(std::size_t event, double here, const Sample& point, const Read& read) {
-  const Watch& watch = watches_[event];
+  Watch& watch = watches_[event];
+  watch.largest = std::max(watch.largest, std::abs(here));
+  if (!watch.left && std::max(std::abs(watch.last), std::abs(here)) <= round_off_of_values * watch.largest)
+    return {};
   const double side = events_[event].direction == Event::Direction::rising ? -1.0 : 1.0;
   if (watch.left && !(side * watch.last > 0.0) && side * here < 0.0) {
     StepReport report;
@@ -145,9 +149,9 @@ std::vector<std::size_t> EventSearch::go_on(const Sample& point, const std::vect
       continue;
     }
     const double here = events_[k].at(point.point());
-    if (woken) watch.last = 0.0;
-    if (here == 0.0 || std::isnan(here)) continue;
+    watch.last = 0.0;  // what it was before is none of this motion's
     watch.left = false;
+    if (std::isnan(here)) continue;
     // What switches rows on is near its zero when they have just been switched off.
     if (woken && !events_[k].on.empty()) continue;
     watch.last = here;
@@ -204,6 +208,7 @@ void EventSearch::save(Snapshot& to) const {
     to.put("met at the last point", watch.met_at_last);
     to.put("left at the last point", watch.left);
     to.put("ticks", watch.ticks);
+    to.put("largest value", watch.largest);
   }
 }
 
@@ -219,6 +224,7 @@ void EventSearch::restore(SnapshotReader& from, const std::vector<bool>& awake) 
     watch.met_at_last = from.flag("met at the last point");
     watch.left = from.flag("left at the last point");
     watch.ticks = from.number("ticks");
+    watch.largest = from.number("largest value");
   }
 }
 

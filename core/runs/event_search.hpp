@@ -21,9 +21,9 @@ struct EventHit {
 /// A change of sign from one point to the next is followed to its time by a bracketed secant method on the
 /// motion between them, which is read by steps of the method from the first of both: so the time has the
 /// order of the method and is solved to round-off.  Where the function vanishes at the start nothing is met
-/// there.  Two changes between neighbouring points cancel and are not seen, but for a contact that was just
-/// left: there g/(t − t_left) is looked at, which is the rate at t_left, so that a return within the same
-/// step is found.
+/// there, and changes between values below 1e-13 of the largest so far are round-off.  Two changes between
+/// neighbouring points cancel and are not seen, but for a contact that was just left: there g/(t − t_left) is
+/// looked at, which is the rate at t_left, so that a return within the same step is found.
 class EventSearch {
  public:
   /// Reads the motion at a time between the last two points.
@@ -62,6 +62,7 @@ class EventSearch {
     bool met_at_last = false;  ///< the last point was the zero: the change of sign behind it is none
     bool left = false;         ///< a contact that was left at the last point, at the rate `last`
     double ticks = 0.0;        ///< of a clock so far
+    double largest = 0.0;      ///< value so far, without sign: far smaller ones are round-off
   };
   /// An event's function between two points, bracketed.
   struct Bracket {

@@ -192,7 +192,7 @@ TEST(States, BadOnesAreToldWithTheirPlace) {
   expect(with("e = { rate = \"x\" }\nf = { rate = \"v_e\" }"), "12:15", "feed on rates");
   expect(with("e = { rate = \"v_e + x\" }"), "11:15", "feed on rates");
   expect(with("e = { rate = \"w\" }"), "11:15", "unknown name 'w'");
-  expect(with("e = { start = 1 }"), "11:", "needs 'rate'");
+  expect(with("e = { begin = 1 }"), "11:", "begin");
   expect(with("x = { rate = \"1\" }"), "11:1", "used twice");
   expect(with("e = { rate = \"x\" }", "[start]\nv_e = 1\n"), "11:1", "its velocity is its rate");
   expect(with("e = { rate = \"v_x\" }", "[[rows]]\nname = \"r\"\nequation = \"x = e\"\n"), "14:15",
