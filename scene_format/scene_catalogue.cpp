@@ -22,7 +22,7 @@ void drop_redundant_rows(CatalogueScene& entry) {
   const std::vector<std::string> dependent = redundant_rows(*scene, scene->start);
   if (dependent.empty() || row_dependence(*scene, scene->start, dependent) != RowDependence::lasting) return;
   if (!contradiction(*scene, scene->start, dependent).empty()) return;  // refused by runs, with the reason
-  entry.scene = without_rows(*entry.scene, dependent);
+  entry.scene = with_rows_left_out(entry.scene, dependent);
   std::string names;
   for (const std::string& name : dependent) names += (names.empty() ? "'" : ", '") + name + "'";
   entry.changes.push_back("redundant constraints left out: " + names);

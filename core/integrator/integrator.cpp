@@ -6,6 +6,7 @@
 #include <diracstep/core/integrator/step_sequence.hpp>
 #include <diracstep/core/integrator/time_kinks.hpp>
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/system/contradictory_rows.hpp>
 #include <sstream>
 #include <utility>
 
@@ -48,7 +49,8 @@ Integrator::Integrator(PreparedScene prepared, const Registry& registry, const S
       reader_(std::make_unique<PointReader>(scene_, solvers, matrices_.full)),
       sequence_(std::make_unique<StepSequence>(
           scene_, design_step(scene_, registry, method_, options_, matrices_.full), solvers, *reader_)),
-      time_kinks_(std::make_unique<TimeKinks>(scene_->kinks, scene_->start.time, options_.step)) {
+      time_kinks_(std::make_unique<TimeKinks>(scene_->kinks, scene_->start.time, options_.step)),
+      left_out_(scene_->whole ? std::make_unique<LeftOutRows>(*scene_) : nullptr) {
   parts_.reserve(4);
   reset(scene_->start);
 }
@@ -135,10 +137,50 @@ StepReport Integrator::take(double h, Guess guess) {
     outcome = std::move(divided);
     pieces = pieces_.size();
   }
-  if (!outcome.ok()) return failed(outcome.solve, step.start, outcome.failure);
+  if (!outcome.ok()) return failed(outcome.solve, step.start, outcome.failure + kink_ahead(h));
+  if (const std::string broken = left_out_ ? broken_left_out_row(sequence_->end().q) : std::string();
+      !broken.empty())
+    return failed({.status = SolveStatus::refused}, step.start, broken);
   StepReport report{outcome.solve, work_.steps, step.start, {}};
   accept_step(h, pieces);
   return report;
+}
+
+/// Empty, or which kink of the formulas a step that failed would have crossed, on with the last acceleration.
+std::string Integrator::kink_ahead(double h) const {
+  if (!scene_->kinks || scene_->kinks->count() == 0 || work_.steps == 0) return {};
+  Vector here(scene_->kinks->count()), there(here);
+  const Vector speed_up = (state_.v - last_.start.v) / last_.size;
+  scene_->kinks->evaluate(time(), state_.q, state_.v, here);
+  scene_->kinks->evaluate(time() + h, state_.q + h * state_.v + 0.5 * h * h * speed_up,
+                          state_.v + h * speed_up, there);
+  for (Eigen::Index k = 0; k < here.size(); ++k)
+    if (here[k] * there[k] < 0.0)
+      return "; in the step " + scene_->kinks->names()[static_cast<std::size_t>(k)] +
+             " changes sides: where a force jumps there and points back from both sides, as dry friction at "
+             "rest, "
+             "no step has a solution; write one that is steep instead of a jump, as tanh(v/eps)";
+  return {};
+}
+
+/// Empty, or what rows left out as redundant demand otherwise than the others: at the end of the step just
+/// solved, along a line to there, and at the pulses that the formulas show.
+std::string Integrator::broken_left_out_row(const Vector& end) {
+  const Interval step{parts_.front().start, parts_.back().start + parts_.back().size - parts_.front().start};
+  std::vector<double> times;
+  if (left_out_->has_rates()) {
+    for (const Interval& part : parts_)
+      for (const double place : {0.146, 0.382, 0.618, 0.854, 1.0})
+        times.push_back(part.start + place * part.size);
+    time_kinks_->add_pulses(step, times);
+  }
+  std::string text = left_out_->broken_at(step.start + step.size, end);
+  for (const double t : times) {
+    if (!text.empty()) break;
+    const double place = (t - step.start) / step.size;
+    text = left_out_->other_rates_near(t, (1.0 - place) * state_.q + place * end);
+  }
+  return text.empty() ? text : "a row that was left out as redundant: " + text;
 }
 
 StepReport Integrator::failed(const SolveReport& solve, double time, const std::string& why) const {

@@ -15,6 +15,7 @@
 
 namespace diracstep {
 
+class LeftOutRows;
 class PointReader;
 class StepSequence;
 class TimeKinks;
@@ -97,6 +98,8 @@ class Integrator {
   void go_on_from(double time, ConstVectorRef q, ConstVectorRef p, ConstVectorRef v, Origin origin);
   StepReport take(double h, Guess guess);
   StepReport failed(const SolveReport& solve, double time, const std::string& why) const;
+  std::string broken_left_out_row(const Vector& end);
+  std::string kink_ahead(double h) const;
   void accept_step(double h, std::size_t pieces);
 
   std::shared_ptr<const Scene> scene_;
@@ -107,7 +110,8 @@ class Integrator {
   std::unique_ptr<PointReader> reader_;  // the sequence refers to it, also after a move
   std::unique_ptr<StepSequence> sequence_;
   std::unique_ptr<TimeKinks> time_kinks_;
-  std::vector<Interval> parts_, pieces_;  ///< of the step
+  std::unique_ptr<LeftOutRows> left_out_;  ///< null where no rows are left out
+  std::vector<Interval> parts_, pieces_;   ///< of the step
   bool met_kinks_ = false;
 
   Clock clock_;

@@ -74,7 +74,7 @@ PreparedScene prepared(std::shared_ptr<const Scene> given, const IntegratorOptio
   require_size("scene '" + scene->name + "': the start q", scene->start.q.size(), scene->storage_size());
   if (const std::vector<std::string> dropped = dependent_rows(*scene, options.drop_redundant_rows);
       !dropped.empty()) {
-    scene = without_rows(*scene, dropped);
+    scene = with_rows_left_out(scene, dropped);
     result.lines.push_back({"dropped rows", joined(dropped), "redundant constraints at the start"});
   }
   const int own_rows = scene->rows();

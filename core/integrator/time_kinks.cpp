@@ -21,9 +21,22 @@ void TimeKinks::look_at_window(double number) {
   window_ = number;
   any_known_ = true;
   known_.clear();
+  pulses_.clear();
   const double first = start_ + number * width_;
   for (const Kinks::Instant& instant : kinks_->instants(first, first + width_))
-    if (instant.width == 0.0) known_.push_back(instant.time);
+    (instant.width == 0.0 ? known_ : pulses_).push_back(instant.time);
+}
+
+void TimeKinks::add_pulses(Interval step, std::vector<double>& times) {
+  if (!kinks_ || std::abs(step.size) > width_) return;
+  const double end = step.start + step.size, first = std::min(step.start, end),
+               last = std::max(step.start, end);
+  const double from = std::floor((first - start_) / width_), to = std::floor((last - start_) / width_);
+  for (double number = from; number <= to; number += 1.0) {
+    look_at_window(number);
+    for (const double t : pulses_)
+      if (t > first && t < last) times.push_back(t);
+  }
 }
 
 /// Those from `first` to `last`, ascending.

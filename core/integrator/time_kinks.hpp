@@ -21,6 +21,9 @@ class TimeKinks {
   /// sides.
   void divide(Interval step, std::vector<Interval>& parts);
 
+  /// The centres of the pulses and ramps of the time in a step.
+  void add_pulses(Interval step, std::vector<double>& times);
+
  private:
   void look_at_window(double number);
   void add_times(double first, double last);
@@ -29,7 +32,7 @@ class TimeKinks {
   double start_, width_;
   double window_ = 0.0;  ///< number of the one that known_ is of
   bool any_known_ = false;
-  std::vector<double> known_, times_;
+  std::vector<double> known_, times_, pulses_;  ///< pulses_: those of width above 0
 };
 
 }  // namespace diracstep

@@ -13,6 +13,8 @@ namespace {
 constexpr int most_rows = 100;
 constexpr double differs = 1e-6;  // relative, so that rows differenced by plugins agree
 
+}  // namespace
+
 /// The dependent rows of a scene beside the others.
 class RowsBesideOthers {
  public:
@@ -45,7 +47,21 @@ class RowsBesideOthers {
     return no_common_pose(t, *pose);
   }
 
- private:
+  std::string different_rates_near(double t, const Vector& near) {
+    const auto pose = pose_near(others_, t, near, {});
+    return pose && pose->allFinite() ? different_rates(t, *pose) : std::string();
+  }
+
+  /// Empty, or that a point of the others is off these.
+  std::string left_at(double t, const Vector& q) const {
+    const double off = distance_of(holonomic_these_, t, q);
+    if (off <= differs) return {};
+    std::ostringstream text;
+    text << "'" << holonomic_these_.front()->names().front() << "' is not met at t = " << t << ", by " << off
+         << " of its size, where the other rows are";
+    return text.str();
+  }
+
   std::string different_rates(double t, const Vector& q) {
     rows_.evaluate(t, q);
     const Columns a = rows_.pattern().full(rows_.coefficients());
@@ -72,6 +88,7 @@ class RowsBesideOthers {
     return {};
   }
 
+ private:
   /// Poses that the others allow are none of these rows, and none is found that all allow.
   std::string no_common_pose(double t, const Vector& q) {
     const double off = distance_of(holonomic_these_, t, q);
@@ -80,9 +97,8 @@ class RowsBesideOthers {
     if (!common || !(distance_of(all_, t, *common) > differs)) return {};
     rows_.evaluate(t, q);
     std::ostringstream text;
-    several_ = kept_.size() > 1;
     text << "'" << names_[static_cast<std::size_t>(these_.front())] << "' contradicts "
-         << (several_ ? "the other rows" : "'" + kept_.front() + "'") << ": at t = " << t
+         << (kept_.size() == 1 ? "'" + kept_.front() + "'" : "the other rows") << ": at t = " << t
          << " no pose is found that fulfils all of them";
     return text.str();
   }
@@ -131,8 +147,6 @@ class RowsBesideOthers {
   bool several_ = false;
 };
 
-}  // namespace
-
 std::string contradiction(const Scene& scene, const Start& start, const std::vector<std::string>& dependent) {
   if (dependent.empty() || scene.rows() > most_rows) return {};
   RowsBesideOthers rows(scene, dependent);
@@ -149,6 +163,41 @@ std::vector<std::string> combined_rows(const Scene& scene, const Start& start, c
   const std::vector<std::string> names = scene.row_names();
   const auto number = static_cast<int>(std::ranges::find(names, row) - names.begin());
   return RowsBesideOthers(scene, dependent).combined(number, start.time, start.q);
+}
+
+namespace {
+
+std::vector<std::string> names_left_out(const Scene& scene) {
+  const std::vector<std::string> kept = scene.row_names();
+  std::vector<std::string> names = scene.whole->row_names();
+  std::erase_if(names, [&](const std::string& name) { return std::ranges::find(kept, name) != kept.end(); });
+  return names;
+}
+
+}  // namespace
+
+std::shared_ptr<const Scene> with_rows_left_out(const std::shared_ptr<const Scene>& scene,
+                                                const std::vector<std::string>& dependent) {
+  auto left = std::make_shared<Scene>(*without_rows(*scene, dependent));
+  if (!left->whole) left->whole = scene;
+  return left;
+}
+
+LeftOutRows::LeftOutRows(const Scene& scene)
+    : rows_(std::make_unique<RowsBesideOthers>(*scene.whole, names_left_out(scene))),
+      has_rates_(scene.whole->rows() <= most_rows &&
+                 !std::ranges::all_of(scene.whole->constraints,
+                                      [](const auto& block) { return block->workless(); })) {}
+
+LeftOutRows::~LeftOutRows() = default;
+
+std::string LeftOutRows::broken_at(double t, const Vector& q) {
+  std::string text = has_rates_ ? rows_->different_rates(t, q) : std::string();
+  return text.empty() ? rows_->left_at(t, q) : text;
+}
+
+std::string LeftOutRows::other_rates_near(double t, const Vector& q) {
+  return has_rates_ ? rows_->different_rates_near(t, q) : std::string();
 }
 
 }  // namespace diracstep

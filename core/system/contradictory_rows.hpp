@@ -1,10 +1,13 @@
 #pragma once
 
 #include <diracstep/core/system/scene.hpp>
+#include <memory>
 #include <string>
 #include <vector>
 
 namespace diracstep {
+
+class RowsBesideOthers;
 
 /// Whether rows whose one-forms depend on those of others demand something else than these.  With
 /// A_d = C A_o, rows A v + b = 0 agree where  b_d = C b_o,  and holonomic ones where a pose of the others
@@ -14,6 +17,33 @@ namespace diracstep {
 ///
 /// Empty, or a line that names such a row and those that it contradicts.
 std::string contradiction(const Scene& scene, const Start& start, const std::vector<std::string>& dependent);
+
+/// The scene without rows that depend on its others, which are kept in Scene::whole.
+std::shared_ptr<const Scene> with_rows_left_out(const std::shared_ptr<const Scene>& scene,
+                                                const std::vector<std::string>& dependent);
+
+/// Holds a motion to the rows that were left out of its scene: what is redundant at the start may demand
+/// something else later.  Rates of more than 100 rows are not looked at.
+class LeftOutRows {
+ public:
+  /// For a scene with Scene::whole.
+  explicit LeftOutRows(const Scene& scene);
+  LeftOutRows(const LeftOutRows&) = delete;
+  LeftOutRows& operator=(const LeftOutRows&) = delete;
+  ~LeftOutRows();
+
+  /// Empty, or a line that names a row which a point q of the other rows breaks, or which demands other
+  /// rates than these there.
+  std::string broken_at(double t, const Vector& q);
+  /// The same of the rates alone, at a point of the other rows near q.
+  std::string other_rates_near(double t, const Vector& q);
+  /// Whether rates are looked at: not where no row depends on the time or has a rate of its own.
+  bool has_rates() const { return has_rates_; }
+
+ private:
+  std::unique_ptr<RowsBesideOthers> rows_;
+  bool has_rates_;
+};
 
 /// Names of the other rows whose combination the one-form of a row is nearest to at the start; `dependent` is
 /// not among them.

@@ -43,6 +43,9 @@ struct Scene {
   /// each step to this instead of to 1e-15 of the largest coordinate (RowScales).  0 where none is stated;
   /// empty where none is at all.
   Vector tolerances = {};
+  /// The scene with all its rows, where some were left out as redundant (with_rows_left_out()); null where
+  /// none were.  An Integrator holds every step to them.
+  std::shared_ptr<const Scene> whole = {};
 
   /// Of the tangent spaces: how many numbers a velocity, a momentum, a row and the second derivatives of L
   /// have.
