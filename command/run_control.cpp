@@ -70,6 +70,7 @@ class Run {
     result_.hits = events_.hits();
     result_.stopped = events_.stopped();
     result_.work = integrator_.work();
+    if (result_.failure.empty() && !result_.stopped) doubt_.finish(integrator_);
     result_.doubt = doubt_.text();
   }
 

@@ -308,6 +308,7 @@ void choose_method(RunArguments& options, const CatalogueScene& entry, const Ses
   const bool fixed = step_given || options.fixed || options.substeps > 1 || times_with_events ||
                      !checkpoint_path(options).empty();
   if (!fixed) options.adaptive = true;
+  if (!fixed && !options.eps) options.eps = choice.local_error;
   say(fmt::format("{}; {}{}", choice.method, choice.reason,
                   fixed ? "" : "; steps vary by their local error, --step H takes fixed ones"));
 }

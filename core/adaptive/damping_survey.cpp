@@ -20,6 +20,7 @@ constexpr double damping_probe = 1e-6;  // in units of the sizes
 constexpr double least_size = 1e-6;     // of the largest position or velocity
 constexpr double parts_of_the_motion = 50.0;
 constexpr double smallest_error = 1e-9;
+constexpr double hardly_damped = 1e-2;  // |Re λ| beside |Im λ|
 
 /// The motion linearised about its points.
 class LinearisedMotion {
@@ -27,20 +28,29 @@ class LinearisedMotion {
   LinearisedMotion(const Scene& scene, const SolverFactory& solvers)
       : scene_(scene), n_(scene.dimension()), motion_(scene, solvers), sizes_(Vector::Zero(2 * n_)) {}
 
-  /// The largest decay rate at a point; NaN where there is no acceleration.
-  double decay_rate(const Sample& at) {
+  struct Rates {
+    double decay = 0.0, undamped = 0.0;
+  };
+
+  /// The largest rates at a point; NaN where there is no acceleration, 0 before anything has moved.
+  Rates rates(const Sample& at) {
     const Vector here = state(at);
     sizes_ = sizes_.cwiseMax(here.cwiseAbs());
+    if (max_norm(sizes_.head(n_)) == 0.0 || max_norm(sizes_.tail(n_)) == 0.0) return {};
     take_units();
     const Columns basis = tangent_space(at);
-    double largest = 0.0;
+    Rates largest;
     for (const double side : {damping_probe, -damping_probe}) {
       Columns image(2 * n_, basis.cols());
       for (Eigen::Index k = 0; k < basis.cols(); ++k) image.col(k) = change(at, here, basis.col(k), side);
-      if (!image.allFinite()) return std::nan("");
+      if (!image.allFinite()) return {std::nan(""), 0.0};
       const Eigen::EigenSolver<Columns> solver(basis.transpose() * image, false);
-      if (solver.info() != Eigen::Success) return std::nan("");
-      for (const auto& value : solver.eigenvalues()) largest = std::max(largest, -value.real());
+      if (solver.info() != Eigen::Success) return {std::nan(""), 0.0};
+      for (const auto& value : solver.eigenvalues()) {
+        largest.decay = std::max(largest.decay, -value.real());
+        if (std::abs(value.real()) < hardly_damped * std::abs(value.imag()))
+          largest.undamped = std::max(largest.undamped, std::abs(value.imag()));
+      }
     }
     return largest;
   }
@@ -57,7 +67,7 @@ class LinearisedMotion {
     units_ = sizes_;
     const auto raise = [](auto part) {
       const double largest = max_norm(part);
-      part = part.cwiseMax(largest > 0.0 ? least_size * largest : 1.0);
+      part = part.cwiseMax(least_size * largest);
     };
     raise(units_.head(n_));
     raise(units_.tail(n_));
@@ -102,6 +112,12 @@ class LinearisedMotion {
   Vector sizes_, units_;
 };
 
+/// So that an undamped motion of so many radians loses 1e-5 of its amplitude; see default_method_of_motion().
+double local_error_for(double radians) {
+  constexpr double usual = AdaptiveOptions::usual_local_error, smallest = 1e-8;
+  return radians > 0.0 ? std::clamp(std::pow(2e-3 / radians, 1.2), smallest, usual) : usual;
+}
+
 }  // namespace
 
 DampingSurvey survey_damping(const std::shared_ptr<const Scene>& scene, const Registry& registry,
@@ -122,10 +138,12 @@ DampingSurvey survey_damping(const std::shared_ptr<const Scene>& scene, const Re
   AdaptiveIntegrator integrator(scene, registry, solvers, options, {.eps = surveying_error, .end = end});
   LinearisedMotion motion(integrator.integrator().scene(), solvers);
   Sample node;
+  survey.undamped = HUGE_VAL;
   for (long k = 0; k < damping_steps && std::abs(integrator.time() - start) < span; ++k) {
     if (!integrator.sample(Momentum::projected, node).ok()) break;
-    const double rate = motion.decay_rate(node);
-    const double h = std::min(std::abs(integrator.next_size()), longest);
+    const auto [rate, undamped] = motion.rates(node);
+    const double h = step > 0.0 ? longest : std::min(std::abs(integrator.next_size()), longest);
+    if (rate > 0.0) survey.undamped = std::min(survey.undamped, undamped);
     survey.covered = std::abs(node.time - start);
     survey.rate = std::max(survey.rate, rate);
     if (rate * h > survey.product) {
@@ -137,6 +155,7 @@ DampingSurvey survey_damping(const std::shared_ptr<const Scene>& scene, const Re
     survey.failure = report.failure;
     break;
   }
+  if (!std::isfinite(survey.undamped)) survey.undamped = 0.0;
   return survey;
 }
 
@@ -147,11 +166,19 @@ DefaultMethod default_method_of_motion(const std::shared_ptr<const Scene>& given
   const bool free = request.order == 0 && !request.rule && !options.compensated_sums;
   if (free && !(request.error > 0.0 && request.error < smallest_error) && scene->force) {
     const DampingSurvey survey = survey_damping(scene, registry, solvers, end, step, options);
-    if (survey.strong())
-      return {surveying_method, 0,
-              "strong damping: what is fastest dies out at a rate of " + to_text(survey.rate, 2) +
-                  ", which times a step of " + to_text(survey.step, 2) + " is " + to_text(survey.product, 2) +
-                  " at most, above " + to_text(DampingSurvey::strong_from, 2)};
+    if (survey.strong()) {
+      DefaultMethod choice{surveying_method, 0,
+                           "strong damping: what is fastest dies out at a rate of " +
+                               to_text(survey.rate, 2) + ", which times a step of " +
+                               to_text(survey.step, 2) + " is " + to_text(survey.product, 2) +
+                               " at most, above " + to_text(DampingSurvey::strong_from, 2)};
+      const double radians = survey.undamped * std::abs(end - scene->start.time);
+      choice.local_error = local_error_for(radians);
+      if (choice.local_error < AdaptiveOptions::usual_local_error)
+        choice.reason += "; what is not damped, at a rate of " + to_text(survey.undamped, 2) +
+                         ", is kept by local errors of " + to_text(choice.local_error, 2);
+      return choice;
+    }
   }
   return default_method(*scene, request);
 }

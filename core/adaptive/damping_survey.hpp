@@ -10,10 +10,11 @@ namespace diracstep {
 
 /// How fast a motion is damped, beside the steps that it is followed with.
 struct DampingSurvey {
-  double rate = 0.0;         ///< d, the largest decay rate met, 1/time
-  double step = 0.0;         ///< h, the step where d h is largest
-  double product = 0.0;      ///< the largest d h
-  double covered = 0.0;      ///< time surveyed
+  double rate = 0.0;      ///< d, the largest decay rate met, 1/time
+  double undamped = 0.0;  ///< the largest |Im λ| with |Re λ| below a hundredth of it, where that is smallest
+  double step = 0.0;      ///< h, the step where d h is largest
+  double product = 0.0;   ///< the largest d h
+  double covered = 0.0;   ///< time surveyed
   std::string failure = {};  ///< empty, or why nothing is known
 
   /// Above it GL(s) leaves a third and more of what should have died out, with a sign that alternates from
@@ -28,8 +29,10 @@ struct DampingSurvey {
 ///
 ///   δq̇ = δv,   δv̇ = ∂a/∂q δq + ∂a/∂v δv,
 ///
-/// by differences of the acceleration a to both sides: a diode conducts on one.  It is compared with the step
-/// of the coarse run there, at most `step`, without sign, or a fiftieth of the motion where that is 0.
+/// by differences of the acceleration a to both sides: a diode conducts on one.  It is compared with `step`,
+/// without sign, which a run with fixed steps takes there, or, where that is 0, with the step of the coarse
+/// run, at most a fiftieth of the motion.  Points before anything has moved have no sizes to difference by
+/// and are left out.
 ///
 /// Nothing is measured where the scene has no force, since nothing but a force damps; for a Lagrangian linear
 /// in v; and for more than 60 coordinates.  Throws Misuse as AdaptiveIntegrator does.
@@ -39,6 +42,10 @@ DampingSurvey survey_damping(const std::shared_ptr<const Scene>& scene, const Re
 
 /// The method for a motion to `end` where none is named: damped/radau:3 where no order, no rule and no error
 /// below 1e-9 is asked for and survey_damping() finds strong damping; else that of default_method().
+///
+/// Radau IIA also takes energy from what nothing damps.  Where the survey finds such a motion, of ω T radians
+/// in all, DefaultMethod::local_error is eps = (2e-3/(ω T))^(6/5), from 1e-8 to 1e-6: on an oscillator the
+/// amplitude lost is about 4.5e-3 ω T eps^(5/6) (measured for ω T from 1e2 to 1e5), then 1e-5.
 DefaultMethod default_method_of_motion(const std::shared_ptr<const Scene>& scene, const Registry& registry,
                                        const SolverFactory& solvers, double end, double step,
                                        const IntegratorOptions& options, const MethodRequest& request);

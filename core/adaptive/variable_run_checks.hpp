@@ -6,6 +6,7 @@
 #include <diracstep/core/runs/node_check.hpp>
 #include <diracstep/core/runs/run_checks.hpp>
 #include <diracstep/core/runs/step_comparison.hpp>
+#include <diracstep/core/runs/work_check.hpp>
 
 namespace diracstep {
 
@@ -20,14 +21,18 @@ class VariableRunChecks {
         side_(std::move(side)),
         energy_(integrator.integrator().scene(), integrator.integrator().method().damped),
         nodes_(integrator.integrator().scene(), 0),
-        comparison_(integrator.integrator().scene()),
+        comparison_(integrator.integrator().scene(), integrator.integrator().method().order),
         kinks_(integrator.integrator(),
                integrator.adaptive().end.value_or(integrator.time() +
-                                                  100.0 * integrator.integrator().options().step)) {}
+                                                  100.0 * integrator.integrator().options().step)),
+        work_(integrator.integrator()) {}
 
   void before_step();
   void after_step();
-  void see(const Sample& point) { energy_.see(point); }
+  void see(const Sample& point) {
+    energy_.see(point);
+    work_.see(point);
+  }
 
   /// Empty, or the doubts, one after the other.
   std::string text() const;
@@ -41,6 +46,7 @@ class VariableRunChecks {
   NodeCheck nodes_;
   StepComparison comparison_;
   KinkCheck kinks_;
+  WorkCheck work_;
   long next_look_ = 1;
   bool looking_ = false;
   Sample node_, start_, whole_, parts_;

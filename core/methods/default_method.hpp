@@ -23,6 +23,7 @@ struct DefaultMethod {
   std::string method;
   int order = 0;
   std::string reason;
+  double local_error = 0.0;  ///< of variable steps by their local error; 0 where the method takes none
 };
 
 /// The method for a scene where none is named; damping_survey.hpp asks first for damping.  First the order p:

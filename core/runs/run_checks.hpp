@@ -2,9 +2,11 @@
 
 #include <diracstep/core/runs/branch_check.hpp>
 #include <diracstep/core/runs/energy_check.hpp>
+#include <diracstep/core/runs/growth_check.hpp>
 #include <diracstep/core/runs/kink_check.hpp>
 #include <diracstep/core/runs/node_check.hpp>
 #include <diracstep/core/runs/step_size_check.hpp>
+#include <diracstep/core/runs/work_check.hpp>
 #include <string>
 #include <vector>
 
@@ -30,6 +32,8 @@ class RunChecks {
         step_(integrator, steps),
         nodes_(integrator.scene(), steps),
         branch_(integrator),
+        growth_(integrator, steps),
+        work_(integrator),
         kinks_(integrator, integrator.time() + static_cast<double>(steps) * integrator.options().step) {}
 
   void before_step(Integrator& integrator) {
@@ -41,13 +45,20 @@ class RunChecks {
     step_.after(integrator);
     branch_.after(integrator);
     kinks_.after(integrator);
+    work_.after(integrator);
   }
-  void see(const Sample& point) { energy_.see(point); }
+  void see(const Sample& point) {
+    energy_.see(point);
+    growth_.see(point);
+    work_.see(point);
+  }
+  /// Where the run has come to its end.
+  void finish(Integrator& integrator) { growth_.finish(integrator, step_.part_of_motion()); }
 
   /// Empty, or the doubts, one after the other.
   std::string text() const {
-    return joined_doubts({energy_.text(), step_.text(), nodes_.text(), branch_.text(), kinks_.text(),
-                          scene_.doubt ? scene_.doubt() : std::string()});
+    return joined_doubts({energy_.text(), work_.text(), step_.text(), nodes_.text(), branch_.text(),
+                          growth_.text(), kinks_.text(), scene_.doubt ? scene_.doubt() : std::string()});
   }
 
  private:
@@ -60,6 +71,8 @@ class RunChecks {
   StepSizeCheck step_;
   NodeCheck nodes_;
   BranchCheck branch_;
+  GrowthCheck growth_;
+  WorkCheck work_;
   KinkCheck kinks_;
   long step_number_ = 0;
   Sample node_;

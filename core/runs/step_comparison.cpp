@@ -9,6 +9,8 @@ namespace diracstep {
 namespace {
 
 constexpr double doubted_way = 0.25, doubted_change = 0.5;
+constexpr double doubted_of_all = 0.01;  // of the whole motion
+constexpr int higher_order = 3;
 constexpr double no_change = 1e-9;  // of a velocity or momentum, in parts of its size
 constexpr long fewest_steps = 3;    // before velocities and momenta count
 
@@ -42,6 +44,9 @@ void StepComparison::add(const Sample& start, double h, const Sample& whole, con
                            max_norm(parts.q - start.q)});
   rest_.see(start.time, start.q, start.v);
   const double rounding = at_rest * std::max(max_norm(start.q), std::abs(h) * rest_.speed(h));
+  if (first_.size() == 0) first_ = start.q;
+  extent_ = std::max({extent_, max_norm(start.q - first_), max_norm(whole.q - first_)});
+  position_.add(start.q, whole.q, parts.q, start.time);
   const double difference = max_norm(whole.q - parts.q) / std::max(longest_way_, rounding);
   if (difference > 0.0 && !(difference <= worst_)) {
     worst_ = difference;
@@ -52,8 +57,21 @@ void StepComparison::add(const Sample& start, double h, const Sample& whole, con
   momentum_.add(start.p, whole.p, parts.p, start.time);
 }
 
+double StepComparison::part_of_motion() const {
+  const double way = std::max(extent_, longest_way_);
+  return std::max(way > 0.0 ? position_.largest / way : 0.0,
+                  momentum_.size > 0.0 ? momentum_.largest / momentum_.size : 0.0);
+}
+
 std::string StepComparison::text() const {
   if (worst_ > doubted_way) return line(worst_time_, worst_, "the way of a step");
+  if (order_ >= higher_order) {
+    const double way = std::max(extent_, longest_way_);
+    if (position_.largest > doubted_of_all * way && position_.largest > no_change * position_.size)
+      return line(position_.time, position_.largest / way, "the way of the motion");
+    if (momentum_.largest > doubted_of_all * momentum_.size)
+      return line(momentum_.time, momentum_.largest / momentum_.size, "the largest momentum");
+  }
   if (steps_ < fewest_steps) return {};
   if (momentum_.doubted())
     return line(momentum_.time, momentum_.largest / momentum_.way, "the change of the momentum");

@@ -13,12 +13,16 @@ namespace diracstep {
 /// Positions are doubted above a quarter of  max h |v|∞ : methods of order 1 stay below at h times the rate
 /// of the motion of 1, the others at more.  Velocities and momenta, whose way may be short at a turning
 /// point, are measured by the longest way of the whole run, and doubted above a half of it.
+///
+/// A step of order 3 and above that differs from its parts by a hundredth of the whole motion, of the way
+/// from the first point compared and the largest momentum, is doubted too: no resolved motion has such steps,
+/// and in a run that is soon slow, as after a start under drag, it may be the only one.
 class StepComparison {
  public:
   static constexpr double first_part = 0.382;
 
   /// The scene, one with a Lagrangian, must outlive this.
-  explicit StepComparison(const Scene& scene) : rest_(scene) {}
+  explicit StepComparison(const Scene& scene, int order = 1) : rest_(scene), order_(order) {}
 
   /// A step of size h from `start`, where it led, and where its parts did.  q, v and p are read.
   void add(const Sample& start, double h, const Sample& whole, const Sample& parts);
@@ -27,6 +31,9 @@ class StepComparison {
   std::string text() const;
   /// The largest difference of positions so far; NaN before the first.
   double worst() const { return worst_; }
+  /// The largest difference of positions so far, in parts of the way of the motion, or of momenta in parts of
+  /// the largest.
+  double part_of_motion() const;
 
  private:
   struct Differences {
@@ -37,7 +44,10 @@ class StepComparison {
 
   RestSizes rest_;
   double longest_way_ = 0.0, worst_ = std::numeric_limits<double>::quiet_NaN(), worst_time_ = 0.0;
-  Differences velocity_, momentum_;
+  Differences velocity_, momentum_, position_;
+  int order_;
+  Vector first_;  ///< position
+  double extent_ = 0.0;
   long steps_ = 0;
 };
 

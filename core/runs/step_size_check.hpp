@@ -6,7 +6,9 @@
 
 namespace diracstep {
 
-/// Divides a few steps of a run, one in 600 and at least three, to say when they are too large: at a step
+/// Divides a few steps of a run, one in 600 and at least three, the first one where it does not start from
+/// rest, and each that follows one in which the velocity changed by more than twice as much as ever before,
+/// to say when they are too large: at a step
 /// that resolves the motion, two parts end where the whole does; see StepComparison.
 ///
 /// Needs no energy, so that it also sees forced and driven scenes.  The parts are taken between
@@ -19,24 +21,31 @@ class StepSizeCheck {
 
   /// Around each step of the run; for most of them a comparison of numbers.
   void before(Integrator& integrator) {
-    if (integrator.work().steps == next_look_) divide(integrator);
+    const bool due = integrator.work().steps == next_look_;
+    if (due) next_look_ += between_looks_;
+    if (due || fast_) divide(integrator);
   }
   void after(Integrator& integrator) {
     if (divided_) compare(integrator);
+    follow(integrator);
   }
 
   /// Empty, or a line that names the worst step so far.
   std::string text() const { return comparison_.text(); }
   /// The largest difference of positions so far; NaN before the first.
   double worst() const { return comparison_.worst(); }
+  double part_of_motion() const { return comparison_.part_of_motion(); }
 
  private:
   void divide(Integrator& integrator);
   void compare(Integrator& integrator);
+  void follow(const Integrator& integrator);
 
   StepComparison comparison_;
   long between_looks_, next_look_;
-  bool divided_ = false;
+  bool divided_ = false, fast_;
+  double largest_change_ = 0.0;  ///< of the velocity in a step
+  Vector velocity_;
   Sample start_, whole_, parts_;
 };
 
