@@ -78,6 +78,13 @@ double Convergence::work_to_go() const {
   return std::max(1.0, std::pow(safety * estimate_ / error_, 1.0 / p));
 }
 
+double Convergence::better_order() const {
+  double better = 0.0;
+  if (runs() < 4) return better;
+  for (const std::size_t last : {runs(), runs() - 1}) better = std::max(better, order_of(last));
+  return better;
+}
+
 std::string Convergence::obstacle() const {
   std::ostringstream text;
   text.precision(3);

@@ -35,6 +35,8 @@ class Convergence {
   double observed_order() const { return order_of(runs()); }  ///< NaN before the third
 
   bool accepted() const { return by_order() || by_three_runs(); }
+  /// The better of the last two orders observed; 0 before there are two.
+  double better_order() const;
   /// Whether the last two observed orders agree with the stated one.
   bool order_confirmed() const { return confirmed(runs()) && confirmed(runs() - 1); }
   /// Three refinements in a row that did not halve the difference.

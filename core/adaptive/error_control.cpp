@@ -125,10 +125,12 @@ ErrorControlReport solve_to_error(const std::shared_ptr<const Scene>& given, con
   const FirstSteps first = first_steps(options, survey, report.order, std::abs(end - scene->start.time));
   const RefinementSearch::Motion motion{
       scene, registry, solvers, end, options, survey.scales, RefinementSearch::Clock::now()};
-  report.reason = options.adaptive       ? "as asked for"
-                  : damped               ? "by their local error, as the damping family allows"
-                  : options.monitor.rate ? "a monitor is given"
-                                         : "max ω / min ω = " + to_text(survey.ratio(), 3);
+  report.reason = options.adaptive          ? "as asked for"
+                  : damped                  ? "by their local error, as the damping family allows"
+                  : options.monitor.rate    ? "a monitor is given"
+                  : !accelerates            ? "L is linear in v: no accelerations to choose variable steps by"
+                  : !survey.failure.empty() ? "how fast it changes is not known: " + survey.failure
+                                            : "max ω / min ω = " + to_text(survey.ratio(), 3);
   const bool may_pay = accelerates && !damped && survey.failure.empty() &&
                        (options.monitor.rate || survey.variable_steps_pay());
   if (!options.adaptive && may_pay) return search_both(motion, report, first);

@@ -60,8 +60,9 @@ struct ErrorControlReport {
                          ///< variable steps
   bool compensated_sums = false;
   Sample end;  ///< of the accepted run, or of the last good one; p projected
-  /// Of the error of `end`: relative maximum norm, the larger of those of q and p, absolute where a column is
-  /// zero.  Never below the round-off of the run, 2.2e-16 √steps: runs that agree to the bit prove no more.
+  /// Of the error of `end`: relative maximum norm, the largest of those of q, p and v, absolute where a
+  /// column is zero.  Never below the round-off of the run, 2.2e-16 √steps: runs that agree to the bit prove
+  /// no more.
   double estimate = std::numeric_limits<double>::quiet_NaN();
   double observed_order = std::numeric_limits<double>::quiet_NaN();  ///< NaN where the runs differ by
                                                                      ///< round-off alone

@@ -100,6 +100,18 @@ void ForceSurvey::count_missed(const PathCubic& path, double a, double b, std::s
   report.missed += missed;
 }
 
+/// Whether the node between two steps lies at a kink that the motion crosses.
+bool ForceSurvey::switches_at(const PathCubic& before, const PathCubic& after) {
+  if (!kinks_ || kinks_->count() == 0) return false;
+  const double gap = std::copysign(force_.closest(before.end()), before.end() - before.begin());
+  Vector q, v, here(kinks_->count()), there(here);
+  before.at(before.end() - gap, q, v);
+  kinks_->evaluate(before.end() - gap, q, v, here);
+  after.at(after.begin() + gap, q, v);
+  kinks_->evaluate(after.begin() + gap, q, v, there);
+  return (here.array() * there.array() < 0.0).any();
+}
+
 void ForceSurvey::examine(const PathCubic& path, double a, double b, ForceSurveyReport& report) {
   const std::vector<double> known = known_times(path, a, b);
   const auto share = static_cast<double>(points_) * std::abs(b - a) / force_.span();
@@ -150,6 +162,7 @@ ForceSurveyReport ForceSurvey::along(const std::vector<PathPoint>& path, long pa
     gap = std::copysign(force_.closest(b), b - a);
     report.stretches.back().end -= gap;
     whole_ = false;
+    if (switches_at(cubic, next)) continue;  // every run has a node there: KinkSteps
     report.missed = HUGE_VAL;
     report.time = b;
   }

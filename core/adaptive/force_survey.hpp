@@ -48,6 +48,7 @@ class ForceSurvey {
   void divide(const PathCubic& path, double a, double b, const std::vector<double>& known,
               ForceSurveyReport& report);
   void count_missed(const PathCubic& path, double a, double b, std::size_t first, ForceSurveyReport& report);
+  bool switches_at(const PathCubic& before, const PathCubic& after);
   std::pair<double, double> narrow(const PathCubic& path, double a, double b);
 
   std::shared_ptr<const Kinks> kinks_;

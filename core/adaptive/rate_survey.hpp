@@ -21,8 +21,8 @@ struct RateSurvey {
   long accelerations = 0;
   std::string failure = {};  ///< empty, or why the survey ended early
 
-  /// max ω / min ω.
-  double ratio() const { return fastest / std::max(slowest, scales.lowest); }
+  /// max ω / min ω, both at least ω_min.
+  double ratio() const { return std::max(1.0, fastest / std::max(slowest, scales.lowest)); }
   /// Above a ratio of 5 they take less time than fixed ones (bench/adaptive_steps).
   bool variable_steps_pay() const { return ratio() > 5.0; }
 };

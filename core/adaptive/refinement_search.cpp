@@ -4,6 +4,7 @@
 #include <diracstep/core/adaptive/refinement_search.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/numerics/scales.hpp>
+#include <diracstep/core/runs/growth_check.hpp>
 #include <diracstep/core/runs/run_checks.hpp>
 #include <utility>
 
@@ -14,11 +15,14 @@ namespace {
 constexpr int max_failures = 12;  // of runs in a row
 constexpr int max_divisions = 6;
 constexpr std::size_t max_runs = 60;
+constexpr std::size_t runs_to_converge = 8, runs_to_resolve_kinks = 24;  // before stagnation counts
 constexpr long fewest_steps = 4;              // of a run with variable steps that counts
 constexpr double missed_allowed = 0.1;        // by the forces surveyed, in parts of the error asked for
 constexpr double error_out_of_reach = 1e-15;  // differences of runs hold nothing but round-off below it
 constexpr long nodes_between_looks = 64;
-constexpr long energies_read = 100;  // of a run
+constexpr long energies_read = 100;             // of a run
+constexpr double growth_of_no_power = 1e6;      // of two runs apart: powers of the time lead to less
+constexpr double smallest_local_error = 2e-14;  // below it steps have one of round-off
 
 std::string text(double value) { return to_text(value, 3); }
 
@@ -58,6 +62,11 @@ ErrorControlReport::Steps RefinementSearch::steps_of(long refinement) const {
   return steps;
 }
 
+/// Whether the motion may cross kinks in q or v, at which the steps end.
+bool RefinementSearch::kinks_on_the_way() const {
+  return !report_.adaptive && motion_.scene->kinks && motion_.scene->kinks->count() > 0;
+}
+
 bool RefinementSearch::reached_end(double t) const {
   return std::abs(t - motion_.end) <= 1e-9 * std::abs(motion_.end - motion_.scene->start.time);
 }
@@ -77,6 +86,8 @@ bool RefinementSearch::stopped(long max_solves) {
   }
   const double limit = static_cast<double>(max_solves);
   const double needed = predicted_solves();
+  // Until the steps resolve a contact the runs go different ways, and their differences foretell nothing.
+  const bool unresolved = kinks_on_the_way() && convergence_.better_order() < 0.5 * report_.order;
   if (ended_ || (motion_.options.go_on && !motion_.options.go_on()))
     refuse("interrupted");
   else if (time_is_up())
@@ -84,11 +95,14 @@ bool RefinementSearch::stopped(long max_solves) {
   else if (expected > limit)
     refuse("the next run would bring the work to " + text(expected) +
            " nonlinear systems or explicit steps (--max-solves)");
+  else if (local_ && eps_of(refinement_) < smallest_local_error)
+    refuse("steps with local errors below " + text(smallest_local_error) +
+           " would follow nothing but round-off");
   else if (convergence_.runs() >= 5 && needed > limit && convergence_.difference() < error_out_of_reach)
-    refuse(convergence_.obstacle());
-  else if (convergence_.runs() >= 5 && needed > limit && !convergence_.near_round_off())
-    refuse("at the rate of the runs so far it would take about " + text(needed) +
-           " nonlinear systems or explicit steps (--max-solves)");
+    refuse_unless_amplified(convergence_.obstacle());
+  else if (convergence_.runs() >= 5 && needed > limit && !convergence_.near_round_off() && !unresolved)
+    refuse_unless_amplified("at the rate of the runs so far it would take about " + text(needed) +
+                            " nonlinear systems or explicit steps (--max-solves)");
   else if (report_.runs.size() >= max_runs)
     refuse("no convergence in " + std::to_string(max_runs) + " runs");
   else
@@ -131,6 +145,7 @@ RefinementSearch::Outcome RefinementSearch::run(long refinement) {
       energy.see(node);
       largest_position_ = std::max(largest_position_, max_norm(node.q));
       largest_momentum_ = std::max(largest_momentum_, max_norm(node.p));
+      largest_velocity_ = std::max(largest_velocity_, max_norm(node.v));
     }
     if (last) read_end = read(Momentum::projected, end);
     if (++nodes % nodes_between_looks != 0) return true;
@@ -161,8 +176,9 @@ RefinementSearch::Outcome RefinementSearch::run(long refinement) {
                           energy.text(), windows.text()});
   if (first) first_good_ = refinement;
   if (!first)
-    now.difference = std::max(relative_change(end.q, report_.end.q, largest_position_),
-                              relative_change(end.p, report_.end.p, largest_momentum_));
+    now.difference = std::max({relative_change(end.q, report_.end.q, largest_position_),
+                               relative_change(end.p, report_.end.p, largest_momentum_),
+                               relative_change(end.v, report_.end.v, largest_velocity_)});
   convergence_.add(local_ ? first_ / static_cast<double>(refinement) : now.step, now.difference);
   now.estimate = std::max(convergence_.estimate(), round_off_of(work.steps));
   now.observed_order = convergence_.observed_order();
@@ -193,13 +209,15 @@ bool RefinementSearch::next(long max_solves) {
   }
   if (convergence_.accepted()) {
     if (!survey(true)) return report_.refusal.empty();
-    accept();
-    return false;
+    return accept();
   }
-  if (convergence_.runs() >= 4 && !convergence_.order_confirmed() && !surveyed_ && !survey(false))
+  // Runs that do not follow the motion yet cross the kinks in other places than it does.
+  if (convergence_.runs() >= 4 && !convergence_.order_confirmed() && !surveyed_ && !kinks_on_the_way() &&
+      !survey(false))
     return report_.refusal.empty();
-  if (convergence_.stagnates() && (convergence_.runs() > 8 || convergence_.difference() < 1e-4))
-    return refuse(convergence_.obstacle());
+  const std::size_t patience = kinks_on_the_way() ? runs_to_resolve_kinks : runs_to_converge;
+  if (convergence_.stagnates() && (convergence_.runs() > patience || convergence_.difference() < 1e-4))
+    return refuse_unless_amplified(convergence_.obstacle());
   const double next = static_cast<double>(refinement_) / convergence_.next_factor();
   refinement_ = std::max(refinement_ + 1, std::lround(next));
   return true;
@@ -223,12 +241,13 @@ std::vector<PathPoint> RefinementSearch::path_of(long refinement) {
   Sample point;
   const auto& stretches = plan_.stretches();
   std::size_t stretch = 0;
-  long left = report_.adaptive ? -1 : stretches.front().steps * refinement;
   const auto at_node = [&](const ReadNode& read, bool) {
     if (!read(Momentum::projected, point).ok()) return false;
     path.push_back({point.time, point.q, point.v});
-    if (path.size() > 1 && --left == 0 && ++stretch < stretches.size()) {
-      left = stretches[stretch].steps * refinement;
+    if (report_.adaptive || stretch + 1 >= stretches.size()) return !time_is_up();
+    const double end = stretches[stretch].end;
+    if (std::abs(point.time - end) <= 1e-9 * std::abs(end - stretches[stretch].begin)) {
+      ++stretch;
       if (stretches[stretch].begin != point.time)
         path.push_back({stretches[stretch].begin, point.q, point.v});
     }
@@ -280,11 +299,62 @@ void RefinementSearch::divide(const ForceSurveyReport& found) {
                      std::to_string(plan_.stretches().size()) + " stretches";
 }
 
-void RefinementSearch::accept() {
+/// How much farther apart two runs end than they begin, relative to the sizes of both; 0 where that is not
+/// known.
+double RefinementSearch::amplification(long refinement) {
+  auto moved = std::make_shared<Scene>(*motion_.scene);
+  moved->start = beside(moved->start, largest_position_, largest_velocity_);
+  const auto end_of = [&](const std::shared_ptr<const Scene>& scene) {
+    Sample end;
+    Work work;
+    (void)run_steps_of(scene, motion_.registry, motion_.solvers, steps_of(refinement), report_.adaptive,
+                       motion_.end, work, [&](const ReadNode& read, bool last) {
+                         if (last && !read(Momentum::projected, end).ok()) end = {};
+                         return !time_is_up();
+                       });
+    report_.work.solves += work.solves;
+    return end;
+  };
+  const Sample one = end_of(motion_.scene), other = end_of(moved);
+  if (one.q.size() == 0 || other.q.size() == 0) return 0.0;
+  double apart = relative_change(other.q, one.q, largest_position_);
+  if (largest_momentum_ > 0.0) apart = std::max(apart, relative_change(other.p, one.p, largest_momentum_));
+  return std::isfinite(apart) ? apart / distance_beside : 0.0;
+}
+
+/// The error that round-off alone leaves, as far as the motion amplifies it; the finest run is asked where a
+/// coarse one tells of too much, if that one is accepted.
+double RefinementSearch::amplified_round_off(bool accepted) {
+  if (local_ || convergence_.runs() == 0) return 0.0;
+  growth_ = amplification(first_good_);
+  const auto left = [this] {
+    return growth_ > growth_of_no_power ? growth_ * round_off_of(last_steps_) : 0.0;
+  };
+  if (accepted && left() > motion_.options.error) growth_ = amplification(refinement_);
+  return left();
+}
+
+/// Refuses, for the growth of errors where that explains it.
+bool RefinementSearch::refuse_unless_amplified(const std::string& why) {
+  const double left = amplified_round_off(false);
+  return refuse(left > motion_.options.error ? amplified(left) : why);
+}
+
+std::string RefinementSearch::amplified(double left) const {
+  return "the motion amplifies errors by a factor of " + text(growth_) +
+         ", so that round-off alone leaves one of " + text(left);
+}
+
+/// Ends the search with the last run, where the motion does not amplify round-off above the error asked for.
+bool RefinementSearch::accept() {
+  const double left = amplified_round_off(true);
+  if (left > motion_.options.error) return refuse(amplified(left));
+  report_.estimate = std::max(report_.estimate, left);
   accepted_ = true;
   report_.warning = doubt_;
   // Orders of differences that are round-off say nothing.
   if (convergence_.difference() <= round_off_of(last_steps_)) report_.observed_order = std::nan("");
+  return false;
 }
 
 /// Ends the search, for which false stands.

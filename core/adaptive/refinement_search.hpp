@@ -45,12 +45,17 @@ class RefinementSearch {
   }
   void count(ErrorControlRun& now, const Work& work);
   bool time_is_up() const;
+  bool kinks_on_the_way() const;
   bool reached_end(double t) const;
   bool stopped(long max_solves);
   bool survey(bool accepted);
   std::vector<PathPoint> path_of(long refinement);
   void divide(const ForceSurveyReport& found);
-  void accept();
+  bool accept();
+  double amplification(long refinement);
+  double amplified_round_off(bool accepted);
+  bool refuse_unless_amplified(const std::string& why);
+  std::string amplified(double left) const;
   bool refuse(const std::string& why);
 
   const Motion& motion_;
@@ -61,8 +66,9 @@ class RefinementSearch {
   double first_;
   double eps_step_ = 0.0;  ///< of the options of variable steps, with its sign
   long refinement_ = 1, last_steps_ = 0, last_refinement_ = 1, first_good_ = 0;
-  double largest_position_ = 0.0, largest_momentum_ = 0.0;  ///< at the nodes read
+  double largest_position_ = 0.0, largest_momentum_ = 0.0, largest_velocity_ = 0.0;  ///< at the nodes read
   int failures_ = 0, divisions_ = 0;
+  double growth_ = 0.0;  ///< of errors, where it has been asked for
   bool surveyed_ = false, ended_ = false, accepted_ = false;
   std::string fast_;   ///< empty, or where the forces change fast
   std::string doubt_;  ///< empty, or what the checks of a run say of the last one

@@ -11,7 +11,9 @@ StepReport run_fixed(Integrator& integrator, const ErrorControlReport::Steps& st
   };
   if (!at_node(read, false)) return {};
   long left = steps.plan.steps() * steps.refinement;
-  return steps.plan.run(integrator, steps.refinement, [&] { return at_node(read, --left == 0); });
+  return steps.plan.run(
+      integrator, steps.refinement, [&] { return at_node(read, --left == 0); },
+      [&] { return at_node(read, false); });
 }
 
 StepReport run_variable(AdaptiveIntegrator& integrator, double end, const AtNode& at_node) {

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <diracstep/core/adaptive/kink_steps.hpp>
 #include <diracstep/core/adaptive/step_plan.hpp>
 #include <diracstep/core/runs/run.hpp>
 #include <limits>
@@ -43,9 +44,11 @@ double StepPlan::mean_step(long refinement) const {
   return (stretches_.back().end - stretches_.front().begin) / static_cast<double>(steps_ * refinement);
 }
 
-StepReport StepPlan::run(Integrator& integrator, long refinement,
-                         const std::function<bool()>& at_node) const {
+StepReport StepPlan::run(Integrator& integrator, long refinement, const std::function<bool()>& at_node,
+                         const std::function<bool()>& at_part) const {
   StepReport report;
+  KinkSteps steps(integrator);
+  bool goes_on = true;
   for (const Stretch& stretch : stretches_) {
     if (&stretch != &stretches_.front()) {
       const Vector q = integrator.position(), p = integrator.momentum(), v = integrator.velocity_estimate();
@@ -53,8 +56,8 @@ StepReport StepPlan::run(Integrator& integrator, long refinement,
     }
     const double h = step_in(stretch, refinement);
     for (long k = 0; k < stretch.steps * refinement; ++k) {
-      report = integrator.step(h);
-      if (!report.ok() || !at_node()) return report;
+      report = steps.step(h, [&] { return goes_on = at_part(); });
+      if (!report.ok() || !goes_on || !at_node()) return report;
     }
   }
   return report;

@@ -38,8 +38,10 @@ class StepPlan {
   /// The mean step of a run, with its sign.
   double mean_step(long refinement) const;
 
-  /// Steps through the motion; `at_node` is called after each step and ends the run with false.
-  StepReport run(Integrator& integrator, long refinement, const std::function<bool()>& at_node) const;
+  /// Steps through the motion; `at_node` is called after each step, `at_part` where a step is divided at a
+  /// kink (KinkSteps), and both end the run with false.
+  StepReport run(Integrator& integrator, long refinement, const std::function<bool()>& at_node,
+                 const std::function<bool()>& at_part) const;
 
  private:
   static double step_in(const Stretch& stretch, long refinement) {
