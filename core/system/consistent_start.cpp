@@ -130,12 +130,19 @@ std::vector<int> held(const std::vector<bool>& guesses) {
 }
 
 /// Throws Misuse where a row is not met at the start, telling that guesses alone may move.
-void require_met(const Scene& scene, const Start& start, const char* guessed) {
+void require_met(const Scene& scene, const Start& start, const Guesses& guesses) {
+  const auto any = [](const std::vector<bool>& guessed) {
+    return guessed.empty() || std::ranges::find(guessed, true) != guessed.end();
+  };
   try {
     require_consistent(scene, start);
   } catch (const InconsistentStart& start_off) {
-    throw Misuse(std::string(start_off.what()) + "; the guesses of " + guessed +
-                 " cannot meet it while what is given stays");
+    const std::string off = start_off.what();
+    const bool of_velocity = off.find("A v + b") != std::string::npos;
+    const std::string kind = of_velocity ? "velocity" : "position";
+    if (any(of_velocity ? guesses.v : guesses.q))
+      throw Misuse(off + "; the guesses cannot meet it while each " + kind + " that is given stays");
+    throw Misuse(off + "; no " + kind + " is named as a guess that may move");
   }
 }
 
@@ -187,7 +194,7 @@ Vector nearest_position(const Scene& scene, const Start& start, const Guesses& g
   x.head(start.q.size()) = start.q;
   const SolveReport report = solvers(problem)->solve(x);
   if (!report.ok() && !kept.empty())
-    require_met(*all, {start.time, x.head(start.q.size()), start.v}, "positions");
+    require_met(*all, {start.time, x.head(start.q.size()), start.v}, guesses);
   if (!report.ok()) throw_not_found(scene, "no nearest point of the holonomic rows", report);
   return x.head(start.q.size());
 }
@@ -256,7 +263,7 @@ ConsistentStart project_start(const Scene& given, const Start& given_start, cons
   }
   result.velocity_moved = (result.start.v - start.v).norm();
   if (!held(guesses.q).empty() || !held(guesses.v).empty())
-    require_met(scene, result.start, held(guesses.v).empty() ? "positions" : "positions and velocities");
+    require_met(scene, result.start, guesses);
   else
     require_projected(scene, result.start);  // rows that seemed redundant were not solved for
   return result;

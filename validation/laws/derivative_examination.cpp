@@ -167,13 +167,14 @@ Deviations deviations(const Scene& scene, const Line& line) {
 /// Whether no switching function changes its sign, and no ramp much, where the differences are taken.
 bool smooth_along(const Kinks& kinks, const Line& line) {
   constexpr double flat = 20.0, straight = 0.1;  // of the argument of a ramp
+  constexpr double near = 10.0;  // in differences: powers such as max(0, y)^2.5 have none of high order there
   const auto at = [&](double s, double shift) {
     Vector g(kinks.count());
     kinks.evaluate(line.t + shift, line.x + s * line.dx, line.y + s * line.dy, g);
     return g;
   };
   const Vector here = at(0.0, 0.0);
-  for (const double s : {-line.delta, line.delta})
+  for (const double s : {-near * line.delta, near * line.delta})
     for (const Vector& there : {at(s, 0.0), at(0.0, s)})
       for (Eigen::Index k = 0; k < here.size(); ++k) {
         const bool crossed = !(here[k] * there[k] > 0.0);
@@ -192,7 +193,7 @@ std::optional<Line> on_one_side(const Scene& scene, Line line) {
   if (!scene.kinks || scene.kinks->count() == 0) return line;
   for (int attempt = 0; attempt < 8; ++attempt) {
     if (smooth_along(*scene.kinks, line)) return line;
-    const double away = 2.5 * line.delta * static_cast<double>(1 << attempt);
+    const double away = 25.0 * line.delta * static_cast<double>(1 << attempt);
     line.x += away * line.dx;
     line.y += away * line.dy;
     line.t += away;
