@@ -80,6 +80,7 @@ double Convergence::work_to_go() const {
 
 double Convergence::better_order() const {
   double better = 0.0;
+  if (runs() < 4) return better;
   for (const std::size_t last : {runs(), runs() - 1}) better = std::max(better, order_of(last));
   return better;
 }

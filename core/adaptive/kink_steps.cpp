@@ -8,7 +8,7 @@ namespace diracstep {
 
 namespace {
 
-constexpr int most_parts_of_a_step = 40, most_tries = 60, most_halvings = 12;
+constexpr int most_parts_of_a_step = 40, most_tries = 60, most_halvings = 20;
 constexpr double finest_part = 1e-14;  // of the step
 
 }  // namespace
@@ -94,7 +94,10 @@ StepReport KinkSteps::step(double h, const std::function<bool()>& at_part) {
     read(before_);
     double size = left;
     StepReport report = integrator_.step(size);
-    for (int k = 0; k < most_halvings && !report.ok(); ++k) report = integrator_.step(size *= 0.5);
+    const auto refused = [&report] { return report.solve.status == SolveStatus::refused; };
+    for (int k = 0; k < most_halvings && !report.ok() && !refused(); ++k)
+      report = integrator_.step(size *= 0.5);
+    if (refused()) return report;
     if (!report.ok()) {
       const int number = crossed >= 0 ? crossed : ahead();
       return number >= 0 ? stuck(number) : report;
@@ -102,7 +105,8 @@ StepReport KinkSteps::step(double h, const std::function<bool()>& at_part) {
     read(after_);
     changes_ = (after_ - before_).cwiseAbs();
     int number = first_change(), last = -1;
-    while (number >= 0 && std::abs(size) > finest_part * std::abs(h)) {
+    // Each function once: several vanish together, as those of v > 0 and v < 0.
+    for (int k = 0; k < kinks_->count() && number >= 0 && std::abs(size) > finest_part * std::abs(h); ++k) {
       last = number;
       report = shorten(number, size);
       if (!report.ok()) return report;

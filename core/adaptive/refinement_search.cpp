@@ -99,10 +99,10 @@ bool RefinementSearch::stopped(long max_solves) {
     refuse("steps with local errors below " + text(smallest_local_error) +
            " would follow nothing but round-off");
   else if (convergence_.runs() >= 5 && needed > limit && convergence_.difference() < error_out_of_reach)
-    refuse(convergence_.obstacle());
+    refuse_unless_amplified(convergence_.obstacle());
   else if (convergence_.runs() >= 5 && needed > limit && !convergence_.near_round_off() && !unresolved)
-    refuse("at the rate of the runs so far it would take about " + text(needed) +
-           " nonlinear systems or explicit steps (--max-solves)");
+    refuse_unless_amplified("at the rate of the runs so far it would take about " + text(needed) +
+                            " nonlinear systems or explicit steps (--max-solves)");
   else if (report_.runs.size() >= max_runs)
     refuse("no convergence in " + std::to_string(max_runs) + " runs");
   else
@@ -217,7 +217,7 @@ bool RefinementSearch::next(long max_solves) {
     return report_.refusal.empty();
   const std::size_t patience = kinks_on_the_way() ? runs_to_resolve_kinks : runs_to_converge;
   if (convergence_.stagnates() && (convergence_.runs() > patience || convergence_.difference() < 1e-4))
-    return refuse(convergence_.obstacle());
+    return refuse_unless_amplified(convergence_.obstacle());
   const double next = static_cast<double>(refinement_) / convergence_.next_factor();
   refinement_ = std::max(refinement_ + 1, std::lround(next));
   return true;
@@ -322,19 +322,34 @@ double RefinementSearch::amplification(long refinement) {
   return std::isfinite(apart) ? apart / distance_beside : 0.0;
 }
 
+/// The error that round-off alone leaves, as far as the motion amplifies it; the finest run is asked where a
+/// coarse one tells of too much, if that one is accepted.
+double RefinementSearch::amplified_round_off(bool accepted) {
+  if (local_ || convergence_.runs() == 0) return 0.0;
+  growth_ = amplification(first_good_);
+  const auto left = [this] {
+    return growth_ > growth_of_no_power ? growth_ * round_off_of(last_steps_) : 0.0;
+  };
+  if (accepted && left() > motion_.options.error) growth_ = amplification(refinement_);
+  return left();
+}
+
+/// Refuses, for the growth of errors where that explains it.
+bool RefinementSearch::refuse_unless_amplified(const std::string& why) {
+  const double left = amplified_round_off(false);
+  return refuse(left > motion_.options.error ? amplified(left) : why);
+}
+
+std::string RefinementSearch::amplified(double left) const {
+  return "the motion amplifies errors by a factor of " + text(growth_) +
+         ", so that round-off alone leaves one of " + text(left);
+}
+
 /// Ends the search with the last run, where the motion does not amplify round-off above the error asked for.
 bool RefinementSearch::accept() {
-  if (!local_) {
-    const auto left_by = [&](double growth) {
-      return growth > growth_of_no_power ? growth * round_off_of(last_steps_) : 0.0;
-    };
-    double growth = amplification(first_good_);
-    if (left_by(growth) > motion_.options.error) growth = amplification(refinement_);
-    if (left_by(growth) > motion_.options.error)
-      return refuse("the motion amplifies errors by a factor of " + text(growth) +
-                    ", so that round-off alone leaves one of " + text(left_by(growth)));
-    report_.estimate = std::max(report_.estimate, left_by(growth));
-  }
+  const double left = amplified_round_off(true);
+  if (left > motion_.options.error) return refuse(amplified(left));
+  report_.estimate = std::max(report_.estimate, left);
   accepted_ = true;
   report_.warning = doubt_;
   // Orders of differences that are round-off say nothing.

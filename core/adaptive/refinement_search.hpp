@@ -53,6 +53,9 @@ class RefinementSearch {
   void divide(const ForceSurveyReport& found);
   bool accept();
   double amplification(long refinement);
+  double amplified_round_off(bool accepted);
+  bool refuse_unless_amplified(const std::string& why);
+  std::string amplified(double left) const;
   bool refuse(const std::string& why);
 
   const Motion& motion_;
@@ -65,6 +68,7 @@ class RefinementSearch {
   long refinement_ = 1, last_steps_ = 0, last_refinement_ = 1, first_good_ = 0;
   double largest_position_ = 0.0, largest_momentum_ = 0.0, largest_velocity_ = 0.0;  ///< at the nodes read
   int failures_ = 0, divisions_ = 0;
+  double growth_ = 0.0;  ///< of errors, where it has been asked for
   bool surveyed_ = false, ended_ = false, accepted_ = false;
   std::string fast_;   ///< empty, or where the forces change fast
   std::string doubt_;  ///< empty, or what the checks of a run say of the last one

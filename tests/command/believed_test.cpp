@@ -185,7 +185,7 @@ step = 0.1
     const Outcome outcome = run("run " + file + how);
     EXPECT_EQ(outcome.status, 1) << outcome.err;
     EXPECT_TRUE(says(outcome, "points back from both sides")) << how << outcome.err;
-    EXPECT_TRUE(says(outcome, "v_x > 0") || says(outcome, "if in line")) << how << outcome.err;
+    EXPECT_TRUE(says(outcome, "in line 7")) << how << outcome.err;
   }
 }
 
