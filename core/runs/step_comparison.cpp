@@ -46,13 +46,13 @@ void StepComparison::add(const Sample& start, double h, const Sample& whole, con
   const double rounding = at_rest * std::max(max_norm(start.q), std::abs(h) * rest_.speed(h));
   if (first_.size() == 0) first_ = start.q;
   extent_ = std::max({extent_, max_norm(start.q - first_), max_norm(whole.q - first_)});
-  position_.add(start.q, whole.q, parts.q, start.time);
   const double difference = max_norm(whole.q - parts.q) / std::max(longest_way_, rounding);
   if (difference > 0.0 && !(difference <= worst_)) {
     worst_ = difference;
     worst_time_ = start.time;
   }
   if (longest_way_ <= rounding) return;  // velocities and momenta are round-off
+  position_.add(start.q, whole.q, parts.q, start.time);
   velocity_.add(start.v, whole.v, parts.v, start.time);
   momentum_.add(start.p, whole.p, parts.p, start.time);
 }
