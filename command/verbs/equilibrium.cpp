@@ -5,7 +5,7 @@
 #include <cmath>
 #include <diracstep/command/arguments.hpp>
 #include <diracstep/command/verbs.hpp>
-#include <diracstep/core/system/eigenmodes.hpp>
+#include <diracstep/core/equilibrium/eigenmodes.hpp>
 #include <diracstep/reports/json.hpp>
 #include <diracstep/reports/report.hpp>
 #include <memory>

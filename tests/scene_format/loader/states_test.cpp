@@ -3,7 +3,7 @@
 #include <cmath>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/runs/run.hpp>
-#include <diracstep/core/system/eigenmodes.hpp>
+#include <diracstep/core/equilibrium/eigenmodes.hpp>
 #include <diracstep/scene_format/scene_file.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
 

@@ -2,7 +2,7 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
-#include <diracstep/core/system/eigenmodes.hpp>
+#include <diracstep/core/equilibrium/eigenmodes.hpp>
 #include <vector>
 
 namespace diracstep {

@@ -2,8 +2,8 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <diracstep/core/numerics/errors.hpp>
-#include <diracstep/core/system/force_balance.hpp>
-#include <diracstep/core/system/linearisation.hpp>
+#include <diracstep/core/equilibrium/force_balance.hpp>
+#include <diracstep/core/equilibrium/linearisation.hpp>
 #include <utility>
 
 namespace diracstep {

@@ -1,7 +1,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "run_command.hpp"
+#include "../run_command.hpp"
 
 /// Events of a scene that act, against closed forms: impacts, settings, rows that are switched, clocks.
 namespace diracstep::testing {

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <diracstep/constraints/holonomic.hpp>
 #include <diracstep/constraints/pfaffian.hpp>
-#include <diracstep/core/system/eigenmodes.hpp>
+#include <diracstep/core/equilibrium/eigenmodes.hpp>
 
 namespace diracstep {
 namespace {

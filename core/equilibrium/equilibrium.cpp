@@ -3,8 +3,8 @@
 #include <array>
 #include <cmath>
 #include <diracstep/core/numerics/errors.hpp>
-#include <diracstep/core/system/equilibrium.hpp>
-#include <diracstep/core/system/force_balance.hpp>
+#include <diracstep/core/equilibrium/equilibrium.hpp>
+#include <diracstep/core/equilibrium/force_balance.hpp>
 #include <optional>
 
 namespace diracstep {

@@ -1,7 +1,7 @@
 #pragma once
 
 #include <complex>
-#include <diracstep/core/system/linearisation.hpp>
+#include <diracstep/core/equilibrium/linearisation.hpp>
 #include <vector>
 
 namespace diracstep {

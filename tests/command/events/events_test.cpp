@@ -1,7 +1,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "run_command.hpp"
+#include "../run_command.hpp"
 
 /// Events of a scene, [[events]]: zero crossings of its formulas.
 namespace diracstep::testing {

@@ -1,6 +1,6 @@
 #pragma once
 
-#include <diracstep/core/system/equilibrium.hpp>
+#include <diracstep/core/equilibrium/equilibrium.hpp>
 
 namespace diracstep {
 
