@@ -86,7 +86,7 @@ std::vector<Output> RunSensitivities::columns() {
       const auto index = static_cast<Eigen::Index>(i % coordinates.size());
       all.push_back({fmt::format("d({}{})/d({})", velocity ? "v_" : "", coordinates[i % coordinates.size()],
                                  columns_[k].by),
-                     [this, k, velocity, index](double, ConstVectorRef, ConstVectorRef) {
+                     [this, k, velocity, index](const MotionPoint&) {
                        const SensitivityColumn& column = read()[k];
                        return (velocity ? column.v : column.q)[index];
                      }});

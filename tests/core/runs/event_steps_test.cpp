@@ -40,7 +40,7 @@ Event wall() {
   return event;
 }
 
-const IntegratorOptions options{.method = "type1/gl:3", .step = 0.02};
+const IntegratorOptions small_steps{.method = "type1/gl:3", .step = 0.02};
 
 template <class Stepper, class Make>
 void expect_half_of_the_speed(const Make& make, double tolerance) {
@@ -62,12 +62,12 @@ TEST(EventSteps, AnImpactKeepsTheOtherRows) {
   const Registry registry = Registry::with_built_ins();
   expect_half_of_the_speed<Integrator>(
       [&](const std::shared_ptr<const Scene>& scene) {
-        return std::make_unique<Integrator>(scene, registry, kinsol(), options);
+        return std::make_unique<Integrator>(scene, registry, kinsol(), small_steps);
       },
       1e-9);
   expect_half_of_the_speed<AdaptiveIntegrator>(
       [&](const std::shared_ptr<const Scene>& scene) {
-        return std::make_unique<AdaptiveIntegrator>(scene, registry, kinsol(), options,
+        return std::make_unique<AdaptiveIntegrator>(scene, registry, kinsol(), small_steps,
                                                     AdaptiveOptions{.eps = 0.05, .end = 3.0});
       },
       1e-8);
@@ -78,7 +78,8 @@ TEST(EventSteps, BadEventsAreMisuse) {
   const auto with = [&](Event event) {
     EventSteps<Integrator> motion(rod(), nullptr, {std::move(event)}, kinsol(), Momentum::projected,
                                   [&](const std::shared_ptr<const Scene>& scene) {
-                                    return std::make_unique<Integrator>(scene, registry, kinsol(), options);
+                                    return std::make_unique<Integrator>(scene, registry, kinsol(),
+                                                                        small_steps);
                                   });
   };
   Event event = wall();
