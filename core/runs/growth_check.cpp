@@ -26,14 +26,13 @@ Start beside(const Start& start, double position_size, double velocity_size) {
 
 GrowthCheck::GrowthCheck(const Integrator& integrator, long steps)
     : steps_(steps),
-      watched_(integrator.work().steps == 0 && integrator.time() == integrator.scene().start.time &&
-               steps <= most_steps_followed &&
+      watched_(integrator.work().steps == 0 && steps <= most_steps_followed &&
                integrator.scene().dimension() + integrator.scene().rows() <= most_followed) {}
 
 void GrowthCheck::see(const Sample& point) {
   if (!watched_) return;
-  if (first_.size() == 0) first_ = point.q;
-  way_ = std::max(way_, max_norm(point.q - first_));
+  if (first_.q.size() == 0) first_ = {point.time, point.q, point.v, {}};
+  way_ = std::max(way_, max_norm(point.q - first_.q));
   largest_momentum_ = std::max(largest_momentum_, max_norm(point.p));
   largest_velocity_ = std::max(largest_velocity_, max_norm(point.v));
 }
@@ -45,7 +44,7 @@ void GrowthCheck::finish(Integrator& integrator, double local) {
   const Snapshot state = integrator.save();
   bool followed = true;
   try {
-    integrator.reset(beside(integrator.scene().start, way_, largest_velocity_));
+    integrator.reset(beside(first_, way_, largest_velocity_));
   } catch (const Misuse&) {  // a start that nothing may be moved at
     followed = false;
   }

@@ -14,7 +14,7 @@ inline constexpr double distance_beside = 1e-13;
 /// times as far apart.  Doubted is a run with G > 1e4 where G times the larger of the round-off, 2.2e-16
 /// √steps, and the difference of a step and its parts (StepComparison) exceeds 0.02 of the motion.
 ///
-/// Only for runs of at most 1000 steps from the scene's start, of at most 12 coordinates and rows together,
+/// Only for runs of at most 1000 steps from a start, of at most 12 coordinates and rows together,
 /// so that it takes some milliseconds.
 class GrowthCheck {
  public:
@@ -33,7 +33,7 @@ class GrowthCheck {
  private:
   long steps_;
   bool watched_;
-  Vector first_;  ///< position
+  Start first_;  ///< where the run starts
   double way_ = 0.0, largest_momentum_ = 0.0, largest_velocity_ = 0.0;
   std::string text_;
 };

@@ -192,12 +192,15 @@ Node FormulaGraph::raise(Node a, Node exponent) {
 
 /// Visits only what is reached: files of many small formulas are read in a time that grows with their length.
 std::vector<Node> FormulaGraph::reachable(std::span<const Node> roots, bool with_indices) const {
-  visits_.resize(nodes_.size(), 0);
-  ++searches_;
+  // Of this thread alone: scenes of one compiled file are loaded by several at once.
+  thread_local std::vector<std::uint64_t> visits;  // the last search that reached each node, of any graph
+  thread_local std::uint64_t searches = 0;
+  if (visits.size() < nodes_.size()) visits.resize(nodes_.size(), 0);
+  ++searches;
   std::vector<Node> nodes;
   const auto reach = [&](Node node) {
-    unsigned& last = visits_[static_cast<std::size_t>(node)];
-    if (std::exchange(last, searches_) != searches_) nodes.push_back(node);
+    std::uint64_t& last = visits[static_cast<std::size_t>(node)];
+    if (std::exchange(last, searches) != searches) nodes.push_back(node);
   };
   for (const Node root : roots) reach(root);
   std::size_t next = 0;
@@ -208,8 +211,7 @@ std::vector<Node> FormulaGraph::reachable(std::span<const Node> roots, bool with
         with_indices && (data.op == Op::element || data.op == Op::coordinate) && data.b != none;
     if (arity(data.op) == 2 || index) reach(data.b);
   }
-  visited_ += nodes.size();
-  if (visited_ > limits_.graph_visits)
+  if (counting_ && (visited_ += nodes.size()) > limits_.graph_visits)
     throw TooLarge("more than " + std::to_string(limits_.graph_visits) +
                    " visits of nodes of a formula graph");
   std::ranges::sort(nodes);

@@ -150,6 +150,9 @@ class FormulaGraph {
   /// asked for.
   std::vector<Node> reachable(std::span<const Node> roots, bool with_indices = false) const;
 
+  /// It is complete: what is read of it from now on, by several threads at once, counts for no limit.
+  void end_counting() { counting_ = false; }
+
   /// ∂root/∂symbol for each root; the symbol is a leaf.
   std::vector<Node> derivative(std::span<const Node> roots, Node symbol);
   Node derivative(Node root, Node symbol) { return derivative(std::span<const Node>(&root, 1), symbol)[0]; }
@@ -177,9 +180,8 @@ class FormulaGraph {
   std::vector<NodeData> nodes_;
   std::vector<Known> known_;
   std::unordered_map<NodeData, Node, Hash> index_;
-  mutable std::vector<unsigned> visits_;  ///< the last search that reached each node
-  mutable unsigned searches_ = 0;
-  mutable std::size_t visited_ = 0;  ///< nodes, in all searches
+  mutable std::size_t visited_ = 0;  ///< nodes, in all searches while it is built
+  bool counting_ = true;
 };
 
 /// How many arguments an operation takes: 0 for leaves.

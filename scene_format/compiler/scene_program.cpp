@@ -659,6 +659,7 @@ std::unique_ptr<SceneProgram> compile_scene(const std::string& file, const std::
             "visits of these; write repeated elements with for = \"i = 1..N\" and sum(i = 1..N, …)",
             limits.graph_nodes, limits.graph_visits));
   }
+  program->graph.end_counting();
   return program;
 }
 
