@@ -114,7 +114,7 @@ TEST_F(SweepVerb, WhatCannotBeRunIsRefused) {
 
 TEST_F(SweepVerb, AFullDiskIsToldAndTheRestIsRunLater) {
   ASSERT_EQ(run(orbits() + to("whole")).status, 0);
-  const Outcome full = run(orbits() + to("out"), "ulimit -f 0;");
+  const Outcome full = run(orbits() + to("out"), "ulimit -f 1;");
   EXPECT_EQ(full.status, 1);
   EXPECT_NE(full.err.find("could not be written in full"), std::string::npos) << full.err;
   std::filesystem::remove_all(path("out"));
