@@ -2,9 +2,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/equilibrium/equilibrium.hpp>
 #include <diracstep/core/equilibrium/force_balance.hpp>
+#include <diracstep/core/numerics/errors.hpp>
 #include <optional>
 
 namespace diracstep {

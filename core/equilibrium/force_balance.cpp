@@ -1,7 +1,7 @@
 #include <Eigen/QR>
 #include <algorithm>
-#include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/equilibrium/force_balance.hpp>
+#include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/system/hidden_rows.hpp>
 #include <diracstep/core/system/lagrangian_derivatives.hpp>
 

@@ -1,9 +1,9 @@
 #include <Eigen/LU>
 #include <Eigen/QR>
 #include <algorithm>
-#include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/equilibrium/force_balance.hpp>
 #include <diracstep/core/equilibrium/linearisation.hpp>
+#include <diracstep/core/numerics/errors.hpp>
 #include <utility>
 
 namespace diracstep {

@@ -238,7 +238,8 @@ class FormulaParser::Reader : FormulaScanner {
   Node definition(std::size_t place, const std::string& name, const FormulaText& text) {
     std::string key = name + ' ' + context_.second + (context_.positions ? 'q' : ' ') +
                       (context_.time ? 't' : ' ') + (context_.sums ? 's' : ' ') +
-                      (context_.reference ? 'r' : ' ') + (context_.mechanics ? 'm' : ' ') + (context_.motion ? 'M' : ' ');
+                      (context_.reference ? 'r' : ' ') + (context_.mechanics ? 'm' : ' ') +
+                      (context_.motion ? 'M' : ' ');
     for (const int loop : context_.loops) key += ' ' + std::to_string(loop);
     const auto found = parser_.defined_.find(key);
     if (found != parser_.defined_.end()) return found->second;

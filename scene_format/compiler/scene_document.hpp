@@ -43,7 +43,7 @@ struct SceneDocument {
     std::optional<FormulaText> loops;
     Place place;
     std::optional<FormulaText> compliance = {};                    ///< of a spring in place of the row
-    bool on = true;  ///< at the start
+    bool on = true;                                                ///< at the start
     std::string extension() const { return "extension_" + name; }  ///< its coordinate then
   };
   /// "x = …", "v_x = […]": a value, or one for each element of a repeated coordinate.

@@ -225,7 +225,8 @@ project = true
 values = ["x"]
 )";
   const Sweep off = read_sweep(write("off.toml", text));
-  expect_misuse([&] { (void)run(off, {.folder = path("off")}); }, {"row 'rod'", "no position is named as a guess"});
+  expect_misuse([&] { (void)run(off, {.folder = path("off")}); },
+                {"row 'rod'", "no position is named as a guess"});
   std::string guessed = text;
   guessed.replace(guessed.find("\"start.y\" = [-0.5]\n"), 19, "");
   write("rod.toml", R"(name = "rod"
