@@ -56,7 +56,7 @@ void run(const diracstep_model& model, const diracstep_options& options, const d
   const auto members = run_ensemble(entry.scene, model.registry, solvers_from(options), stepping,
                                     starts_of(model, ensemble), steps, momentum_from(ensemble.momentum),
                                     ensemble.threads, [&] { return !stopped(ensemble.stop); });
-  PointWriter writer(ends, entry.invariants, !entry.scene->lagrangian);
+  PointWriter writer(ends, entry.scene->rows(), entry.invariants, !entry.scene->lagrangian);
   std::vector<std::string> cells;
   long unread = 0;
   for (std::size_t k = 0; k < members.size(); ++k) {

@@ -168,7 +168,8 @@ int diracstep_read(diracstep_integrator* integrator, int momentum, diracstep_sta
     write(sample.q, to.q);
     write(sample.v, to.v);
     write(sample.p, to.p);
-    write(sample.lambda, to.lambda);
+    const Eigen::Index rows = std::min<Eigen::Index>(from.scene->rows(), sample.lambda.size());
+    write(sample.lambda.head(rows), to.lambda);  // an integrator may know more rows than the scene
   });
 }
 

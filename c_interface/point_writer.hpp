@@ -7,8 +7,9 @@ namespace diracstep::c_interface {
 /// Writes points into the caller's arrays, one row each.
 class PointWriter {
  public:
-  PointWriter(diracstep_points& points, const std::vector<Invariant>& invariants, bool by_momentum)
-      : points_(points), invariants_(invariants), by_momentum_(by_momentum) {
+  /// `rows`: of the scene; an integrator may know more, whose forces are left out.
+  PointWriter(diracstep_points& points, int rows, const std::vector<Invariant>& invariants, bool by_momentum)
+      : points_(points), rows_(rows), invariants_(invariants), by_momentum_(by_momentum) {
     points.count = 0;
   }
 
@@ -21,6 +22,7 @@ class PointWriter {
 
  private:
   diracstep_points& points_;
+  Eigen::Index rows_;
   const std::vector<Invariant>& invariants_;
   bool by_momentum_;
   double last_time_ = 0.0;

@@ -34,7 +34,8 @@ void PointWriter::write(const Sample& point, long row) {
   write_row(point.q, points_.q, row);
   write_row(point.v, points_.v, row);
   write_row(point.p, points_.p, row);
-  write_row(point.lambda, points_.lambda, row);
+  if (points_.lambda != nullptr)
+    std::copy_n(point.lambda.begin(), std::min(rows_, point.lambda.size()), points_.lambda + row * rows_);
   if (points_.invariants == nullptr) return;
   double* to = points_.invariants + row * static_cast<long>(invariants_.size());
   for (const Invariant& invariant : invariants_)
@@ -106,7 +107,7 @@ class Run {
         checks_(std::move(checks)),
         course_(course),
         momentum_(momentum_from(course.momentum)),
-        writer_(points, handle.invariants, handle.invariants_by_momentum) {}
+        writer_(points, handle.scene->rows(), handle.invariants, handle.invariants_by_momentum) {}
 
   template <class Size>
   void go(double end, Size size) {

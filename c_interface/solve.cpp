@@ -71,7 +71,7 @@ void solve(const diracstep_model& model, const diracstep_options& options, const
   const SolverFactory solvers = solvers_from(options);
   const ErrorControlReport report =
       solve_to_error(entry.scene, model.registry, solvers, end, wanted(model, options, course, error));
-  PointWriter writer(points, entry.invariants, !entry.scene->lagrangian);
+  PointWriter writer(points, entry.scene->rows(), entry.invariants, !entry.scene->lagrangian);
   found = found_from(report);
   if (!report.ok()) {
     if (report.end.q.size() > 0) writer.write(report.end);

@@ -53,7 +53,8 @@ std::size_t CsvTable::column(const std::string& name) const {
   return static_cast<std::size_t>(found - names.begin());
 }
 
-CsvTable read_csv(const std::string& path, const std::string& what, std::size_t limit) {
+CsvTable read_csv(const std::string& path, const std::string& what, std::size_t limit,
+                  std::size_t least_columns) {
   const std::string text = read_file(path, what, limit);
   CsvTable table;
   std::size_t width = 0;
@@ -66,8 +67,9 @@ CsvTable read_csv(const std::string& path, const std::string& what, std::size_t 
     if (line.empty() || line.front() == '#') continue;
     const std::vector<std::string> fields = fields_of(line);
     auto numbers = numbers_of(fields);
-    if (width == 0 && fields.size() < 2)
-      throw Misuse(fmt::format("{}: '{}', line {}: expected two columns or more", what, path, number));
+    if (width == 0 && fields.size() < least_columns)
+      throw Misuse(
+          fmt::format("{}: '{}', line {}: expected {} columns or more", what, path, number, least_columns));
     if (width != 0 && fields.size() != width)
       throw Misuse(fmt::format("{}: '{}', line {}: {} columns; expected {}", what, path, number,
                                fields.size(), width));

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <diracstep/core/adaptive/adaptive_run.hpp>
 #include <diracstep/core/adaptive/damping_survey.hpp>
 #include <diracstep/core/adaptive/error_control.hpp>
+#include <diracstep/core/adaptive/variable_run_checks.hpp>
 #include <diracstep/core/numerics/near_names.hpp>
 #include <diracstep/core/runs/event_steps.hpp>
 #include <diracstep/core/runs/run.hpp>
@@ -98,6 +100,7 @@ MemberRuns::MemberRuns(const Sweep& sweep, SceneMaker make_scene, const Registry
                                misuse.what()));
     }
   if (!sweep_.end) sweep_.end = example_.t_end;
+  step_given_ = sweep_.step > 0.0;
   take_recommendation();
   if (sweep_.step == 0.0 && !sweep_.error) sweep_.step = example_.natural_step;
   sweep_.values = recorded_values(sweep, example_);
@@ -120,6 +123,7 @@ void MemberRuns::choose_method() {
   options_.order = sweep_.order;
   if (sweep_.rule) options_.constraint_rule = registry_.rule(*sweep_.rule);
   if (sweep_.method != automatic_method || sweep_.error) return;
+  const bool step_is_open = !step_given_;
   const double step = std::abs(sweep_.step);
   options_.step = std::copysign(step, *sweep_.end - example_.scene->start.time);
   const DefaultMethod chosen = default_method_of_motion(
@@ -127,6 +131,7 @@ void MemberRuns::choose_method() {
       {options_.order, 0.0, options_.constraint_rule, large_from(options_.dense_limit)});
   options_.method = sweep_.method = chosen.method;
   options_.order = sweep_.order = chosen.order;
+  if (step_is_open && example_.events.empty()) local_error_ = chosen.local_error;
 }
 
 CatalogueScene MemberRuns::scene_of(long number) const {
@@ -180,6 +185,7 @@ MemberResult MemberRuns::take_steps(const CatalogueScene& entry) const {
   IntegratorOptions options = options_;
   options.step = grid.step;
   Recorded recorded(sweep_, entry);
+  if (local_error_ > 0.0) return run_by_local_error(entry, options, recorded);
   return entry.events.empty() ? run_without_events(entry, options, grid.steps, recorded)
                               : run_through_events(entry, options, grid.steps, recorded);
 }
@@ -196,6 +202,21 @@ MemberResult MemberRuns::run_without_events(const CatalogueScene& entry, const I
   };
   const RunReport report = run_steps(integrator, steps, Momentum::projected,
                                      recorded.needs_every_point() ? 1 : steps, see, &checks);
+  return result_of(report.last.failure, checks.text(), entry, end, recorded);
+}
+
+MemberResult MemberRuns::run_by_local_error(const CatalogueScene& entry, const IntegratorOptions& options,
+                                            Recorded& recorded) const {
+  AdaptiveIntegrator integrator(entry.scene, registry_, solvers_, options,
+                                {.eps = local_error_, .end = *sweep_.end});
+  VariableRunChecks checks(integrator, {entry.scene, registry_, solvers_, integrator.options()});
+  Sample end;
+  const auto see = [&](const Sample& node) {
+    recorded.see(entry, node);
+    end = node;
+    return true;
+  };
+  const RunReport report = run_until(integrator, *sweep_.end, Momentum::projected, 1, see, &checks);
   return result_of(report.last.failure, checks.text(), entry, end, recorded);
 }
 

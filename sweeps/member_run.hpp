@@ -41,6 +41,8 @@ class MemberRuns {
   MemberResult take_steps(const CatalogueScene& entry) const;
   MemberResult run_without_events(const CatalogueScene& entry, const IntegratorOptions& options, long steps,
                                   Recorded& recorded) const;
+  MemberResult run_by_local_error(const CatalogueScene& entry, const IntegratorOptions& options,
+                                  Recorded& recorded) const;
   MemberResult run_through_events(const CatalogueScene& entry, const IntegratorOptions& options, long steps,
                                   Recorded& recorded) const;
   MemberResult search(const CatalogueScene& entry) const;
@@ -53,6 +55,8 @@ class MemberRuns {
   SolverFactory solvers_;
   CatalogueScene example_;
   IntegratorOptions options_;
+  bool step_given_ = false;
+  double local_error_ = 0.0;  ///< of variable steps, where strong damping chose these and no step is given
 };
 
 }  // namespace diracstep

@@ -1,9 +1,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/files/csv_table.hpp>
 #include <diracstep/files/input_file.hpp>
 #include <diracstep/scene_format/compiler/size_limits.hpp>
 #include <diracstep/scene_format/compiler/table_reader.hpp>
@@ -11,7 +11,6 @@
 #include <diracstep/sweeps/random_numbers.hpp>
 #include <diracstep/sweeps/sweep.hpp>
 #include <filesystem>
-#include <sstream>
 
 namespace diracstep {
 
@@ -21,20 +20,6 @@ namespace {
 
 constexpr double most_members = 1e12, most_values = 1e7;
 constexpr std::size_t most_table_bytes = 1'000'000'000;
-
-std::string trimmed(std::string_view text) {
-  const auto first = text.find_first_not_of(" \t\r");
-  if (first == std::string_view::npos) return {};
-  return std::string(text.substr(first, text.find_last_not_of(" \t\r") - first + 1));
-}
-
-std::vector<std::string> split_fields(const std::string& line) {
-  std::vector<std::string> fields;
-  std::istringstream stream(line);
-  for (std::string field; std::getline(stream, field, ',');) fields.push_back(trimmed(field));
-  if (!line.empty() && line.back() == ',') fields.emplace_back();
-  return fields;
-}
 
 class SweepReader : TableReader {
  public:
@@ -142,35 +127,11 @@ class SweepReader : TableReader {
     if (!node->is_string())
       fail(place_of(node->source()), "'table': expected the name of a CSV file in quotes");
     const std::string file = beside(node->as_string()->get());
-    std::istringstream stream(read_file(file, "the table", most_table_bytes));
-    std::string line;
-    std::getline(stream, line);
-    sweep_.table_names = split_fields(line);
-    for (int number = 2; std::getline(stream, line); ++number)
-      if (!trimmed(line).empty()) sweep_.table.push_back(table_line(file, number, line));
-    if (sweep_.table.empty()) throw Misuse(file + ": expected a line of names and a line for each member");
-    if (static_cast<double>(sweep_.table.size()) * static_cast<double>(sweep_.table_names.size()) > 1e9)
-      throw Misuse(file + ": more than 1e9 numbers");
-  }
-
-  std::vector<double> table_line(const std::string& file, int line, const std::string& text) const {
-    const std::vector<std::string> fields = split_fields(text);
-    if (fields.size() != sweep_.table_names.size())
-      throw SceneError(
-          file, {line, 1},
-          fmt::format("{} fields; the first line names {}", fields.size(), sweep_.table_names.size()));
-    std::vector<double> values;
-    for (std::size_t k = 0; k < fields.size(); ++k) {
-      double value = 0.0;
-      const char* end = fields[k].data() + fields[k].size();
-      const auto read = std::from_chars(fields[k].data(), end, value);
-      if (read.ec != std::errc() || read.ptr != end || !std::isfinite(value))
-        throw SceneError(
-            file, {line, 1},
-            fmt::format("'{}' of '{}'; expected a finite number", fields[k], sweep_.table_names[k]));
-      values.push_back(value);
-    }
-    return values;
+    CsvTable read = read_csv(file, "the table", most_table_bytes, 1);
+    if (read.names.empty() || read.lines.empty())
+      throw Misuse(fmt::format("'{}': expected a line of names and a line of numbers for each member", file));
+    sweep_.table_names = std::move(read.names);
+    sweep_.table = std::move(read.lines);
   }
 
   Drawn drawn(const Item& item) const {

@@ -224,6 +224,8 @@ void run_fit(FitArguments arguments, Session& session) {
     changes[name] = value;
   }
   const CatalogueScene entry = make_scene(session, arguments.scene, changes);
+  if (!entry.events.empty())
+    throw Misuse("fit does not go with the events of the scene: when one is met is not differentiated");
   Vector begin(static_cast<Eigen::Index>(parameters_fitted.size()));
   for (std::size_t k = 0; k < parameters_fitted.size(); ++k) {
     const auto found = entry.parameters.find(parameters_fitted[k]);
@@ -256,6 +258,15 @@ void run_fit(FitArguments arguments, Session& session) {
   if (!arguments.residuals.empty()) write_residuals(arguments.residuals, data, report, *entry.scene);
   print(arguments.json ? fit_json(report, parameters_fitted, arguments, entry.scene->name)
                        : fit_text(report, parameters_fitted, arguments, entry.scene->name));
+  constexpr double suspicious = 3.0;  // of the standard deviations given
+  const bool all_given = parameters(arguments.sigma, "--sigma").size() == data.columns.size();
+  if (report.converged && all_given && report.residual > suspicious) {
+    say(fmt::format(
+        "doubted: what is left is {:.3g} times the deviations that --sigma states: another minimum, "
+        "which --from may lead to, or another model",
+        report.residual));
+    session.exit_status = doubted;
+  }
   if (report.converged) return;
   say(fmt::format("the fit has not converged: {}", report.ending));
   session.exit_status = failed;

@@ -109,7 +109,7 @@ Linearisation linearise(const Scene& given, const Equilibrium& at, double later)
               linear.stiffness + s.transpose() * balance.damping * linear.drift);
   else
     linear.state = n.transpose() * linear.drift;  // rows alone determine the motion
-  const double reach = given.start.q.lpNorm<Eigen::Infinity>();
+  const double reach = std::max(given.start.q.lpNorm<Eigen::Infinity>(), at.q.lpNorm<Eigen::Infinity>());
   for (const double part : {0.382, 0.618}) {  // unequal, so that a period does not hide between them
     const double t = part * (later - at.time);
     const BalanceAt there(*scene, at.time + t, at.q + t * at.v, at.v);

@@ -150,7 +150,13 @@ EventActions::Outcome EventActions::act(const Event& event, const Sample& at, co
     double wanted = 0.0;
     if (event.restitution) {
       const double before = rate_of_row(*event.contact, at.time, outcome.q, outcome.v);
-      wanted = -event.restitution(point) * before;
+      const double restitution = event.restitution(point);
+      if (!(restitution >= 0.0 && std::isfinite(restitution))) {
+        outcome.failure = "event '" + event.name + "' at t = " + to_text(at.time, 10) + ": restitution is " +
+                          to_text(restitution) + "; a number that is not negative is needed";
+        return outcome;
+      }
+      wanted = -restitution * before;
       outcome.rate = wanted;
       with_contact->constraints.insert(with_contact->constraints.begin(),
                                        std::make_shared<ImpactRow>(event.contact, -wanted));

@@ -196,6 +196,11 @@ StepReport EventSteps<Stepper>::begin() {
   StepReport report;
   report.solve = sample(here);
   if (!report.ok()) return failed(std::string("reading the start: ") + describe(report.solve.status));
+  for (const Event& event : events())
+    if (event.restitution && event.direction == Event::Direction::falling)
+      if (const double gap = event.at(here.point()); gap < 0.0)
+        return failed("event '" + event.name + "': its function is " + to_text(gap) +
+                      " at the start, behind the contact; it is positive where there is none (direction)");
   if (report = search_.see(here, {}); !report.ok()) return report;
   (void)search_.go_on(here, {}, actions_.awake());
   std::vector<EventHit> due;

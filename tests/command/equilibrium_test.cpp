@@ -53,6 +53,16 @@ TEST_F(EquilibriumVerb, StatesAloneHaveTheirEigenvalues) {
   EXPECT_EQ(json["stability"].get<std::string>().substr(0, 8), "unstable");
 }
 
+/// Nothing in it depends on the time; round-off of th = 1 is no change, although the start is at 0.
+TEST_F(EquilibriumVerb, ARestFarFromAStartAtZeroIsNotDoubted) {
+  std::ofstream(path("servo.toml"))
+      << "name = \"servo\"\nlagrangian = \"0.01*v_th^2/2\"\n[coordinates]\nth = {}\n[states]\n"
+         "sum = { rate = \"1 - th\" }\nlag = { rate = \"(th - lag)/0.01\" }\n[force]\n"
+         "th = \"20*(1 - th) + 10*sum - 2*(th - lag)/0.01 - 0.35*v_th\"\n[span]\nend = 3\nstep = 0.01\n";
+  const Outcome outcome = run("equilibrium '" + path("servo.toml") + "'");
+  EXPECT_EQ(outcome.status, 0) << outcome.err << outcome.out;
+}
+
 TEST_F(EquilibriumVerb, RowsThatMoveAreTold) {
   for (const char* row : {"v_x = 1", "x = 0.1*sin(3*t)"}) {
     std::ofstream(path("belt.toml"))

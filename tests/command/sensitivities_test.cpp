@@ -32,6 +32,22 @@ TEST_F(SensitivitiesOfRuns, AreThoseOfDifferences) {
   EXPECT_EQ(json["end"], run_of("run chaplygin_sleigh --end 2")["end"]);  // the same bits
 }
 
+TEST_F(SensitivitiesOfRuns, AFitThroughEventsIsRefused) {
+  std::ofstream(path("data.csv")) << "t,y\n0.1,0.9\n1,0.2\n";
+  expect_misuse(
+      "fit " DIRACSTEP_SOURCE "/examples/scenes/bouncing_ball.toml '" + path("data.csv") + "' --parameters g",
+      {"fit", "events"});
+}
+
+/// Data of another pendulum: what is left is far above the deviation stated.
+TEST_F(SensitivitiesOfRuns, AFitThatLeavesMoreThanStatedIsDoubted) {
+  std::ofstream(path("data.csv")) << "t,x\n0.5,3\n1,-2\n1.5,4\n";
+  const Outcome outcome =
+      run("fit chaplygin_sleigh '" + path("data.csv") + "' --parameters a --sigma x=0.001");
+  EXPECT_EQ(outcome.status, 3) << outcome.err << outcome.out;
+  EXPECT_NE(outcome.err.find("--sigma"), std::string::npos) << outcome.err;
+}
+
 TEST_F(SensitivitiesOfRuns, StandInTheFilePointByPoint) {
   const Outcome outcome =
       run("run chaplygin_sleigh --end 1 --sensitivities a --json --out '" + path("sleigh.csv") + "'");

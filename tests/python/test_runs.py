@@ -164,3 +164,29 @@ def test_drawing(skate, tmp_path):
     animation = run.animate("x", "y", frames=3)
     animation.save(tmp_path / "skate.gif", writer="pillow")
     assert (tmp_path / "skate.gif").stat().st_size > 0
+
+
+def test_rows_that_a_circuit_hides_are_not_written(tmp_path):
+    """An integrator knows the voltage law of a source across a capacitor as a further row; the arrays have no room for it."""
+    file = tmp_path / "across.toml"
+    file.write_text("""
+name = "across"
+[[source_voltage]]
+name = "V"
+nodes = ["ground", "a"]
+value = "sin(1000*t)"
+[[capacitor]]
+name = "C"
+nodes = ["a", "ground"]
+value = 1e-6
+[span]
+end = 1e-2
+step = 1e-4
+""")
+    scene = ds.load(file)
+    run = scene.run()
+    assert run.lambda_.shape == (101, len(scene.rows)) and np.all(np.isfinite(run.lambda_))
+    assert abs(run["qC"][-1]) == pytest.approx(1e-6 * abs(np.sin(10.0)), rel=1e-9)
+    integrator = scene.integrator()
+    integrator.step()
+    assert integrator.state().lambda_.shape == (len(scene.rows),)

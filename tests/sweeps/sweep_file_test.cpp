@@ -104,9 +104,9 @@ TEST_F(SweepFile, MistakesAreToldWithTheirPlace) {
       {"2e+12 members", "1e+12 are the most"});
   expect_refused("scene = \"a\"\ntable = \"none.csv\"\n", {"none.csv", "cannot be read"});
   write("bad.csv", "a,b\n1,2\n1,x\n");
-  expect_refused("scene = \"a\"\ntable = \"bad.csv\"\n", {"bad.csv:3", "'x' of 'b'"});
+  expect_refused("scene = \"a\"\ntable = \"bad.csv\"\n", {"bad.csv', line 3", "1,x", "finite numbers"});
   write("short.csv", "a,b\n1\n");
-  expect_refused("scene = \"a\"\ntable = \"short.csv\"\n", {"short.csv:2", "1 fields", "names 2"});
+  expect_refused("scene = \"a\"\ntable = \"short.csv\"\n", {"short.csv', line 2", "1 columns", "expected 2"});
   expect_refused("scene = [\n", {"s.toml"});
 }
 

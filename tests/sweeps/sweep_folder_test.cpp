@@ -212,6 +212,32 @@ values = ["y", "v_y"]
   }
 }
 
+/// A charge behind a resistor that lets it through in a nanosecond: fixed steps of the default would not.
+TEST_F(SweepFolder, StrongDampingTakesStepsByTheirLocalError) {
+  write("lag.toml", R"(name = "lag"
+lagrangian = "v_x^2/2 - x^2/2"
+dissipation = "c*v_x^2/2"
+[coordinates]
+x = {}
+[parameters]
+c = 1e6
+[start]
+x = 1
+[span]
+end = 1000
+step = 1
+)");
+  const Sweep sweep = read_sweep(
+      write("lags.toml", "scene = \"lag.toml\"\n[grid]\nc = [1e5, 1e6]\n[record]\nvalues = [\"x\"]\n"));
+  const SweepReport report = run(sweep, {.folder = path("out")});
+  EXPECT_EQ(report.method, "damped/radau:3");
+  EXPECT_EQ(report.ok, 2) << (report.reasons.empty() ? "" : report.reasons[0]);
+  for (std::size_t k = 0; k < 2; ++k) {
+    const std::vector<std::string> line = fields(rows("out")[1 + k]);
+    EXPECT_NEAR(std::stod(line[4]), std::exp(-1000.0 / std::stod(line[1])), 1e-6);
+  }
+}
+
 /// What the sweep gives stays, and the rest of the start is found: y of the rod from its x.
 TEST_F(SweepFolder, ProjectionMovesWhatIsNotGiven) {
   const std::string text = R"(scene = "pendulum_cartesian"

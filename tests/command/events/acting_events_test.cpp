@@ -49,6 +49,21 @@ TEST_F(ActingEvents, ABallBouncesByItsClosedForm) {
   }
 }
 
+TEST_F(ActingEvents, AStartBehindAContactAndANegativeRestitutionAreTold) {
+  for (const auto& [what, told] : {std::pair("--set e=-0.5", "restitution is -0.5"),
+                                   std::pair("y = -0.3", "at the start, behind the contact")}) {
+    std::string text = ball;
+    std::string options;
+    if (what[0] == '-')
+      options = std::string(" ") + what;
+    else
+      text.replace(text.find("y = 1"), 5, what);
+    const Outcome outcome = run("run " + scene(text) + options);
+    EXPECT_EQ(outcome.status, 1) << what;
+    EXPECT_NE(outcome.err.find(told), std::string::npos) << what << outcome.err;
+  }
+}
+
 TEST_F(ActingEvents, ABallThatComesToRestIsToldOrHeldByARow) {
   std::string text = ball;
   text.replace(text.find("e = 0.8"), 7, "e = 0.5");
