@@ -57,8 +57,8 @@ TEST_F(EquilibriumVerb, StatesAloneHaveTheirEigenvalues) {
 TEST_F(EquilibriumVerb, ARestFarFromAStartAtZeroIsNotDoubted) {
   std::ofstream(path("servo.toml"))
       << "name = \"servo\"\nlagrangian = \"0.01*v_th^2/2\"\n[coordinates]\nth = {}\n[states]\n"
-         "sum = { rate = \"1 - th\" }\nlag = { rate = \"(th - lag)/0.01\" }\n[force]\n"
-         "th = \"20*(1 - th) + 10*sum - 2*(th - lag)/0.01 - 0.35*v_th\"\n[span]\nend = 3\nstep = 0.01\n";
+         "total = { rate = \"1 - th\" }\nlag = { rate = \"(th - lag)/0.01\" }\n[force]\n"
+         "th = \"20*(1 - th) + 10*total - 2*(th - lag)/0.01 - 0.35*v_th\"\n[span]\nend = 3\nstep = 0.01\n";
   const Outcome outcome = run("equilibrium '" + path("servo.toml") + "'");
   EXPECT_EQ(outcome.status, 0) << outcome.err << outcome.out;
 }

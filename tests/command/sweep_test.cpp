@@ -15,7 +15,7 @@ class SweepVerb : public Command {
   std::string orbits() const {
     std::ofstream(path("orbits.toml")) << R"(scene = "kepler_e06"
 method = "type1/gl:2"
-step = 0.01
+step = 0.002
 end = 20
 block = 2
 [grid]
