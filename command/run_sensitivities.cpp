@@ -34,7 +34,11 @@ ParametricScene parameters_of(const std::vector<std::string>& wanted, const std:
 RunSensitivities::RunSensitivities(const std::vector<std::string>& wanted, const std::string& name,
                                    const Parameters& changes, const CatalogueScene& entry,
                                    const Registry& registry, Integrator& integrator)
-    : sensitivities_(integrator, registry, parameters_of(wanted, name, changes, entry)) {
+    : RunSensitivities(wanted, parameters_of(wanted, name, changes, entry), registry, integrator) {}
+
+RunSensitivities::RunSensitivities(const std::vector<std::string>& wanted, const ParametricScene& scene,
+                                   const Registry& registry, Integrator& integrator)
+    : doubt_(scene.doubt), sensitivities_(integrator, registry, scene) {
   const int n = sensitivities_.coordinates();
   const auto starts = std::ranges::count_if(wanted, is_start);
   directions_.resize(2 * n + sensitivities_.parameters(),

@@ -22,6 +22,11 @@ class RunSensitivities {
   /// the scene was made from.  Throws Misuse for another word.  The integrator stands at its start.
   RunSensitivities(const std::vector<std::string>& wanted, const std::string& name, const Parameters& changes,
                    const CatalogueScene& entry, const Registry& registry, Integrator& integrator);
+  RunSensitivities(const std::vector<std::string>& wanted, const ParametricScene& scene,
+                   const Registry& registry, Integrator& integrator);
+
+  /// Of the scene: see ParametricScene::doubt.
+  const std::string& doubt() const { return doubt_; }
 
   /// After each step of the integrator.
   void follow_step();
@@ -32,8 +37,7 @@ class RunSensitivities {
   std::vector<Output> columns();
 
  private:
-  void add(const std::string& word, const Scene& scene, Eigen::Index& column);
-
+  std::string doubt_;
   Sensitivities sensitivities_;
   Directions directions_;
   std::vector<SensitivityColumn> columns_;

@@ -59,7 +59,9 @@ CsvTable read_csv(const std::string& path, const std::string& what, std::size_t 
   CsvTable table;
   std::size_t width = 0;
   long number = 0;
-  for (std::size_t begin = 0; begin < text.size();) {
+  constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
+  for (std::size_t begin = text.starts_with(byte_order_mark) ? byte_order_mark.size() : 0;
+       begin < text.size();) {
     const std::size_t end = std::min(text.find('\n', begin), text.size());
     const std::string_view line = trimmed(std::string_view(text).substr(begin, end - begin));
     begin = end + 1;

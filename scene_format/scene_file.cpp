@@ -477,6 +477,26 @@ void move_start(const LoadedScene& loaded, const CatalogueScene& entry, Parametr
                          result.start_q, result.start_v);
 }
 
+/// Where formulas jump or have kinks at places or times that depend on the parameters; the derivative of a
+/// motion is that of its formulas, without what a moving jump adds.
+std::string doubt_of_switches(const SceneProgram& program) {
+  std::string names;
+  for (const std::string& name : program.differentiated) {
+    const auto& parameter =
+        program.symbols.parameters[static_cast<std::size_t>(program.symbols.parameter(name))];
+    const auto reads = [&](const Piece& piece) {
+      return std::ranges::any_of(piece.slots,
+                                 [&](Node leaf) { return program.graph[leaf].a == parameter.family; });
+    };
+    if (std::ranges::any_of(program.kinks.kinks.pieces, reads) ||
+        std::ranges::any_of(program.kinks.events.pieces, reads))
+      names += (names.empty() ? "'" : ", '") + name + "'";
+  }
+  if (names.empty()) return {};
+  return "where the formulas switch depends on " + names +
+         ": if they jump there, the derivatives lack what the moving jump adds";
+}
+
 ParametricScene load_parametric(const std::string& file, const std::string& text, const CatalogueScene& entry,
                                 const std::vector<std::string>& parameters, const Parameters& changes,
                                 bool as_written) {
@@ -502,6 +522,7 @@ ParametricScene load_parametric(const std::string& file, const std::string& text
   auto extended = std::make_shared<Scene>(scene_of(loaded, start));
   extended->kinks = nullptr;
   result.extended = std::move(extended);
+  result.doubt = doubt_of_switches(*loaded->program);
   differentiate_start(*loaded, entry.scene->start, result);
   move_start(*loaded, entry, result);
   return result;

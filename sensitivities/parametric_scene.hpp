@@ -20,6 +20,9 @@ struct ParametricScene {
   Vector parameters = {};                 ///< θ, P numbers
   Columns start_q = {}, start_v = {};  ///< ∂q0/∂θ and ∂v0/∂θ, n×P; empty: the start does not depend on θ
 
+  /// Empty, or what the derivatives lack: the formulas switch where a parameter says.
+  std::string doubt = {};
+
   /// The names of the parameters.
   std::vector<std::string> names() const;
 };

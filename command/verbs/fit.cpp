@@ -254,6 +254,10 @@ void run_fit(FitArguments arguments, Session& session) {
                            steps,
                            arguments.max_evaluations,
                            arguments.confidence};
+  if (const std::string doubt = problem.scene(begin).doubt; !doubt.empty()) {
+    say(doubt);
+    session.exit_status = doubted;
+  }
   const FitReport report = fit(problem, data, begin);
   if (!arguments.residuals.empty()) write_residuals(arguments.residuals, data, report, *entry.scene);
   print(arguments.json ? fit_json(report, parameters_fitted, arguments, entry.scene->name)

@@ -141,6 +141,7 @@ void run_fixed(const RunArguments& options, const CatalogueScene& entry, const S
   if (derivatives) keeping.sensitivities = &*derivatives;
   run_to(steps, motion, keeping, result);
   if (derivatives && result.failure.empty()) result.sensitivities = derivatives->read();
+  if (derivatives) result.doubt = joined_doubts({result.doubt, derivatives->doubt()});
 }
 
 /// Variable steps to the end, or to the last of the times given.

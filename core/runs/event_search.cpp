@@ -74,7 +74,8 @@ StepReport EventSearch::look(std::size_t event, double here, const Sample& point
   if (!watch.left && std::max(std::abs(watch.last), std::abs(here)) <= round_off_of_values * watch.largest)
     return {};
   const double side = events_[event].direction == Event::Direction::rising ? -1.0 : 1.0;
-  if (watch.left && !(side * watch.last > 0.0) && side * here < 0.0) {
+  if (watch.left && events_[event].restitution && !(side * watch.last > 0.0) &&
+      side * here < -round_off_of_values * watch.largest) {
     StepReport report;
     report.solve.status = SolveStatus::refused;
     report.failure = "the contact of event '" + events_[event].name +
@@ -94,6 +95,14 @@ StepReport EventSearch::look(std::size_t event, double here, const Sample& point
 StepReport EventSearch::tick(std::size_t event, const Sample& point, const Read& read) {
   Watch& watch = watches_[event];
   const double step = point.time - last_time_;
+  constexpr double most_ticks = 1e5;  // between two points
+  if (std::abs(step) > most_ticks * events_[event].every) {
+    StepReport report;
+    report.solve.status = SolveStatus::refused;
+    report.failure = "event '" + events_[event].name + "' happens every " + to_text(events_[event].every) +
+                     ", more than " + to_text(most_ticks) + " times in a step of " + to_text(std::abs(step));
+    return report;
+  }
   for (double ticks = watch.ticks + 1.0;; ticks += 1.0) {
     const double t = start_ + std::copysign(ticks * events_[event].every, step);
     const double left = (point.time - t) / step;

@@ -164,6 +164,8 @@ class EventSteps {
   StepReport act(std::vector<EventHit> met);
   StepReport make_true(EventHit hit, std::vector<EventSearch::Left>& left);
   void add_left(std::size_t number, std::vector<EventSearch::Left>& left) const;
+  void add_closing(const Sample& here, std::vector<EventHit>& due) const;
+  std::vector<EventSearch::Left> at_rest_in_contact(const Sample& here) const;
   StepReport failed(std::string failure) const {
     StepReport report;
     report.solve.status = SolveStatus::refused;
@@ -202,8 +204,9 @@ StepReport EventSteps<Stepper>::begin() {
         return failed("event '" + event.name + "': its function is " + to_text(gap) +
                       " at the start, behind the contact; it is positive where there is none (direction)");
   if (report = search_.see(here, {}); !report.ok()) return report;
-  (void)search_.go_on(here, {}, actions_.awake());
+  (void)search_.go_on(here, at_rest_in_contact(here), actions_.awake());
   std::vector<EventHit> due;
+  add_closing(here, due);
   for (std::size_t k = 0; k < events().size(); ++k)
     if (events()[k].every > 0.0 && (!events()[k].condition || events()[k].condition(here.point()) > 0.0))
       due.push_back({k, here});
@@ -298,9 +301,12 @@ StepReport EventSteps<Stepper>::act(std::vector<EventHit> met) {
     }
     met.clear();
     const Sample& here = after_;
+    for (EventSearch::Left& contact : left)
+      contact.rate = EventActions::contact_rate(events()[contact.event], here);
     for (const std::size_t k : search_.at_zero()) add_left(k, left);
     for (const std::size_t k : search_.go_on(here, left, actions_.awake()))
       if (!events()[k].condition || events()[k].condition(here.point()) > 0.0) met.push_back({k, here});
+    add_closing(here, met);
   }
   return {};
 }
@@ -314,6 +320,31 @@ void EventSteps<Stepper>::add_left(std::size_t number, std::vector<EventSearch::
   const double rate = EventActions::contact_rate(event, after_);
   if (std::abs(rate) > round_off * after_.v.template lpNorm<Eigen::Infinity>())
     left.push_back({number, rate});
+}
+
+/// Contacts that are closed to the last bit and close further: they have no sign to change.
+template <class Stepper>
+void EventSteps<Stepper>::add_closing(const Sample& here, std::vector<EventHit>& due) const {
+  constexpr double round_off = 1e-12;
+  const std::vector<bool> awake = actions_.awake();
+  for (std::size_t k = 0; k < events().size(); ++k) {
+    const Event& event = events()[k];
+    if (!event.restitution || !awake[k] || event.at(here.point()) != 0.0) continue;
+    if (event.condition && !(event.condition(here.point()) > 0.0)) continue;
+    const double side = event.direction == Event::Direction::rising ? -1.0 : 1.0;
+    const double rate = side * EventActions::contact_rate(event, here);
+    if (rate < -round_off * here.v.template lpNorm<Eigen::Infinity>()) due.push_back({k, here});
+  }
+}
+
+/// Contacts that are closed and stay so for now: where they close without an impact, that is told.
+template <class Stepper>
+std::vector<EventSearch::Left> EventSteps<Stepper>::at_rest_in_contact(const Sample& here) const {
+  std::vector<EventSearch::Left> left;
+  for (std::size_t k = 0; k < events().size(); ++k)
+    if (events()[k].restitution && events()[k].at(here.point()) == 0.0)
+      left.push_back({k, EventActions::contact_rate(events()[k], here)});
+  return left;
 }
 
 template <class Stepper>

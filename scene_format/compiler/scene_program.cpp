@@ -167,7 +167,7 @@ class SceneCompiler {
 
   /// `value` where ε is not 0, else `at_zero`.
   Node unless_rigid(Node compliance, Node value, double at_zero) {
-    constexpr double smallest = 1e-300;
+    constexpr double smallest = 1e-40;  // below, it is the row to the last bit
     const Node above = graph_.subtract(graph_.apply(Op::abs, compliance), graph_.number(smallest));
     return graph_.add(graph_.where(above, value),
                       graph_.where(graph_.negative(above), graph_.number(at_zero)));

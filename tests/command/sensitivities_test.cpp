@@ -39,6 +39,43 @@ TEST_F(SensitivitiesOfRuns, AFitThroughEventsIsRefused) {
       {"fit", "events"});
 }
 
+/// x'' = 1 once t > w: dx(3)/dw = −(3 − w), of which the derivative of the formulas is 0.
+TEST_F(SensitivitiesOfRuns, AJumpThatAParameterMovesIsDoubted) {
+  const std::string file = scene("late", R"toml(
+lagrangian = "v_x^2/2"
+[coordinates]
+x = {}
+[parameters]
+w = 1
+[force]
+x = "if(t > w, 1, 0)"
+[span]
+end = 3
+step = 0.1
+)toml");
+  const Outcome outcome = run("run '" + file + "' --sensitivities w");
+  EXPECT_EQ(outcome.status, 3) << outcome.err;
+  EXPECT_NE(outcome.err.find("depends on 'w'"), std::string::npos) << outcome.err;
+  EXPECT_EQ(run("run '" + file + "' --sensitivities q0").status, 0);
+}
+
+TEST_F(SensitivitiesOfRuns, AHamiltonianAloneThatIsDegenerateIsRefused) {
+  const std::string file = scene("linear", R"toml(
+hamiltonian = "p_a*b - p_b*a + 0.1*a^2"
+[coordinates]
+a = {}
+b = {}
+[start]
+a = 1
+p_b = 1
+[span]
+end = 1
+step = 0.1
+)toml");
+  EXPECT_EQ(run("run '" + file + "'").status, 0);
+  expect_misuse("run '" + file + "' --sensitivities q0", {"degenerate Hamiltonian"});
+}
+
 /// Data of another pendulum: what is left is far above the deviation stated.
 TEST_F(SensitivitiesOfRuns, AFitThatLeavesMoreThanStatedIsDoubted) {
   std::ofstream(path("data.csv")) << "t,x\n0.5,3\n1,-2\n1.5,4\n";

@@ -49,6 +49,36 @@ TEST_F(ActingEvents, ABallBouncesByItsClosedForm) {
   }
 }
 
+/// A free body passes x = 0, where a counter is set and nothing else.
+TEST_F(ActingEvents, ASettingAtAPlaceThatIsPassedIsNoContact) {
+  const Json json =
+      result(scene("name = \"passing\"\nlagrangian = \"v_x^2/2\"\n[coordinates]\nx = {}\n"
+                   "[states]\nn = {}\n[start]\nx = 1\nv_x = -1\n[[events]]\nname = \"cross\"\n"
+                   "when = \"x\"\nset = { n = \"n + 1\" }\n[span]\nend = 3\nstep = 0.05\n"));
+  EXPECT_EQ(json["end"]["q"]["n"], 1.0);
+  EXPECT_NEAR(json["end"]["q"]["x"].get<double>(), -2.0, 1e-13);
+}
+
+/// Newton's cradle: the middle body touches the last one, so that both impacts are of one time.
+TEST_F(ActingEvents, ContactsThatAreClosedActToo) {
+  const std::string contact =
+      "restitution = 1\n[[events]]\nname = \"bc\"\nwhen = \"c - b\"\nrestitution = 1\n";
+  const Json json =
+      result(scene("name = \"cradle\"\nlagrangian = \"(v_a^2 + v_b^2 + v_c^2)/2\"\n[coordinates]\n"
+                   "a = {}\nb = {}\nc = {}\n[start]\na = -1\nv_a = 1\n[[events]]\nname = \"ab\"\n"
+                   "when = \"b - a\"\n" +
+                   contact + "[span]\nend = 3\nstep = 0.07\n"));
+  EXPECT_NEAR(json["end"]["q"]["b"].get<double>(), 0.0, 1e-12);
+  EXPECT_NEAR(json["end"]["q"]["c"].get<double>(), 2.0, 1e-12);
+  std::string thrown = ball;
+  thrown.replace(thrown.find("y = 1"), 5, "y = 0\nv_y = -1");
+  const Json up = result(scene(thrown) + " --set e=1 --end 0.1");
+  EXPECT_NEAR(up["end"]["q"]["y"].get<double>(), 0.1 - 0.5 * 9.81 * 0.01, 1e-12);
+  std::string resting = ball;
+  resting.replace(resting.find("y = 1"), 5, "y = 0");
+  EXPECT_EQ(run("run " + scene(resting)).status, 1) << "it would fall through the floor";
+}
+
 TEST_F(ActingEvents, AStartBehindAContactAndANegativeRestitutionAreTold) {
   for (const auto& [what, told] : {std::pair("--set e=-0.5", "restitution is -0.5"),
                                    std::pair("y = -0.3", "at the start, behind the contact")}) {
