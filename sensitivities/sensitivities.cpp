@@ -188,9 +188,10 @@ Sensitivities::Gradient Sensitivities::gradient(long steps, const Cotangent& cot
   const Snapshot end = integrator.save();
   Directions z;
   for (;;) {
-    for (auto step = segment.rbegin(); step != segment.rend(); ++step) {
-      if (step->added.size() > 0) z = z.size() > 0 ? Directions(z + step->added) : step->added;
-      parts.motion->pull(step->stages, z);
+    for (std::size_t k = segment.size(); k-- > 0;) {
+      const auto& step = segment[k];
+      if (step.added.size() > 0) z = z.size() > 0 ? Directions(z + step.added) : step.added;
+      parts.motion->pull(step.stages, z);
     }
     if (first == 0) break;
     const long last = first;

@@ -90,7 +90,7 @@ class EventSteps {
         search_(std::move(events)),
         actions_(start, all, solvers, search_.events()),
         zeno_(search_.events().size()) {
-    take(std::move(start));
+    take(start);
     began_at_ = time();
   }
   EventSteps(const EventSteps&) = delete;
@@ -136,9 +136,9 @@ class EventSteps {
     std::unique_ptr<Stepper> stepper, beside;
   };
 
-  void take(std::shared_ptr<const Scene> scene) {
+  void take(const std::shared_ptr<const Scene>& scene) {
     current_ = &modes_[actions_.on()];
-    current_->scene = std::move(scene);
+    current_->scene = scene;
     current_->beside.reset();
     current_->stepper = make_(current_->scene);
   }
@@ -418,7 +418,7 @@ void EventSteps<Stepper>::restore(SnapshotReader& from) {
   began_at_ = from.number("began at");
   std::vector<bool> on = actions_.on();
   const std::vector<bool> at_start = on;
-  for (std::size_t r = 0; r < on.size(); ++r) on[r] = from.flag("row is on");
+  for (auto&& row : on) row = from.flag("row is on");
   actions_.set_on(on);
   Start start = scene().start;
   start.time = from.number("start of the rows' time");

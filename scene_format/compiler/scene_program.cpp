@@ -185,7 +185,7 @@ class SceneCompiler {
     Node energy =
         graph_.multiply(graph_.multiply(graph_.number(0.5), stiffness), graph_.power(extension(row), 2));
     const auto& loops = symbols_.families[static_cast<std::size_t>(symbols_.family(row.extension()))].loops;
-    for (auto loop = loops.rbegin(); loop != loops.rend(); ++loop) energy = graph_.sum(energy, *loop);
+    for (std::size_t k = loops.size(); k-- > 0;) energy = graph_.sum(energy, loops[k]);
     return energy;
   }
 
