@@ -9,8 +9,7 @@ import sys
 import time
 import unittest
 
-from selenium import webdriver
-from selenium.webdriver.chrome.service import Service
+from headless import headless_browser
 
 PHONE, DESKTOP, PAPER = 390, 1200, 680
 
@@ -143,11 +142,7 @@ class Report(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls):
-        options = webdriver.ChromeOptions()
-        for argument in ("--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"):
-            options.add_argument(argument)
-        options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-        cls.browser = webdriver.Chrome(service=Service("chromedriver"), options=options)
+        cls.browser = headless_browser()
 
     @classmethod
     def tearDownClass(cls):

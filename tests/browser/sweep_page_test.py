@@ -3,8 +3,7 @@ import pathlib
 import sys
 import unittest
 
-from selenium import webdriver
-from selenium.webdriver.chrome.service import Service
+from headless import headless_browser
 from selenium.webdriver.support.ui import Select
 
 REPORT = pathlib.Path(sys.argv.pop(1)).resolve()
@@ -13,11 +12,7 @@ REPORT = pathlib.Path(sys.argv.pop(1)).resolve()
 class SweepPage(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        options = webdriver.ChromeOptions()
-        for option in ("--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"):
-            options.add_argument(option)
-        options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-        cls.browser = webdriver.Chrome(service=Service("chromedriver"), options=options)
+        cls.browser = headless_browser()
 
     @classmethod
     def tearDownClass(cls):
