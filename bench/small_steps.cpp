@@ -18,6 +18,7 @@
 #include <utility>
 #include <vector>
 
+#include "../tests/support/bare_lagrangian.hpp"
 #include "timing.hpp"
 
 using namespace diracstep;
@@ -255,34 +256,6 @@ class ByHand {
   std::array<Unknowns, 3> past_;
 };
 
-/// A Lagrangian without the stage kernels that come beside it.
-class Bare final : public Lagrangian {
- public:
-  explicit Bare(std::shared_ptr<const Lagrangian> of)
-      : Lagrangian(of->pattern(), of->structure()), of_(std::move(of)) {}
-
-  double value(double t, ConstVectorRef x, ConstVectorRef y) const override { return of_->value(t, x, y); }
-  void gradient(double t, ConstVectorRef x, ConstVectorRef y, VectorRef fx, VectorRef fy) const override {
-    of_->gradient(t, x, y, fx, fy);
-  }
-  void hessian(double t, ConstVectorRef x, ConstVectorRef y, VectorRef fxx, VectorRef fxy,
-               VectorRef fyy) const override {
-    of_->hessian(t, x, y, fxx, fxy, fyy);
-  }
-  void gradients(const PointColumns& at, double* fx, double* fy) const override {
-    of_->gradients(at, fx, fy);
-  }
-  void hessians(const PointColumns& at, double* fxx, double* fxy, double* fyy) const override {
-    of_->hessians(at, fxx, fxy, fyy);
-  }
-  void gradient_rate(double t, ConstVectorRef x, ConstVectorRef y, VectorRef fyt) const override {
-    of_->gradient_rate(t, x, y, fyt);
-  }
-
- private:
-  std::shared_ptr<const Lagrangian> of_;
-};
-
 /// Steps of one kind: `run` takes so many, and what they have done so far.
 struct Side {
   std::function<void(int)> run;
@@ -333,8 +306,7 @@ void compare(const char* scene, int s, double end, int steps, const Hand& hand =
   constexpr int rounds = 15;
   const int repeats = std::max(1, 2000 / steps);  // so that the clock can tell them
   const CatalogueScene entry = make_scene(scene);
-  const auto bare = std::make_shared<Scene>(*entry.scene);
-  bare->lagrangian = std::make_shared<const Bare>(entry.scene->lagrangian);
+  const auto bare = testing::without_stage_kernels(*entry.scene);
   const double h = end / steps;
   std::vector<Side> sides{of_library(entry.scene, s, h, kinsol()),
                           of_library(entry.scene, s, h, kinsol({.iteration = Iteration::automatic})),
