@@ -60,25 +60,12 @@ struct Sensitivities::Parts {
   Sample sample;
 };
 
-namespace {
-
-/// Throws Misuse where the steps are those of H alone.
-const Registry& differentiable(const Integrator& integrator, const Registry& registry) {
-  if (!integrator.scene().lagrangian)
-    throw Misuse("scene '" + integrator.scene().name +
-                 "' has a degenerate Hamiltonian and no Lagrangian: its motion is not differentiated");
-  return registry;
-}
-
-}  // namespace
-
 Sensitivities::Sensitivities(Integrator& integrator, const Registry& registry, const ParametricScene& scene) {
   require_well_formed(scene);
-  (void)differentiable(integrator, registry);
   parts_ = std::make_unique<Parts>(integrator, registry, scene);
 }
 Sensitivities::Sensitivities(Integrator& integrator, const Registry& registry)
-    : parts_(std::make_unique<Parts>(integrator, differentiable(integrator, registry), ParametricScene{})) {}
+    : parts_(std::make_unique<Parts>(integrator, registry, ParametricScene{})) {}
 Sensitivities::~Sensitivities() {
   if (parts_) parts_->integrator.record_stages(false);
 }

@@ -206,6 +206,9 @@ class LinearisedMotionIn final : public LinearisedMotion {
 
 std::unique_ptr<LinearisedMotion> linearised_motion(const Integrator& integrator, const Registry& registry,
                                                     const ParametricScene& scene) {
+  if (!integrator.scene().lagrangian)
+    throw Misuse("scene '" + integrator.scene().name +
+                 "' has a degenerate Hamiltonian and no Lagrangian: its motion is not differentiated");
   const std::shared_ptr<const Scene> prepared(std::shared_ptr<const Scene>{}, &integrator.scene());
   auto extended = std::make_shared<ExtendedScene>(scene.extended ? prepared_like(*prepared, scene) : prepared,
                                                   prepared->dimension(), scene.parameters);
