@@ -116,12 +116,11 @@ void require_empty(const fs::path& folder) {
 }
 
 /// Reads sweep.json, or makes it with the folder; the size of a block.
-long join(const MemberRuns& runs, const SweepOptions& options, int threads) {
+long join(const MemberRuns& runs, const Json& here, const SweepOptions& options, int threads) {
   const fs::path folder = options.folder, manifest = folder / "sweep.json";
   std::error_code refused;
   fs::create_directory(folder, refused);
   if (refused) throw Misuse(fmt::format("'{}' cannot be made: {}", options.folder, refused.message()));
-  const Json here = identity(runs);
   const std::unique_ptr<FileLock> lock = waited_lock(manifest.string());
   if (fs::exists(manifest)) {
     const Json there =
@@ -245,9 +244,9 @@ SweepReport run_sweep(const Sweep& sweep, const std::function<CatalogueScene(con
   SweepReport report;
   report.method = runs.sweep().error ? "by the error asked for" : runs.sweep().method;
   report.members = sweep.members();
-  report.block = join(runs, options, threads);
-  const BlockFiles blocks(options.folder, sha256(identity(runs).dump()).substr(0, 16), report.members,
-                          report.block);
+  const Json what = identity(runs);
+  report.block = join(runs, what, options, threads);
+  const BlockFiles blocks(options.folder, sha256(what.dump()).substr(0, 16), report.members, report.block);
   for (;;) {
     const bool all = run_blocks(runs, blocks, options, threads, report);
     count_finished(blocks, report);
