@@ -19,6 +19,14 @@ std::vector<std::string> scene_names() {
   return names;
 }
 
+void require_inputs_until(const CatalogueScene& entry, double end, const std::string& what) {
+  for (const auto& [name, first, last] : entry.input_ranges)
+    if (!(end >= first && end <= last))
+      throw Misuse(what + ": the input '" + name + "' is given from t = " + to_text(first) + " to " +
+                   to_text(last) + " and has no value at t = " + to_text(end) +
+                   "; hold = true would keep its end values");
+}
+
 void drop_redundant_rows(CatalogueScene& entry) {
   const std::shared_ptr<const Scene> scene = completed(entry.scene);
   if (!scene->start.q.allFinite() || scene->start.q.size() != scene->dimension()) return;  // refused by runs

@@ -125,6 +125,9 @@ std::vector<std::string> scene_names();
 /// for a file that is wrong, with the line and column.
 CatalogueScene make_scene(const std::string& name, const Parameters& changes = {});
 
+/// Throws Misuse where an input of the scene has no value at the end of a motion; `what` names the end.
+void require_inputs_until(const CatalogueScene& entry, double end, const std::string& what);
+
 /// Leaves out the redundant constraints (redundant_rows.hpp) and notes which.
 void drop_redundant_rows(CatalogueScene& entry);
 

@@ -79,13 +79,6 @@ MemberResult result_of(const std::string& failure, const std::string& doubt, con
           recorded.numbers(entry, end)};
 }
 
-void require_inputs(const CatalogueScene& entry, double end) {
-  for (const auto& [name, first, last] : entry.input_ranges)
-    if (!(end >= first && end <= last))
-      throw Misuse(
-          fmt::format("end = {:g}: the input '{}' is given from t = {:g} to {:g}", end, name, first, last));
-}
-
 }  // namespace
 
 MemberRuns::MemberRuns(const Sweep& sweep, SceneMaker make_scene, const Registry& registry,
@@ -175,7 +168,7 @@ MemberResult MemberRuns::run(long number) const {
 
 MemberResult MemberRuns::take(long number) const {
   const CatalogueScene entry = scene_of(number);
-  require_inputs(entry, *sweep_.end);
+  require_inputs_until(entry, *sweep_.end, "end");
   return sweep_.error ? search(entry) : take_steps(entry);
 }
 

@@ -355,15 +355,6 @@ IntegratorOptions take_found(const RunArguments& options, const CatalogueScene& 
   return used;
 }
 
-void require_inputs_until(const CatalogueScene& entry, double end) {
-  for (const auto& [name, first, last] : entry.input_ranges)
-    if (!(end >= first && end <= last))
-      throw Misuse(
-          fmt::format("--end: the input '{}' is given from t = {:g} to {:g} and has no value at t = {:g}; "
-                      "hold = true would keep its end values",
-                      name, first, last, end));
-}
-
 /// Throws Misuse for runs that do not look for events, where the scene has some.
 void require_events_found(const CatalogueScene& entry, const RunArguments& options) {
   if (entry.events.empty()) return;
@@ -439,7 +430,7 @@ void run(const RunArguments& given, Session& session) {
     if (!given.step && options.step)
       options.step = std::copysign(*options.step, end - entry.scene->start.time);
   }
-  require_inputs_until(entry, end);
+  require_inputs_until(entry, end, "--end");
   require_events_found(entry, options);
   if (!options.sensitivities.empty() && !entry.events.empty())
     throw Misuse(
