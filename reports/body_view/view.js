@@ -139,5 +139,5 @@ export function BodyView(container, motion, between) {
   };
   draw(0);
   resize();
-  return { draw, resize, camera, meshes };
+  return { draw, resize, camera, meshes, canvas };
 }
