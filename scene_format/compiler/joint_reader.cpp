@@ -257,10 +257,11 @@ void BodyReader::read_wheel(const toml::table& table) {
   body.position = vector(*table.get("centre"), fmt::format("'centre' of {}", what), false);
   body.position_given = true;
   body.orientation = from_z_to(axle);
-  if (table.contains("rate")) {
-    body.rate_given = true;
-    body.rate[2] = formula(*table.get("rate"), fmt::format("'rate' of {}", what));
-  }
+  const Body& carrier = mechanism_.bodies[static_cast<std::size_t>(on)];
+  const Formula spin = formula(table, "rate", 0.0, what);  // beside the rate of what carries it
+  body.rate_given = carrier.rate_given && table.contains("rate");
+  body.rate = transposed(matrix_of(body.orientation)) * (matrix_of(carrier.orientation) * carrier.rate) +
+              Vec{0.0, 0.0, spin};
   Joint joint;
   joint.name = wheel + "_axle";
   joint.kind = Joint::Kind::revolute;
