@@ -7,8 +7,8 @@
 #include <diracstep/core/system/row_subset.hpp>
 #include <diracstep/files/input_file.hpp>
 #include <diracstep/scene_format/compiler/size_limits.hpp>
+#include <diracstep/scene_format/drawn_bodies.hpp>
 #include <diracstep/scene_format/loader/defined_start.hpp>
-#include <diracstep/scene_format/loader/drawn_bodies.hpp>
 #include <diracstep/scene_format/loader/scene_definition.hpp>
 #include <diracstep/scene_format/loader/scene_functions.hpp>
 #include <diracstep/scene_format/loader/scene_kinks.hpp>

@@ -18,12 +18,14 @@ std::array<Vec, 2> Mechanics::axes_of(const Joint& joint) {
   const Pose &first = frame(joint.first).start, &second = frame(joint.second).start;
   if (joint.axis.in_bodies) return *joint.axis.in_bodies;
   const Vec axis = joint.axis.in_space.value_or(Vec{0.0, 0.0, 1.0});
-  return {first.of_direction(axis), second.of_direction(joint.second_axis.value_or(axis))};
+  return {define(joint.name + "_axis1", first.of_direction(axis), joint.source),
+          define(joint.name + "_axis2", second.of_direction(joint.second_axis.value_or(axis)), joint.source)};
 }
 
 void Mechanics::add_joint(const Joint& joint) {
   if (joint.kind == Joint::Kind::distance) return add_distance(joint);
-  const std::array<Vec, 2> ends = this->ends(joint.first, joint.second, joint.point, joint.in_space_ends);
+  const std::array<Vec, 2> ends =
+      this->ends(joint.name, joint.first, joint.second, joint.point, joint.in_space_ends, joint.source);
   Hold hold{frame(joint.second).now.point(ends[1]) - frame(joint.first).now.point(ends[0]),
             plane(joint.first) || plane(joint.second)};
   if (joint.kind == Joint::Kind::prismatic) {
@@ -84,7 +86,9 @@ void Mechanics::add_locked_rows(const Joint& joint, Hold& hold) {
 void Mechanics::add_slide_rows(const Joint& joint, Hold& hold) {
   const Pose& first = frame(joint.first).now;
   const Vec axis = axes_of(joint)[0];
-  const std::array<Vec, 2> sides = across(axis);
+  std::array<Vec, 2> sides = across(axis);
+  sides = {define(joint.name + "_side1", sides[0], joint.source),
+           define(joint.name + "_side2", sides[1], joint.source)};
   const auto side = [&](const std::string& name, const Vec& of_first) {
     const Vec direction = define(name + "_way", first.turn * of_first, joint.source);
     row(name, dot(hold.apart, direction), joint.source);
@@ -129,10 +133,13 @@ void Mechanics::add_hinge(const Joint& joint, Hold& hold) {
       hold.plane ? std::array<Vec, 2>{Vec{0.0, 0.0, 1.0}, Vec{0.0, 0.0, 1.0}} : axes_of(joint);
   Formula angle = second.angle - first.angle;
   if (!hold.plane) {
-    const std::array<Vec, 2> sides = across(axes[1]);
+    std::array<Vec, 2> sides = across(axes[1]);
+    sides = {define(joint.name + "_side1", sides[0], joint.source),
+             define(joint.name + "_side2", sides[1], joint.source)};
     add_turn_row(joint, hold, joint.name + "_turn1", axes[0], sides[0]);
     add_turn_row(joint, hold, joint.name + "_turn2", axes[0], sides[1]);
-    const Vec at_start = first.start.of_direction(second.start.turn * sides[0]);
+    const Vec in_space = define(joint.name + "_side_start", second.start.turn * sides[0], joint.source);
+    const Vec at_start = define(joint.name + "_side_first", first.start.of_direction(in_space), joint.source);
     const Vec now = second.now.turn * sides[0];
     angle = angle_between(dot(first.now.turn * cross(axes[0], at_start), now),
                           dot(first.now.turn * at_start, now));
@@ -149,7 +156,8 @@ void Mechanics::add_hinge(const Joint& joint, Hold& hold) {
 }
 
 void Mechanics::add_distance(const Joint& joint) {
-  const std::array<Vec, 2> ends = this->ends(joint.first, joint.second, joint.point, joint.in_space_ends);
+  const std::array<Vec, 2> ends =
+      this->ends(joint.name, joint.first, joint.second, joint.point, joint.in_space_ends, joint.source);
   const Frame &first = frame(joint.first), &second = frame(joint.second);
   const Vec apart =
       define(joint.name + "_apart", second.now.point(ends[1]) - first.now.point(ends[0]), joint.source);

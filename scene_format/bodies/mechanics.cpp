@@ -69,11 +69,12 @@ void Mechanics::torque(int number, const Vec& torque_in_body, int source) {
     push(rotation.coordinate(i), forces[static_cast<std::size_t>(i)], source);
 }
 
-std::array<Vec, 2> Mechanics::ends(int first, int second, const Places& point,
-                                   const std::optional<std::array<Vec, 2>>& in_space) {
+std::array<Vec, 2> Mechanics::ends(const std::string& name, int first, int second, const Places& point,
+                                   const std::optional<std::array<Vec, 2>>& in_space, int source) {
   if (point.in_bodies) return *point.in_bodies;
   const Vec a = in_space ? (*in_space)[0] : *point.in_space, b = in_space ? (*in_space)[1] : *point.in_space;
-  return {frame(first).start.of_point(a), frame(second).start.of_point(b)};
+  return {define(name + "_first", frame(first).start.of_point(a), source),
+          define(name + "_second", frame(second).start.of_point(b), source)};
 }
 
 // ------------------------------------------------------------------ bodies
@@ -119,8 +120,17 @@ void Mechanics::add_frames() {
           body.position,
           straight ? unit_matrix() : Matrix{{{cosine, -sine, 0.0}, {sine, cosine, 0.0}, {0.0, 0.0, 1.0}}}};
     } else {
-      frame.start = {body.position, matrix_of(body.orientation)};
+      frame.orientation = body.orientation;
+      for (std::size_t i = 0; i < frame.orientation.size(); ++i)
+        frame.orientation[i] =
+            define(fmt::format("{}_start_q{}", body.name, i), body.orientation[i], body.source);
+      frame.start = {body.position, matrix_of(frame.orientation)};
     }
+    for (std::size_t i = 0; i < 3; ++i)
+      for (std::size_t j = 0; j < 3; ++j)
+        frame.start.turn[i][j] = define(fmt::format("{}_start_R{}{}", body.name, i + 1, j + 1),
+                                        frame.start.turn[i][j], body.source);
+    frame.start.at = define(body.name + "_start", frame.start.at, body.source);
     if (body.fixed)
       frame.now = frame.start;
     else if (body.plane)
@@ -159,8 +169,8 @@ void Mechanics::add_start(const Body& body, const Frame& frame) {
     return;
   }
   const Rotation rotation(body.name);
-  const Rotation::Quaternion at = Rotation::start(body.orientation),
-                             rate = Rotation::start_rate(body.orientation, body.rate);
+  const Rotation::Quaternion at = Rotation::start(frame.orientation),
+                             rate = Rotation::start_rate(frame.orientation, body.rate);
   for (int i = 0; i < Rotation::coordinates; ++i) {
     set(rotation.coordinate(i), at[static_cast<std::size_t>(i)], rate[static_cast<std::size_t>(i)]);
     may_move(rotation.coordinate(i), body.rate_given);
@@ -170,7 +180,8 @@ void Mechanics::add_start(const Body& body, const Frame& frame) {
 // ------------------------------------------------------------------ springs and wheels of the plane
 
 void Mechanics::add_spring(const Spring& spring) {
-  const std::array<Vec, 2> ends = this->ends(spring.first, spring.second, spring.point, spring.in_space_ends);
+  const std::array<Vec, 2> ends =
+      this->ends(spring.name, spring.first, spring.second, spring.point, spring.in_space_ends, spring.source);
   const Frame &first = frame(spring.first), &second = frame(spring.second);
   const Vec along = second.now.point(ends[1]) - first.now.point(ends[0]);
   const Formula rest =

@@ -26,7 +26,8 @@ class Mechanics {
  private:
   struct Frame {
     Pose now, start;
-    Vec rate = zero_vector();  ///< in the body
+    Rotation::Quaternion orientation = {1.0, 0.0, 0.0, 0.0};  ///< at the start
+    Vec rate = zero_vector();                                 ///< in the body
     Vec rate_in_space = zero_vector();
     Formula angle = 0.0;  ///< in the plane
     bool held = false;    ///< by a joint or a contact
@@ -77,8 +78,8 @@ class Mechanics {
   bool plane(int number) const { return number != ground && body(number).plane; }
   Frame& frame(int number) { return number == ground ? ground_ : frames_[static_cast<std::size_t>(number)]; }
   /// The two points, each in its own body.
-  std::array<Vec, 2> ends(int first, int second, const Places& point,
-                          const std::optional<std::array<Vec, 2>>& in_space);
+  std::array<Vec, 2> ends(const std::string& name, int first, int second, const Places& point,
+                          const std::optional<std::array<Vec, 2>>& in_space, int source);
   /// The formula under a name of its own where it is long.
   Formula define(const std::string& name, const Formula& formula, int source);
   Vec define(const std::string& name, const Vec& vector, int source);

@@ -1,7 +1,9 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <diracstep/scene_format/bodies/rotation.hpp>
+#include <limits>
 
 namespace diracstep::bodies {
 
@@ -80,6 +82,35 @@ Matrix matrix_of(const Rotation::Quaternion& q) {
   return {{{diagonal(1, 2, 3), off(1, 2, 3, -1.0), off(1, 3, 2, 1.0)},
            {off(1, 2, 3, 1.0), diagonal(2, 1, 3), off(2, 3, 1, -1.0)},
            {off(1, 3, 2, -1.0), off(2, 3, 1, 1.0), diagonal(3, 1, 2)}}};
+}
+
+double distance_from_rotations(const Numbers& r) {
+  double off = 0.0;
+  for (std::size_t i = 0; i < 3; ++i)
+    for (std::size_t j = 0; j < 3; ++j) {
+      double product = 0.0;
+      for (std::size_t k = 0; k < 3; ++k) product += r[i][k] * r[j][k];
+      off = std::max(off, std::abs(product - (i == j ? 1.0 : 0.0)));
+    }
+  const double determinant = r[0][0] * (r[1][1] * r[2][2] - r[1][2] * r[2][1]) -
+                             r[0][1] * (r[1][0] * r[2][2] - r[1][2] * r[2][0]) +
+                             r[0][2] * (r[1][0] * r[2][1] - r[1][1] * r[2][0]);
+  return determinant > 0.0 ? off : std::numeric_limits<double>::infinity();
+}
+
+Rotation::Quaternion quaternion_of(const Numbers& r) {
+  const std::array<double, 4> squares{1.0 + r[0][0] + r[1][1] + r[2][2], 1.0 + r[0][0] - r[1][1] - r[2][2],
+                                      1.0 - r[0][0] + r[1][1] - r[2][2], 1.0 - r[0][0] - r[1][1] + r[2][2]};
+  const auto largest = static_cast<std::size_t>(std::ranges::max_element(squares) - squares.begin());
+  const double wx = r[2][1] - r[1][2], wy = r[0][2] - r[2][0], wz = r[1][0] - r[0][1], xy = r[0][1] + r[1][0],
+               xz = r[0][2] + r[2][0], yz = r[1][2] + r[2][1];
+  const std::array<std::array<double, 4>, 4> parts{{{squares[0], wx, wy, wz},
+                                                    {wx, squares[1], xy, xz},
+                                                    {wy, xy, squares[2], yz},
+                                                    {wz, xz, yz, squares[3]}}};
+  const std::array<double, 4>& q = parts[largest];
+  const double length = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+  return {q[0] / length, q[1] / length, q[2] / length, q[3] / length};
 }
 
 Rotation::Quaternion from_z_to(const Vec& axis) {

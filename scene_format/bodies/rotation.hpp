@@ -39,6 +39,11 @@ class Rotation {
 
 /// R of a unit quaternion.
 Matrix matrix_of(const Rotation::Quaternion& q);
+using Numbers = std::array<std::array<double, 3>, 3>;
+/// The largest entry of |R Rᵀ − 1|, infinite where the determinant is not above 0.
+double distance_from_rotations(const Numbers& r);
+/// Of a rotation, by the largest of its four components.
+Rotation::Quaternion quaternion_of(const Numbers& r);
 /// The rotation that takes the z axis to a unit vector.
 Rotation::Quaternion from_z_to(const Vec& axis);
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <diracstep/scene_format/bodies/shapes.hpp>
 #include <diracstep/scene_format/compiler/body_reader.hpp>
 
 namespace diracstep::scene_compiler {
@@ -32,45 +33,10 @@ const std::map<std::string, ShapeKeys>& shapes() {
   return all;
 }
 
-Matrix diagonal(const bodies::Formula& a, const bodies::Formula& b, const bodies::Formula& c) {
-  return {{{a, 0.0, 0.0}, {0.0, b, 0.0}, {0.0, 0.0, c}}};
-}
-
-/// Of a uniform body about its centre; cylinders, discs and rods along z.
-Matrix inertia_of(Body::Shape shape, const bodies::Formula& mass, const Vec& size) {
-  const bodies::Formula a = square(size[0]), b = square(size[1]), c = square(size[2]);
-  switch (shape) {
-    case Body::Shape::box:
-      return diagonal(mass * (b + c) / 12.0, mass * (a + c) / 12.0, mass * (a + b) / 12.0);
-    case Body::Shape::ball:
-      return diagonal(0.4 * mass * a, 0.4 * mass * a, 0.4 * mass * a);
-    case Body::Shape::cylinder: {
-      const bodies::Formula side = mass * (3.0 * a + b) / 12.0;
-      return diagonal(side, side, 0.5 * mass * a);
-    }
-    case Body::Shape::disc:
-      return diagonal(0.25 * mass * a, 0.25 * mass * a, 0.5 * mass * a);
-    case Body::Shape::rod:
-      return diagonal(mass * a / 12.0, mass * a / 12.0, 0.0);
-    case Body::Shape::none:
-      break;
-  }
-  return diagonal(0.0, 0.0, 0.0);
-}
-
 const char* shape_name(Body::Shape shape) {
   for (const auto& [name, keys] : shapes())
     if (keys.shape == shape) return name.c_str();
   return "ellipsoid";
-}
-
-/// Half axes of the ellipsoid with the same mass and moments of inertia.
-Vec ellipsoid_of(const Body& body) {
-  const auto half = [&](std::size_t i, std::size_t j, std::size_t k) {
-    const bodies::Formula rest = body.inertia[j][j] + body.inertia[k][k] - body.inertia[i][i];
-    return root(2.5 * rest / body.mass);
-  };
-  return {half(0, 1, 2), half(1, 2, 0), half(2, 0, 1)};
 }
 
 }  // namespace
@@ -307,7 +273,8 @@ void BodyReader::read_shape(const toml::table& table, Body& body, const std::str
                      fmt::format("'size' of {}: edges must be above 0", what));
   }
   body.inertia = inertia_of(body.shape, body.mass, body.size);
-  if (body.plane && body.shape == Body::Shape::rod) body.inertia[2][2] = body.inertia[0][0];  // it lies along x
+  if (body.plane && body.shape == Body::Shape::rod)
+    body.inertia[2][2] = body.inertia[0][0];  // it lies along x
 }
 
 Vec BodyReader::end_to_end(const toml::table& table, const Body& body, const std::string& what) {
@@ -329,7 +296,8 @@ void BodyReader::lay_between(const toml::table& table, Body& body, const std::st
                  fmt::format("'from' and 'to' of {} are for the shapes \"rod\" and \"cylinder\"", what));
   for (const char* key : {"position", "orientation", "length"})
     if (const toml::node* node = table.get(key))
-      tables_.fail(place_of(node->source()), fmt::format("'{}' of {} follows from 'from' and 'to'", key, what));
+      tables_.fail(place_of(node->source()),
+                   fmt::format("'{}' of {} follows from 'from' and 'to'", key, what));
   body.position = vector(*table.get("from"), what, body.plane) + 0.5 * along;
   body.position_given = true;
   if (body.plane)
@@ -418,42 +386,19 @@ Rotation::Quaternion BodyReader::axis_and_angle(const toml::table& table, const 
   return {cosine, part[0], part[1], part[2]};
 }
 
-/// The quaternion of a matrix of numbers, by the largest of its components.
 Rotation::Quaternion BodyReader::of_matrix(const toml::array& rows, const std::string& what) {
   std::array<std::array<double, 3>, 3> r{};
   for (std::size_t i = 0; i < 3; ++i) {
     const Vec row = vector(rows[i], what, false);
     for (std::size_t j = 0; j < 3; ++j) r[i][j] = row[j].value();
   }
-  double off = 0.0;
-  for (std::size_t i = 0; i < 3; ++i)
-    for (std::size_t j = 0; j < 3; ++j) {
-      double product = 0.0;
-      for (std::size_t k = 0; k < 3; ++k) product += r[i][k] * r[j][k];
-      off = std::max(off, std::abs(product - (i == j ? 1.0 : 0.0)));
-    }
-  const double determinant = r[0][0] * (r[1][1] * r[2][2] - r[1][2] * r[2][1]) -
-                             r[0][1] * (r[1][0] * r[2][2] - r[1][2] * r[2][0]) +
-                             r[0][2] * (r[1][0] * r[2][1] - r[1][1] * r[2][0]);
-  if (!(off <= of_length_one && determinant > 0.0))
+  if (const double off = distance_from_rotations(r); !(off <= of_length_one))
     tables_.fail(
         place_of(rows.source()),
-        fmt::format(
-            "{}: its rows are no rotation: they are off from perpendicular unit vectors by {:.2g}, the "
-            "determinant is {:.6g}",
-            what, off, determinant));
-  std::array<double, 4> squares{1.0 + r[0][0] + r[1][1] + r[2][2], 1.0 + r[0][0] - r[1][1] - r[2][2],
-                                1.0 - r[0][0] + r[1][1] - r[2][2], 1.0 - r[0][0] - r[1][1] + r[2][2]};
-  const auto largest = static_cast<std::size_t>(std::ranges::max_element(squares) - squares.begin());
-  const double wx = r[2][1] - r[1][2], wy = r[0][2] - r[2][0], wz = r[1][0] - r[0][1], xy = r[0][1] + r[1][0],
-               xz = r[0][2] + r[2][0], yz = r[1][2] + r[2][1];
-  const std::array<std::array<double, 4>, 4> parts{{{squares[0], wx, wy, wz},
-                                                    {wx, squares[1], xy, xz},
-                                                    {wy, xy, squares[2], yz},
-                                                    {wz, xz, yz, squares[3]}}};
-  const std::array<double, 4>& q = parts[largest];
-  const double length = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
-  return {q[0] / length, q[1] / length, q[2] / length, q[3] / length};
+        fmt::format("{}: its rows are no rotation, perpendicular unit vectors of determinant 1; they are off "
+                    "by {:.2g}",
+                    what, off));
+  return quaternion_of(r);
 }
 
 void BodyReader::draw(const Body& body) {

@@ -390,7 +390,7 @@ TEST_F(Bodies, MistakesAreToldWithTheirPlace) {
             {"scene.toml:7:15", "of length 1.41421"}},
            {"position = [0.6, 0, -0.8]",
             "orientation = [[1, 0, 0], [0, 1, 0], [0, 0, -1]]",
-            {"no rotation", "-1"}},
+            {"scene.toml:7:15", "no rotation"}},
            {"kind = \"revolute\"",
             "kind = \"hinge\"",
             {"scene.toml:10:8", "expected \"distance\", \"fixed\""}},

@@ -1,6 +1,6 @@
 #include <algorithm>
 #include <diracstep/scene_format/compiler/evaluator.hpp>
-#include <diracstep/scene_format/loader/drawn_bodies.hpp>
+#include <diracstep/scene_format/drawn_bodies.hpp>
 
 namespace diracstep {
 
