@@ -80,7 +80,8 @@ export function BodyView(container, motion, between) {
   sun.position.set(0.4 * reach, -0.6 * reach, reach).add(centre);
   scene.add(sun);
 
-  const cell = 10 ** Math.floor(Math.log10(reach / 3)), cells = 2 * Math.ceil(reach / cell);
+  const ten = 10 ** Math.floor(Math.log10(reach / 8)), cell = ten * [5, 2, 1].find(k => k * ten <= reach / 8);
+  const cells = 2 * Math.ceil(reach / cell);
   const grid = new THREE.GridHelper(cells * cell, cells, 0x888888, 0xbbbbbb).rotateX(Math.PI / 2);
   grid.position.set(Math.round(centre.x / cell) * cell, Math.round(centre.y / cell) * cell, 0);
   scene.add(grid, new THREE.AxesHelper(0.12 * reach));

@@ -117,7 +117,11 @@ class InSpace(BodiesPage):
 
     def test_without_webgl_bodies_are_shown_from_above(self):
         self.browser.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument",
-                                     {"source": "HTMLCanvasElement.prototype.getContext = () => null"})
+                                     {"source": """
+          const context = HTMLCanvasElement.prototype.getContext;
+          HTMLCanvasElement.prototype.getContext = function (kind, ...rest) {
+            return kind.startsWith('webgl') ? null : context.call(this, kind, ...rest);
+          };"""})
         self.browser.get(REPORT.as_uri())
         self.browser.execute_script(FIGURE + ".scrollIntoView()")
         time.sleep(0.5)

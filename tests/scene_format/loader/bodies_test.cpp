@@ -13,10 +13,10 @@
 
 /// Bodies, joints and contacts as text (docs/bodies.md): what they expand into, how it moves, what is
 /// refused.
-namespace diracstep {
+namespace diracstep::body_tests {
 namespace {
 
-using testing::end_of;
+using diracstep::testing::end_of;
 
 class Bodies : public ::testing::Test {
  protected:
@@ -367,8 +367,8 @@ struct Mistake {
 };
 
 TEST_F(Bodies, MistakesAreToldWithTheirPlace) {
-  const std::string good = with_span(pendulum);
-  ASSERT_EQ(message_of(good), "");
+  const std::string unchanged = with_span(pendulum);
+  ASSERT_EQ(message_of(unchanged), "");
   for (const Mistake& mistake : std::vector<Mistake>{
            {"mass = 2", "mass = -2", {"scene.toml:5:8", "'mass' of body 'bob' is -2; it must be above 0"}},
            {"mass = 2", "mass = \"mm\"", {"scene.toml:5:9", "unknown name 'mm'"}},
@@ -406,7 +406,7 @@ TEST_F(Bodies, MistakesAreToldWithTheirPlace) {
            {"[[body]]", "[[bodies]]", {"scene.toml:3", "unknown key 'bodies'", "did you mean 'body'"}},
            {"[[body]]\n", "[[rolling]]\nbody = \"x\"\n[[body]]\n", {"there is no body 'x'", "known are bob"}},
            {"gravity = 9.81", "hamiltonian = \"1\"", {"no 'hamiltonian'"}}}) {
-    std::string text = good;
+    std::string text = unchanged;
     const std::size_t where = text.find(mistake.from);
     ASSERT_NE(where, std::string::npos) << mistake.from;
     const std::string message = message_of(text.replace(where, mistake.from.size(), mistake.to));
@@ -417,4 +417,4 @@ TEST_F(Bodies, MistakesAreToldWithTheirPlace) {
 }
 
 }  // namespace
-}  // namespace diracstep
+}  // namespace diracstep::body_tests

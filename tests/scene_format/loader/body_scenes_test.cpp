@@ -12,7 +12,7 @@
 #include "stepping.hpp"
 
 /// The scenes of the catalogue that are made of bodies, beside their references.
-namespace diracstep {
+namespace diracstep::body_scene_tests {
 namespace {
 
 double output_of(const CatalogueScene& entry, const Sample& sample, const std::string& name) {
@@ -154,4 +154,4 @@ TEST(BodyScenes, TheFiveBarLeavesThreeRowsOut) {
 }
 
 }  // namespace
-}  // namespace diracstep
+}  // namespace diracstep::body_scene_tests
