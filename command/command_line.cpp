@@ -160,6 +160,7 @@ int with_all_verbs(int count, char** arguments, bool run_verbs, const Processes&
   add_help(app);
   add_check(app, session);
   add_equilibrium(app, session);
+  add_expand(app, session);
   add_fit(app, session);
   add_list(app, session);
   add_new(app, session);

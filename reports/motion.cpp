@@ -171,6 +171,21 @@ bool find_plane(Motion& motion, const CatalogueScene& entry) {
   return true;
 }
 
+bool find_solids(Motion& motion, const CatalogueScene& entry) {
+  for (const DrawnBody& body : entry.bodies) {
+    if (motion.solids.size() == max_bodies) break;
+    Motion::Solid& solid =
+        motion.solids.emplace_back(Motion::Solid{body.name, body.shape, body.size, {}, body.fixed});
+    for (const int index : body.coordinates) {
+      solid.places.push_back(static_cast<int>(motion.coordinates.size()));
+      motion.coordinates.push_back(coordinate(entry, index));
+    }
+  }
+  if (motion.solids.empty()) return false;
+  motion.form = Motion::Form::space;
+  return true;
+}
+
 /// Whether a unit such as "N s/m" or "1/s^2" speaks of the symbol.
 bool speaks_of(const std::string& unit, std::string_view symbol) {
   const auto letter = [](char c) { return std::isalpha(static_cast<unsigned char>(c)) != 0; };
@@ -185,7 +200,7 @@ bool speaks_of(const std::string& unit, std::string_view symbol) {
 
 Motion motion_of(const CatalogueScene& entry) {
   Motion motion;
-  if (find_plane(motion, entry) || find_profile(motion, entry)) return motion;
+  if (find_solids(motion, entry) || find_plane(motion, entry) || find_profile(motion, entry)) return motion;
   const std::size_t count = std::min(entry.scene->coordinates.size(), max_curves);
   for (std::size_t i = 0; i < count; ++i)
     motion.coordinates.push_back(coordinate(entry, static_cast<int>(i)));
@@ -194,6 +209,8 @@ Motion motion_of(const CatalogueScene& entry) {
 
 const char* name(Motion::Form form) {
   switch (form) {
+    case Motion::Form::space:
+      return "space";
     case Motion::Form::plane:
       return "plane";
     case Motion::Form::profile:

@@ -257,10 +257,15 @@ std::string inside_script(const std::string& json) {
 }
 
 std::string scripts(const std::vector<PageEntry>& entries) {
-  return fmt::format(
-      "<script type=\"application/json\" id=\"data\">{}</script>\n<script>\n{}\n{}\n{}</script>\n",
-      inside_script(study_page_data(entries)), study_page_parts::plot, study_page_parts::motion,
-      study_page_parts::page);
+  const bool bodies = std::ranges::any_of(
+      entries, [](const PageEntry& entry) { return entry.history.motion.form == Motion::Form::space; });
+  const std::string view =
+      bodies ? fmt::format("<script>\n{}</script>\n", study_page_parts::body_view) : std::string();
+  return view +
+         fmt::format(
+             "<script type=\"application/json\" id=\"data\">{}</script>\n<script>\n{}\n{}\n{}</script>\n",
+             inside_script(study_page_data(entries)), study_page_parts::plot, study_page_parts::motion,
+             study_page_parts::page);
 }
 
 }  // namespace

@@ -44,7 +44,7 @@ Json motion_json(const History& history) {
   Json json{{"form", name(motion.form)}, {"time", Json::array()}};
   for (std::size_t k = 0; k < history.track_time.size(); k += every)
     json["time"].push_back(rounded(history.track_time[k]));
-  for (const char* list : {"names", "units", "numbers", "bodies", "bars", "pins", "values"})
+  for (const char* list : {"names", "units", "numbers", "bodies", "bars", "pins", "solids", "values"})
     json[list] = Json::array();
   for (std::size_t i = 0; i < motion.coordinates.size(); ++i) {
     json["names"].push_back(motion.coordinates[i].name);
@@ -58,6 +58,12 @@ Json motion_json(const History& history) {
   for (const Motion::Body& body : motion.bodies) json["bodies"].push_back(body_json(body));
   for (const Motion::Bar& bar : motion.bars) json["bars"].push_back({bar.from, bar.to});
   for (const auto& pin : motion.pins) json["pins"].push_back({rounded(pin[0]), rounded(pin[1])});
+  for (const Motion::Solid& solid : motion.solids)
+    json["solids"].push_back({{"name", solid.name},
+                              {"shape", solid.shape},
+                              {"size", rounded({solid.size.begin(), solid.size.end()})},
+                              {"coordinates", solid.places},
+                              {"fixed", rounded({solid.fixed.begin(), solid.fixed.end()})}});
   return json;
 }
 

@@ -256,9 +256,30 @@ std::string curves_script(const History& history, const std::string& time) {
          plotted(curves);
 }
 
+/// The ways of the centres of bodies, in space.
+std::string space_script(const History& history) {
+  std::string data, plots;
+  std::size_t drawn = 0;
+  for (const Motion::Solid& solid : history.motion.solids) {
+    if (solid.places.empty() || drawn == max_trails) continue;
+    data += fmt::format("$body{} << EOD\n", drawn);
+    for (const Vector& at : history.positions)
+      data += fmt::format("{:.6g} {:.6g} {:.6g}\n", at[solid.places[0]], at[solid.places[1]],
+                          solid.places.size() == 7 ? at[solid.places[2]] : 0.0);
+    data += "EOD\n";
+    plots += fmt::format("{}$body{} with lines lw 1.5 title {} noenhanced", drawn == 0 ? "" : ", ", drawn,
+                         gnuplot_text(solid.name));
+    ++drawn;
+  }
+  return data + "set view equal xyz\nset xlabel 'x [m]'\nset ylabel 'y [m]'\nset zlabel 'z [m]'\nsplot " +
+         plots + '\n';
+}
+
 std::string motion_script(const History& history, const std::string& time) {
   const std::string linear = std::string(study_style) + "unset logscale\nunset mxtics\nset format '%g'\n";
   switch (history.motion.form) {
+    case Motion::Form::space:
+      return linear + space_script(history);
     case Motion::Form::plane:
       return linear + plane_script(history);
     case Motion::Form::profile:

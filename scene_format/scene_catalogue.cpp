@@ -5,6 +5,7 @@
 #include <diracstep/core/system/contradictory_rows.hpp>
 #include <diracstep/core/system/redundant_rows.hpp>
 #include <diracstep/files/input_file.hpp>
+#include <diracstep/scene_format/compiler/plain_scene.hpp>
 #include <diracstep/scene_format/compiler/size_limits.hpp>
 #include <diracstep/scene_format/loader/shipped_scenes.hpp>
 #include <diracstep/scene_format/parametric_scene_file.hpp>
@@ -73,6 +74,10 @@ std::string text_of_scene(const std::string& name) {
 
 CatalogueScene make_scene(const std::string& name, const Parameters& changes) {
   return scene_source(name).load(changes);
+}
+
+std::string expanded_scene(const std::string& name) {
+  return scene_compiler::plain_scene(name, text_of_scene(name));
 }
 
 SceneFile scene_source(const std::string& name) { return {name, text_of_scene(name)}; }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <diracstep/core/system/event.hpp>
 #include <diracstep/core/system/scene.hpp>
 #include <functional>
@@ -64,6 +65,15 @@ struct Output {
   PointFunction at;
 };
 
+/// A rigid body as a picture shows it.
+struct DrawnBody {
+  std::string name;
+  std::string shape;             ///< "box", "sphere", "cylinder", "disc", "rod"; "ellipsoid" of the inertia
+  std::array<double, 3> size;    ///< edges; radius; radius, length along z; radius; length along z; half axes
+  std::vector<int> coordinates;  ///< in q: x, y, z, quaternion w, x, y, z; in the plane x, y, angle
+  std::array<double, 7> fixed = {};  ///< x, y, z, w, x, y, z of one that stands still, without coordinates
+};
+
 /// Where a value of a start is from.
 enum class StartOrigin { left_out, given, guess, rate };  ///< rate: that of a state
 
@@ -104,6 +114,7 @@ struct CatalogueScene {
   std::vector<Output> outputs = {};
   std::vector<InputRange> input_ranges = {};
   std::vector<Event> events = {};
+  std::vector<DrawnBody> bodies = {};
   /// The scene with the rows that are off at the start as well, where events switch some; else null.
   std::shared_ptr<const Scene> all_rows = {};
   /// Of the columns of its motions: all_rows or the scene itself.

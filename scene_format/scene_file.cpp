@@ -7,6 +7,7 @@
 #include <diracstep/core/system/row_subset.hpp>
 #include <diracstep/files/input_file.hpp>
 #include <diracstep/scene_format/compiler/size_limits.hpp>
+#include <diracstep/scene_format/drawn_bodies.hpp>
 #include <diracstep/scene_format/loader/defined_start.hpp>
 #include <diracstep/scene_format/loader/scene_definition.hpp>
 #include <diracstep/scene_format/loader/scene_functions.hpp>
@@ -431,6 +432,7 @@ CatalogueScene load(const std::shared_ptr<const CompiledScene>& compiled, const 
                                 loaded->program->invariants[i].value});
   add_outputs(entry, loaded);
   add_events(entry, loaded);
+  entry.bodies = drawn_bodies(*loaded);
   for (const auto& input : document.inputs)
     if (!input.hold && loaded->program->symbols.inputs_of_time.contains(input.name))
       entry.input_ranges.push_back({input.name, input.times.front(), input.times.back()});

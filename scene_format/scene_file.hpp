@@ -31,6 +31,10 @@ CatalogueScene scene_from_text(const std::string& file, const std::string& text,
 /// The same for a name of the catalogue or the path of a file.  Throws Misuse as make_scene does.
 SceneFile scene_source(const std::string& name);
 
+/// The text of a scene without its bodies, joints and contacts: what they make as coordinates, a Lagrangian
+/// and rows (docs/bodies.md).  It runs to the same bits.  Throws Misuse as scene_source does.
+std::string expanded_scene(const std::string& name);
+
 /// A scene from a file.  Throws Misuse where it cannot be read.
 CatalogueScene scene_from_file(const std::string& path, const Parameters& changes = {});
 

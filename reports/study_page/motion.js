@@ -1,5 +1,5 @@
-// The motion of a scene: points and bars in a plane, the profile of a chain, or coordinates over time.
-// The first two are drawn as an animation that can be stopped, and that waits where less motion is preferred.
+// The motion of a scene: bodies in space, points and bars in a plane, the profile of a chain, or coordinates over time.
+// The first three are drawn as an animation that can be stopped, and that waits where less motion is preferred.
 'use strict';
 const motionPicture = (() => {
   const framesPerSecond = 25, shortest = 8, longest = 40, mostTrails = 8;
@@ -126,8 +126,46 @@ const motionPicture = (() => {
     return Object.assign(state, { show });
   }
 
+  // The centres of bodies from above, where there is no three.js or no WebGL.
+  function fromAbove(motion) {
+    const moving = motion.solids.filter(body => body.coordinates.length);
+    return { ...motion, form: 'plane', pins: motion.solids.filter(body => !body.coordinates.length).map(body => body.fixed.slice(0, 2)),
+      bodies: moving.map(({ name, coordinates }) => ({ name, x: coordinates[0], y: coordinates[1],
+        ...(coordinates.length === 3 ? { heading: coordinates[2] } : {}) })) };
+  }
+
+  // Bodies in space: turned by dragging, zoomed with the wheel; the view keeps its own canvas.
+  function spaceView(figure, motion) {
+    const box = document.createElement('div');
+    box.className = 'view';
+    figure.insertBefore(box, figure.querySelector('.tools'));
+    try {
+      const view = bodyView.BodyView(box, motion, between);
+      view.canvas.setAttribute('aria-label', `${figure.dataset.description}, in space; drag or arrow keys turn, wheel or + and - zoom`);
+      return view;
+    } catch (error) {
+      box.remove();
+      return null;
+    }
+  }
+
   // draw() of the figure; called once for each width.
   return function draw(figure, motion, spec) {
+    if (motion.form === 'space') {
+      let shown = null;
+      return () => {
+        if (shown) return shown();
+        const view = typeof bodyView === 'undefined' ? null : spaceView(figure, motion);
+        if (!view) return (shown = draw(figure, fromAbove(motion), spec))();
+        figure.querySelectorAll('img, svg').forEach(picture => picture.remove());
+        const playing = player(figure, motion);
+        playing.draw = view.draw;
+        figure.bodyView = view;
+        figure.querySelector('[data-file=svg]').remove();  // a canvas has no such file
+        shown = () => { view.resize(); playing.show(); };
+        shown();
+      };
+    }
     if (motion.form === 'curves') return () => Plot(figure, curvesSpec(motion, spec));
     const [specOf, frameOf] = motion.form === 'plane' ? [planeSpec, planeFrame] : [profileSpec, profileFrame];
     const whole = specOf(motion, spec), playing = player(figure, motion);

@@ -122,8 +122,10 @@ function toolButton(bar, label, action) {
 
 function addTools(figure, name) {
   const bar = figure.querySelector('.tools');
-  toolButton(bar, 'SVG', () => save(`${name}.svg`, 'image/svg+xml', svgText(figure.querySelector('svg'))));
-  toolButton(bar, 'PNG', () => savePng(figure.querySelector('svg'), `${name}.png`));
+  const svg = toolButton(bar, 'SVG', () => save(`${name}.svg`, 'image/svg+xml', svgText(figure.querySelector('svg'))));
+  toolButton(bar, 'PNG', () => figure.bodyView ? figure.bodyView.canvas.toBlob(blob => save(`${name}.png`, 'image/png', blob))
+    : savePng(figure.querySelector('svg'), `${name}.png`));
+  svg.dataset.file = 'svg';
 }
 
 function addLevels(figure, draw) {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/files/csv_table.hpp>
+#include <diracstep/scene_format/compiler/body_reader.hpp>
 #include <diracstep/scene_format/compiler/circuit_reader.hpp>
 #include <diracstep/scene_format/compiler/netlist_reader.hpp>
 #include <diracstep/scene_format/compiler/scene_document.hpp>
@@ -38,31 +39,37 @@ class DocumentReader : TableReader {
   }
 
   SceneDocument read(const toml::table& root) {
-    check_keys(root, "the scene",
-               {"name",        "class",       "description", "source",   "needs",          "lagrangian",
-                "hamiltonian", "dissipation", "coordinates", "sizes",    "parameters",     "definitions",
-                "rows",        "force",       "start",       "span",     "reference",      "invariants",
-                "recommended", "inductor",    "capacitor",   "resistor", "source_voltage", "mutual",
-                "redundant",   "outputs",     "states",      "inputs",   "events",         "source_current",
-                "diode",       "switch",      "transformer", "gyrator",  "opamp"});
+    std::vector<std::string> known{
+        "name",        "class",       "description", "source",   "needs",          "lagrangian",
+        "hamiltonian", "dissipation", "coordinates", "sizes",    "parameters",     "definitions",
+        "rows",        "force",       "start",       "span",     "reference",      "invariants",
+        "recommended", "inductor",    "capacitor",   "resistor", "source_voltage", "mutual",
+        "redundant",   "outputs",     "states",      "inputs",   "events",         "source_current",
+        "diode",       "switch",      "transformer", "gyrator",  "opamp"};
+    known.insert(known.end(), body_tables().begin(), body_tables().end());
+    check_keys(root, "the scene", known);
     read_head(root);
     read_parameters(root, "sizes", true);
     read_parameters(root, "parameters", false);
     read_coordinates(root);
+    read_bodies(root);
     read_circuit(root);
     read_states(root);
     for (const Item& item : items(root, "definitions")) {
       require_new_name(item.key, item.place);
       document_.definitions.emplace(item.key, formula(*item.node, item.key));
     }
+    add_body_definitions();
     read_inputs(root);
     read_rows(root);
     for (const Item& item : items(root, "force")) document_.force.push_back(entry(item));
     read_start(root);
+    add_body_rows();
     read_span(root);
     read_references(root);
     read_invariants(root);
     read_outputs(root);
+    for (const auto& output : bodies_.expansion.outputs) add_output(output.name, bodies_.formula(output));
     read_events(root);
     read_recommended(root);
     guess_currents(document_);
@@ -173,6 +180,41 @@ class DocumentReader : TableReader {
     }
   }
 
+  // Bodies: their parts stand behind those of the file, as in the plain scene of plain_scene.hpp.
+
+  void read_bodies(const toml::table& root) {
+    bodies_ = BodyReader(*this, document_.file, document_).read(root);
+    for (const auto& [name, unit, meaning, source] : bodies_.expansion.coordinates)
+      add_coordinate({name, unit, meaning, {}, false, bodies_.place(source)});
+    document_.bodies = bodies_.drawn;
+  }
+
+  void add_body_definitions() {
+    if (bodies_.lagrangian) document_.lagrangian = bodies_.lagrangian;
+    if (bodies_.dissipation) document_.dissipation = bodies_.dissipation;
+    for (const auto& definition : bodies_.expansion.definitions) {
+      require_new_name(definition.name, bodies_.place(definition.source));
+      document_.definitions.emplace(definition.name, bodies_.formula(definition));
+    }
+  }
+
+  /// And the force and the start.
+  void add_body_rows() {
+    for (const auto& row : bodies_.expansion.rows)
+      add_row({row.name, bodies_.formula(row), {}, bodies_.place(row.source)});
+    for (auto& entry : document_.force)
+      if (const auto joined = bodies_.force.find(entry.key.text); joined != bodies_.force.end())
+        entry.values = {joined->second};
+    const auto entry_of = [&](const bodies::Expansion::Named& named) {
+      return SceneDocument::Entry{{named.name, bodies_.place(named.source)}, {bodies_.formula(named)}, false};
+    };
+    for (const auto& force : bodies_.expansion.force) document_.force.push_back(entry_of(force));
+    for (const auto& start : bodies_.expansion.start) document_.start.push_back(entry_of(start));
+    if (document_.project && document_.guesses.empty()) return;  // all are guesses
+    for (const std::string& guess : bodies_.expansion.guesses)
+      document_.guesses.push_back({guess, bodies_.place(0)});
+  }
+
   void read_circuit(const toml::table& root) {
     for (SceneDocument::Coordinate& coordinate : CircuitReader(*this, document_).read(root))
       add_coordinate(std::move(coordinate));
@@ -275,14 +317,18 @@ class DocumentReader : TableReader {
       const Place place = place_of(row->source());
       const std::string name = string(*row, "name", fmt::format("row{}", document_.rows.size() + 1));
       if (!is_name(name)) fail(place, fmt::format("'{}' is no name for a row", name));
-      if (!row_names_.insert(name).second) fail(place, fmt::format("two rows are named '{}'", name));
-      document_.rows.push_back({name, required_formula(*row, "equation", "[[rows]]"),
-                                optional_formula(*row, "for"), place, optional_formula(*row, "compliance"),
-                                !row->contains("on") || flag(*row, "on")});
+      add_row({name, required_formula(*row, "equation", "[[rows]]"), optional_formula(*row, "for"), place,
+               optional_formula(*row, "compliance"), !row->contains("on") || flag(*row, "on")});
       if (!document_.rows.back().on && document_.rows.back().loops)
         fail(place, "a repeated row cannot be switched: on = false is for single ones");
       if (document_.rows.back().compliance) add_extension(document_.rows.back());
     }
+  }
+
+  void add_row(SceneDocument::Row row) {
+    if (!row_names_.insert(row.name).second)
+      fail(row.place, fmt::format("two rows are named '{}'", row.name));
+    document_.rows.push_back(std::move(row));
   }
 
   /// The coordinate of a compliant row, whose start follows from the others'.
@@ -376,17 +422,20 @@ class DocumentReader : TableReader {
   /// Columns beside t, the coordinates, v_…, p_…, lambda_…, energy and invariant_…, whose names they cannot
   /// have.
   void read_outputs(const toml::table& root) {
-    for (const Item& item : items(root, "outputs")) {
-      require_new_name(item.key, item.place);
-      for (const char* taken : {"v_", "p_", "lambda_", "invariant_"})
-        if (item.key.starts_with(taken))
-          fail(item.place,
-               fmt::format("'{}': columns that begin with {} are those of the scene itself; choose "
-                           "another name",
-                           item.key, taken));
-      if (item.key == "energy") fail(item.place, "the column 'energy' is that of the scene itself");
-      document_.outputs.push_back({item.key, formula(*item.node, item.key), item.place});
-    }
+    for (const Item& item : items(root, "outputs"))
+      add_output(item.key, formula(*item.node, item.key), item.place);
+  }
+
+  void add_output(const std::string& name, const FormulaText& formula, std::optional<Place> stated = {}) {
+    const Place place = stated.value_or(formula.start);
+    require_new_name(name, place);
+    for (const char* taken : {"v_", "p_", "lambda_", "invariant_"})
+      if (name.starts_with(taken))
+        fail(place, fmt::format("'{}': columns that begin with {} are those of the scene itself; choose "
+                                "another name",
+                                name, taken));
+    if (name == "energy") fail(place, "the column 'energy' is that of the scene itself");
+    document_.outputs.push_back({name, formula, place});
   }
 
   void read_events(const toml::table& root) {
@@ -499,6 +548,7 @@ class DocumentReader : TableReader {
   }
 
   SceneDocument document_;
+  BodyParts bodies_;
   std::set<std::string> names_, row_names_;
   std::vector<std::string> extensions_;
 };

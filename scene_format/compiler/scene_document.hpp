@@ -129,6 +129,14 @@ struct SceneDocument {
 
     std::string side(int number) const { return name + (number == 1 ? "_1" : "_2"); }
   };
+  /// A body as a picture shows it.
+  struct DrawnBody {
+    std::string name, shape;        ///< "box", "sphere", "cylinder", "disc", "rod", "ellipsoid"
+    std::vector<FormulaText> size;  ///< three numbers, by shape (bodies::Body), of an ellipsoid half axes
+    std::vector<std::string> coordinates;  ///< x, y, z, quaternion w, x, y, z; in the plane x, y, angle
+    std::vector<FormulaText> fixed;        ///< of a body that stands still the seven numbers
+    Place place = {};
+  };
   struct Recommended {
     std::string method = "auto";
     int order = 0;           ///< 0: the method's own
@@ -160,6 +168,7 @@ struct SceneDocument {
   std::vector<Branch> branches;
   std::vector<Mutual> mutuals;
   std::vector<TwoPort> two_ports;
+  std::vector<DrawnBody> bodies;
   Recommended recommended;
 };
 

@@ -42,6 +42,7 @@ class SceneCompiler {
       program_.outputs.push_back(
           {output.name, motion_function(output.formula, "output '" + output.name + "'")});
     for (const auto& event : document_.events) compile_event(event);
+    for (const auto& body : document_.bodies) compile_drawn(body);
     write_source();
     program_.kinks = KinkFinder(program_, builder_).find();
   }
@@ -573,6 +574,13 @@ class SceneCompiler {
       builder_.add_rows(contact, std::move(single), offsets);
     }
     program.contact = std::move(contact);
+  }
+
+  void compile_drawn(const SceneDocument::DrawnBody& body) {
+    std::vector<Node>& values = program_.drawn.emplace_back();
+    for (const auto* list : {&body.size, &body.fixed})
+      for (const FormulaText& text : *list)
+        values.push_back(parser_.formula(text, {.what = "the size or place of body '" + body.name + "'"}));
   }
 
   void require_settable(const NamedValue& value) const {

@@ -134,7 +134,8 @@ struct SceneProgram {
   std::vector<InvariantProgram> invariants;
   std::vector<OutputProgram> outputs;
   std::vector<StateProgram> states;
-  std::vector<EventProgram> events;  ///< as in the document
+  std::vector<EventProgram> events;      ///< as in the document
+  std::vector<std::vector<Node>> drawn;  ///< sizes of each of the document's bodies, then its fixed place
   KinkProgram kinks;
   std::string source;  ///< C for all kernels
   std::string name;    ///< of the source, by its content; the table in it is diracstep_kernels_NAME

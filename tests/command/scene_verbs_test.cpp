@@ -55,8 +55,24 @@ TEST_F(SceneVerbs, CheckRunsEverySceneAgainstItsPublishedValues) {
     EXPECT_FALSE(one["source"].get<std::string>().empty()) << one;
     scenes.insert(one["scene"].get<std::string>());
   }
-  EXPECT_EQ(scenes.size(), 28U);
+  EXPECT_EQ(scenes.size(), 37U);
   expect_misuse("check --scenes knife_edge", {"--scenes"});
+}
+
+TEST_F(SceneVerbs, ExpandPrintsAPlainSceneThatRunsToTheSameBits) {
+  const Outcome plain = run("expand spinning_top");
+  EXPECT_EQ(plain.status, 0) << plain.err;
+  EXPECT_EQ(plain.out.find("[[body]]"), std::string::npos);
+  EXPECT_NE(plain.out.find("[[rows]]\nname = \"tip_x\""), std::string::npos) << plain.out;
+  EXPECT_EQ(Json::parse(run("expand spinning_top --json").out)["text"], plain.out);
+  std::ofstream(path("plain.toml")) << plain.out;
+  const std::string of_bodies = path("bodies.csv"), of_rows = path("rows.csv");
+  EXPECT_EQ(run("run spinning_top --end 0.05 --out '" + of_bodies + "'").status, 0);
+  EXPECT_EQ(run("run '" + path("plain.toml") + "' --end 0.05 --out '" + of_rows + "'").status, 0);
+  EXPECT_EQ(contents(of_bodies), contents(of_rows));
+  EXPECT_TRUE(run("expand knife_edge").out.starts_with("name = \"knife_edge\""))
+      << "as it is, without bodies";
+  expect_misuse("expand no_such_scene", {"unknown scene 'no_such_scene'"});
 }
 
 TEST_F(SceneVerbs, CheckNamesRedundantRows) {

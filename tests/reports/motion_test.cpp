@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <diracstep/reports/motion.hpp>
 
 namespace diracstep {
@@ -41,6 +42,19 @@ TEST(Motion, PointsTheWayOfAHeading) {
   ASSERT_GE(skate.bodies[0].heading, 0);
   EXPECT_EQ(skate.coordinates[static_cast<std::size_t>(skate.bodies[0].heading)].name, "ph");
   EXPECT_EQ(motion_of(make_scene("pendulum_cartesian")).bodies[0].heading, -1);
+}
+
+TEST(Motion, DrawsBodiesInSpace) {
+  const Motion satellite = motion_of(make_scene("satellite"));
+  EXPECT_EQ(satellite.form, Motion::Form::space);
+  ASSERT_EQ(satellite.solids.size(), 2u);
+  EXPECT_EQ(satellite.solids[0].shape, "ellipsoid");  // of its inertia
+  EXPECT_NEAR(satellite.solids[0].size[0], std::sqrt(2.5 * (10.0 + 12.0 - 8.0) / 50.0), 1e-12);
+  EXPECT_EQ(satellite.solids[1].shape, "disc");
+  EXPECT_EQ(satellite.solids[1].size[0], 0.15);
+  ASSERT_EQ(satellite.solids[1].places.size(), 7u);
+  EXPECT_EQ(satellite.coordinates[static_cast<std::size_t>(satellite.solids[1].places[0])].name, "wheel_x");
+  EXPECT_EQ(motion_of(make_scene("snakeboard")).solids[2].places.size(), 3u);
 }
 
 TEST(Motion, DrawsALongFamilyAsAProfileAndBoundsIt) {
