@@ -25,7 +25,8 @@ from .symbols import (acos, acosh, asin, asinh, atan, atan2, atanh, cos, cosh, e
 
 __version__ = version()
 
-__all__ = ["CallbackCost", "Doubt", "Ensemble", "Equilibrium", "Error", "Event", "Fit", "Failure", "GeneratingFunction", "Gradient", "Integrator",
-           "Interrupted", "Jacobian", "Misuse", "Points", "Run", "Scene", "Search", "SolvedStart", "State", "Statistics", "Study", "acos", "acosh", "asin", "asinh",
-           "atan", "atan2", "atanh", "catalogue", "cos", "cosh", "exp", "load", "log", "maximum", "methods", "minimum",
-           "parse", "pi", "sin", "sinh", "sqrt", "tan", "tanh", "version"]
+__all__ = ["CallbackCost", "Doubt", "Ensemble", "Equilibrium", "Error", "Event", "Failure", "Fit", "GeneratingFunction",
+           "Gradient", "Integrator", "Interrupted", "Jacobian", "Misuse", "Points", "Run", "Scene", "Search", "SolvedStart",
+           "State", "Statistics", "Study", "acos", "acosh", "asin", "asinh", "atan", "atan2", "atanh", "catalogue", "cos",
+           "cosh", "exp", "load", "log", "maximum", "methods", "minimum", "parse", "pi", "sin", "sinh", "sqrt", "tan",
+           "tanh", "version"]

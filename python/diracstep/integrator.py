@@ -183,10 +183,10 @@ class Integrator:
         def write(_: Any, end: Any, q: Any, v: Any, p: Any) -> int:
             try:
                 at = end.contents
-                numbers = [np.ctypeslib.as_array(ctypes.cast(address, c.Numbers), (size,)).copy() if size else np.empty(0)
+                seen = [np.ctypeslib.as_array(ctypes.cast(address, c.Numbers), (size,)).copy() if size else np.empty(0)
                            for address, size in ((at.q, n), (at.v, n), (at.p, n), (at.lambda_, m))]
-                seen = State(at.time, *numbers, at.energy, np.empty(0), np.empty(0))
-                given = cotangent(seen) if callable(cotangent) else cotangent
+                state = State(at.time, seen[0], seen[1], seen[2], seen[3], at.energy, np.empty(0), np.empty(0))
+                given = cotangent(state) if callable(cotangent) else cotangent
                 for name, to in (("q", q), ("v", v), ("p", p)):
                     if name in given:
                         np.ctypeslib.as_array(to, (n,))[:] = column(given[name], self.scene._coordinates, name)

@@ -56,7 +56,8 @@ class Scene:
     def __init__(self, coordinates: Sequence[str], lagrangian: Callable[..., Any] | None = None, *,
                  hamiltonian: Callable[..., Any] | None = None, dissipation: Callable[..., Any] | None = None, rows: Any = None,
                  force: Callable[..., Any] | None = None, parameters: Mapping[str, float] | None = None, q: Any = None,
-                 v: Any = None, p: Any = None, t: float = 0.0, start: Mapping[str, float] | None = None, until: float = 1.0, step: float = 0.1,
+                 v: Any = None, p: Any = None, t: float = 0.0, start: Mapping[str, float] | None = None, until: float = 1.0,
+                 step: float = 0.1,
                  invariants: Mapping[str, Callable[..., Any]] | None = None, name: str = "scene", description: str = "",
                  callback: bool = False, plugins: Sequence[str] = (), methods: Sequence[GeneratingFunction] = (),
                  drop_redundant: bool = False, tolerances: Mapping[str, float] | None = None) -> None:
@@ -128,7 +129,7 @@ class Scene:
         self._widths = {"q": n, "v": n, "p": n, "lambda_": facts.rows, "invariants": facts.invariants, "outputs": facts.outputs}
         self.inputs: dict[str, tuple[float, float]] = {  #: tables of the time, and between which times they have values
             name: (float(first), float(last)) for name, first, last in self._lines(c.INPUTS)}
-        self.events: dict[str, str] = dict(self._lines(c.EVENTS))  #: by name: "record", "stop" or "act"
+        self.events: dict[str, str] = {name: what for name, what in self._lines(c.EVENTS)}  #: by name: "record", "stop" or "act"
         self.units: dict[str, str] = {name: unit for name, (_, unit, _) in zip(self._coordinates, listed)}
         self.parameters: dict[str, float] = {name: float(value) for name, value, _, _ in self._lines(c.PARAMETERS)}
         self.about: list[tuple[str, str]] = [(what, text) for what, text in self._lines(c.ABOUT)]  #: what the scene says of itself
@@ -172,8 +173,9 @@ class Scene:
         """The same scene with absolute tolerances, in their units, of coordinates that are far smaller than others."""
         if self._callbacks is not None:
             raise Misuse("the tolerances of a scene of callbacks are stated where it is made")
+        again: dict[str, Any] = {**self._again, "tolerances": {**self._tolerances, **tolerances}}
         made = Scene.__new__(Scene)
-        made._open(**{**self._again, "tolerances": {**self._tolerances, **tolerances}}, parameters=self._changes)
+        made._open(**again, parameters=self._changes)
         return made
 
     def __del__(self) -> None:
@@ -185,7 +187,8 @@ class Scene:
 
     # ---- runs ----
     def run(self, *, until: float | None = None, steps: int | None = None, at: Any = None, every_time: float | None = None,
-            error: float | None = None, every: int = 1, momentum: str = "projected", progress: bool | None = None, max_solves: int = 0, max_time: float = 0.0,
+            error: float | None = None, every: int = 1, momentum: str = "projected", progress: bool | None = None,
+            max_solves: int = 0, max_time: float = 0.0,
             tolerances: Mapping[str, float] | None = None, **options: Any) -> Run:
         """One motion from the scene's start, as a Run.
 
