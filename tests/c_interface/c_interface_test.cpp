@@ -102,7 +102,7 @@ TEST_F(CInterface, StepsAndReadsAsTheLibraryDoes) {
   ASSERT_EQ(create(&callbacks.scene(), options), DIRACSTEP_OK) << diracstep_message();
   EXPECT_EQ(diracstep_step(made_, 20), DIRACSTEP_OK);
   Vector q(3), v(3), p(3), lambda(2);
-  diracstep_state state{0.0, 0.0, q.data(), v.data(), p.data(), lambda.data()};
+  diracstep_state state{0.0, 0.0, q.data(), v.data(), p.data(), lambda.data(), nullptr, nullptr};
   ASSERT_EQ(diracstep_read(made_, DIRACSTEP_PROJECTED, &state), DIRACSTEP_OK);
   const Sample expected = end_of(scene, "type1/gl:2");
   EXPECT_DOUBLE_EQ(state.time, 1.0);
@@ -290,7 +290,7 @@ TEST_F(CInterface, ToleranceOfASmallCoordinateIsKept) {
     EXPECT_EQ(create(), DIRACSTEP_OK) << diracstep_message();
     EXPECT_EQ(diracstep_step(made_, 100), DIRACSTEP_OK) << diracstep_message();
     std::array<double, 2> q{}, v{}, p{};
-    diracstep_state state{0.0, 0.0, q.data(), v.data(), p.data(), nullptr};
+    diracstep_state state{0.0, 0.0, q.data(), v.data(), p.data(), nullptr, nullptr, nullptr};
     EXPECT_EQ(diracstep_read(made_, DIRACSTEP_PROJECTED, &state), DIRACSTEP_OK);
     return q[0];
   };
