@@ -21,6 +21,34 @@ def of_command(scene, *options):
     return json.loads(done.stdout)
 
 
+# A rectifier: the charge of its capacitor, whose ripple is slow beside what the diode damps.
+RECTIFIER = """
+name = "rectifier"
+[[source_voltage]]
+name = "V"
+nodes = ["ground", "in"]
+value = "5*sin(100*pi*t)"
+[[diode]]
+name = "D"
+nodes = ["in", "out"]
+on = 0.1
+off = 1e6
+[[capacitor]]
+name = "C"
+nodes = ["out", "ground"]
+value = 1e-4
+[[resistor]]
+name = "R"
+nodes = ["out", "ground"]
+value = 1000
+[outputs]
+kept = "V(out)"
+[span]
+end = 0.03
+step = 5e-4
+"""
+
+
 def quietly(scene, **options):
     """The run, also where it is doubted or fails."""
     with warnings.catch_warnings():
@@ -61,3 +89,36 @@ def test_a_run_without_options_is_that_of_the_command(name):
 @pytest.mark.parametrize("file", SCENES, ids=lambda path: path.stem)
 def test_a_run_of_an_example_is_that_of_the_command(file):
     assert_same(quietly(ds.load(file), every=7), of_command(file))
+
+
+@pytest.fixture
+def rectifier(tmp_path):
+    file = tmp_path / "rectifier.toml"
+    file.write_text(RECTIFIER)
+    return file
+
+
+@pytest.mark.parametrize("options, ours", [
+    ([], {}), (["--step", "1e-4"], {"step": 1e-4}), (["--adaptive"], {"adaptive": True}), (["--order", "4"], {"order": 4}),
+    (["--adaptive", "--eps", "1e-5"], {"eps": 1e-5}), (["--end", "0.011"], {"until": 0.011}), (["--substeps", "4"], {"substeps": 4}),
+])
+def test_options_mean_the_same_where_the_motion_is_damped(rectifier, options, ours):
+    assert_same(quietly(ds.load(rectifier), every=7, **ours), of_command(rectifier, *options))
+
+
+@pytest.mark.parametrize("name", ["knife_edge", "pendulum_cartesian", "lc_circuit", "flyball_governor"])
+@pytest.mark.parametrize("options, ours", [
+    (["--adaptive"], {"adaptive": True}), (["--order", "4"], {"order": 4}), (["--momentum", "minus"], {"momentum": "minus"}),
+    (["--method", "type1/midpoint", "--step", "0.0123"], {"method": "type1/midpoint", "step": 0.0123}),
+])
+def test_options_mean_the_same(name, options, ours):
+    until = min(2.0, ds.load(name).until)
+    assert_same(quietly(ds.load(name), every=7, until=until, **ours), of_command(name, "--end", repr(until), *options))
+
+
+@pytest.mark.parametrize("name", ["knife_edge", "kepler_e06"])
+def test_a_search_ends_where_that_of_the_command_does(name):
+    run, theirs = ds.load(name).run(error=1e-6, until=3.0, every=7), of_command(name, "--error", "1e-6", "--end", "3.0")
+    assert run.search.method == theirs["method"] and run.search.order == theirs["order"]
+    assert run.search.estimate == theirs["error_control"]["estimate"]
+    assert list(run.q[-1]) == list(theirs["end"]["q"].values())
