@@ -33,7 +33,7 @@ void take_checked_steps(Integrator& integrator, long steps, EnsembleMember& memb
   member.doubt = checks.text();
 }
 
-Worker worker(std::shared_ptr<Integrator> integrator, std::span<const Start> starts, long steps,
+Worker worker(const std::shared_ptr<Integrator>& integrator, std::span<const Start> starts, long steps,
               Momentum momentum) {
   const std::size_t between =
       std::max<std::size_t>(1, (starts.size() + checked_members - 1) / checked_members);
