@@ -168,7 +168,10 @@ class Run(Points):
         return self.gradient(given, parameters)
 
     def jvp(self, *, q: Any = None, v: Any = None, parameters: Mapping[str, float] | None = None) -> dict[str, np.ndarray]:
-        """What a direction at the start and in the parameters becomes at the end: {"q": n numbers, "v": …, "p": …}."""
+        """What a direction at the start and in the parameters becomes at the end: {"q": n numbers, "v": …, "p": …}.
+
+        q, v: n numbers, or by coordinate; parameters: by name.  A product with jacobian(), which is taken for it.
+        """
         names, moved = self.scene.coordinates, parameters or {}
         direction = np.concatenate([np.zeros(len(names)) if given is None else column(given, names, what)
                                     for given, what in ((q, "q"), (v, "v"))] + [[real(value, name) for name, value in moved.items()]])
