@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <diracstep/c_interface/handles.hpp>
 
@@ -6,18 +7,31 @@ using namespace diracstep::c_interface;
 
 namespace {
 
+/// Steps one by one may go on beyond the end, or be far fewer: they are looked at as those of a run of about
+/// so many.
+constexpr long expected_steps = 300;
+
+long expected_from(const Integrator& integrator, double end) {
+  return std::max(expected_steps, steps_left(integrator, end));
+}
+
+double expected_end(const Integrator& integrator, double end) {
+  return integrator.time() + static_cast<double>(expected_from(integrator, end)) * integrator.options().step;
+}
+double expected_end(const AdaptiveIntegrator&, double end) { return end; }
+
 template <class Stepper>
 void begin(const diracstep_integrator& handle, EventSteps<Stepper>& motion,
            std::optional<CheckedMotion<Stepper>>& checks) {
   Sample start;
   if (!motion.sample(start).ok()) return;
-  checks.emplace(motion, checks_of(handle, motion, handle.end));
+  checks.emplace(motion, checks_of(handle, motion, expected_end(motion.stepper(), handle.end)));
   checks->see(start);
 }
 
 void begin_checks(diracstep_integrator& handle, FixedMotion& motion) {
   if (handle.push && !handle.checks.pushed)
-    handle.checks.pushed.emplace(motion.stepper(), steps_left(motion.stepper(), handle.end));
+    handle.checks.pushed.emplace(motion.stepper(), expected_from(motion.stepper(), handle.end));
   else if (!handle.push && !handle.checks.fixed)
     begin(handle, motion, handle.checks.fixed);
 }
