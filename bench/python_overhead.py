@@ -35,7 +35,7 @@ def best(*actions):
 def run_in_c(scene, steps, step, method):
     """One run by the library alone, prepared beforehand."""
     course = c.Course(steps=steps, every=1)
-    points = Points(len(scene.coordinates), len(scene.rows), len(scene.invariants), steps + 2)
+    points = Points(scene._widths, steps + 2)
     for array in points.arrays.values():
         array.fill(0.0)  # pages of memory are there
     integrator = scene.integrator(method=method, step=step)

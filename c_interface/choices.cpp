@@ -1,5 +1,6 @@
 #include <cmath>
 #include <diracstep/c_interface/handles.hpp>
+#include <diracstep/core/adaptive/damping_survey.hpp>
 #include <diracstep/core/runs/run.hpp>
 #include <diracstep/solvers/direct_solver.hpp>
 
@@ -11,7 +12,8 @@ namespace {
 
 /// Whether the method, and where no step is given the step too, are those that the scene's file recommends.
 bool recommended(const diracstep_model& model, const diracstep_options& options) {
-  return options.method == nullptr && options.order == 0 && entry_of(model).recommended.stated;
+  return options.method == nullptr && options.order == 0 && !steps_vary(options) &&
+         entry_of(model).recommended.stated;
 }
 
 }  // namespace
@@ -51,6 +53,19 @@ IntegratorOptions stepping_from(const diracstep_model& model, const diracstep_op
   return stepping;
 }
 
+void choose_method(const diracstep_model& model, diracstep_options& options, IntegratorOptions& stepping) {
+  if (stepping.method != automatic_method || options.pushed != 0) return;
+  const double end = end_from(model, options);
+  if (end == model.scene->start.time) return;
+  const DefaultMethod choice = default_method_of_motion(
+      entry_of(model).scene, model.registry, solvers_from(options), end, std::abs(stepping.step), stepping,
+      {stepping.order, 0.0, stepping.constraint_rule, large_from(stepping.dense_limit)});
+  if (!model.registry.method(choice.method).info.damped) return;
+  stepping.method = choice.method;
+  const bool fixed = options.fixed != 0 || options.step != 0.0 || options.substeps > 1;
+  if (std::isnan(options.eps) || (options.eps == 0.0 && !fixed)) options.eps = choice.local_error;
+}
+
 StepControl control_from(const diracstep_options& options) {
   return step_control(options.control != nullptr ? options.control : "integrating");
 }
@@ -61,17 +76,14 @@ double end_from(const diracstep_model& model, const diracstep_options& options) 
   return end;
 }
 
-double step_from(const diracstep_model& model, const diracstep_options& options) {
-  return step_from(model, options, model.scene->start.time);
+double open_step(const diracstep_model& model, const diracstep_options& options, double start) {
+  if (options.step != 0.0) return options.step;
+  const CatalogueScene& entry = entry_of(model);
+  return std::copysign(recommended(model, options) ? entry.recommended.step : entry.natural_step,
+                       end_from(model, options) - start);
 }
 
-double step_from(const diracstep_model& model, const diracstep_options& options, double start) {
-  const CatalogueScene& entry = entry_of(model);
-  const double forward = end_from(model, options) - start;
-  double step = options.step;
-  if (step == 0.0)
-    step = std::copysign(recommended(model, options) ? entry.recommended.step : entry.natural_step, forward);
-  if (steps_vary(options)) return std::copysign(step, forward);
+double fitted_step(const diracstep_options& options, double start, double step) {
   return options.ends != 0 ? fit_steps(start, options.end, step).step : step;
 }
 

@@ -21,10 +21,13 @@ ParametricScene parametric(const diracstep_model& model, const diracstep_derivat
 
 Integrator& stepper_of(const diracstep_model& model, diracstep_integrator& handle, long steps) {
   if (handle.scene != model.scene) throw Misuse("the integrator is of another model");
-  if (handle.fixed() == nullptr) throw Misuse("derivatives need steps of fixed size");
+  FixedMotion& motion = fixed_of(handle, "a derivative");
+  if (!motion.events().empty())
+    throw Misuse("derivatives do not go with the events of the scene: when one is met is not differentiated");
   if (handle.push) throw Misuse("an integrator with a pushed force is not differentiated");
   if (steps < 1) throw Misuse("steps is " + std::to_string(steps) + "; 1 or more are needed");
-  return *handle.fixed();
+  handle.checks.begin_anew();
+  return motion.stepper();
 }
 
 void write(const Columns& columns, double* to, const char* what) {
@@ -37,8 +40,8 @@ ReadDirections cotangent_at(const diracstep_derivatives& wanted, const Sample& e
   const Eigen::Index n = end.q.size();
   ReadDirections read{Columns::Zero(n, 1), Columns::Zero(n, 1), Columns::Zero(n, 1)};
   Sample copy = end;
-  diracstep_state state{end.time,      end.energy,    copy.q.data(),
-                        copy.v.data(), copy.p.data(), copy.lambda.data()};
+  diracstep_state state{end.time,      end.energy,         copy.q.data(), copy.v.data(),
+                        copy.p.data(), copy.lambda.data(), nullptr,       nullptr};
   if (wanted.cotangent(wanted.data, &state, read.q.data(), read.v.data(), read.p.data()) != 0)
     throw Failure("the function of the end failed");
   return read;

@@ -3,7 +3,10 @@
  *
  * Every function that can fail returns DIRACSTEP_OK or one of the codes below it; diracstep_message says what
  * happened.  Structs that are all zero are the defaults.  Columns of a point hold n numbers (coordinates), m
- * numbers (rows) or i numbers (invariants): see diracstep_facts.  Units are those of the scene.
+ * numbers (rows), i numbers (invariants) or o numbers (outputs): see diracstep_facts.  Units are those of the
+ * scene.
+ *
+ * Events of a scene (docs/events.md) are looked for by runs, by ensembles and by single steps, and act.
  *
  * A model is not changed by anything: threads may share it.  An integrator belongs to one thread at a time;
  * different ones share nothing.
@@ -20,7 +23,7 @@ extern "C" {
 
 /* Raised when a struct here or in diracstep_scene.h, or what a function does, changes; not for new functions.
  */
-#define DIRACSTEP_VERSION_OF_C_INTERFACE 3u
+#define DIRACSTEP_VERSION_OF_C_INTERFACE 4u
 
 #if defined(_WIN32)
 #define DIRACSTEP_API __declspec(dllexport)
@@ -83,8 +86,9 @@ DIRACSTEP_API void diracstep_close(diracstep_model *model);
 /* Sizes and times of a scene.  What it points to is there as long as the model. */
 typedef struct diracstep_facts {
   int dimension;  /* n */
-  int rows;       /* m */
+  int rows;       /* m, those that are off at the start included */
   int invariants; /* i */
+  int outputs;    /* o */
   double start_time;
   const double *start_q, *start_v; /* n numbers */
   double end_time;                 /* where a run ends that is given no other end */
@@ -110,15 +114,21 @@ enum {
   DIRACSTEP_METHODS,     /* name, order, "self-adjoint" or "", formula */
   DIRACSTEP_RULES,       /* name: rules for nonholonomic rows */
   DIRACSTEP_SCENES,      /* name: of the catalogue and of the plugins */
-  DIRACSTEP_PLUGINS      /* name, path, description */
+  DIRACSTEP_PLUGINS,     /* name, path, description */
+  DIRACSTEP_OUTPUTS,     /* name */
+  DIRACSTEP_INPUTS,      /* name, times between which the table has values; none outside */
+  DIRACSTEP_EVENTS       /* name, "record", "stop" or "act" */
 };
 DIRACSTEP_API int diracstep_list(const diracstep_model *model, int what, diracstep_table *table);
 
 /* ---- Integrators ---- */
 
-/* How a scene is stepped. */
+/* How a scene is stepped.  Where all is zero, method, steps and their control are those of the command
+ * `diracstep run`: where no method is named and the motion is damped strongly, damped/radau:3, whose steps
+ * then vary by their local error unless `fixed`, `step` or `substeps` is given. */
 typedef struct diracstep_options {
-  const char *method;   /* NULL and no order: what the scene's file recommends, its step too; else "auto" */
+  const char *method;   /* NULL and no order: what the scene's file recommends, its step too, where steps do
+                         * not vary; else "auto" */
   int order;            /* composed to this order; 0: the method's own */
   double step;          /* may be negative; 0: that of the scene, in the direction of `end` */
   int ends;             /* 1: the motion is to end at `end`, and a fixed step is made so much smaller … */
@@ -129,10 +139,10 @@ typedef struct diracstep_options {
   int project_start;    /* 1: an inconsistent start is moved onto the rows instead of refused */
   int substeps;         /* a step that cannot be solved is taken in 2, 4, … up to so many; 0: 1 */
   int compensated_sums; /* 1: sums of a step in extended precision */
-  int pushed;           /* 1: diracstep_push will be used */
+  int pushed;           /* 1: diracstep_push will be used; damping is not looked for then */
+  int fixed;            /* 1: steps of one size */
   double eps; /* above 0: steps vary, so many radians each, 0.2 is usual; with damped/radau:S by their
-                 local error, 1e-6 is usual.  NaN: steps vary, by what is usual for the method, which is then
-                 damped/radau:3 where none is named and the motion is damped strongly */
+                 local error, 1e-6 is usual.  NaN: steps vary, by what is usual for the method */
   const char *control;  /* "integrating", "in-step", "irreversible"; NULL: the first */
   double smallest_step; /* of steps that vary, without sign; 0: 1e-9 of the time to the end */
   long max_steps;       /* of steps that vary: the next one fails; 0: ten million */
@@ -145,7 +155,9 @@ typedef struct diracstep_state {
   double *q;
   double *v;      /* in the distribution */
   double *p;      /* the representative asked for */
-  double *lambda; /* forces of the rows */
+  double *lambda; /* forces of the rows, 0 of those that are off */
+  double *invariants;
+  double *outputs; /* of the scene's file */
 } diracstep_state;
 
 typedef struct diracstep_integrator diracstep_integrator;
@@ -160,7 +172,9 @@ DIRACSTEP_API void diracstep_destroy(diracstep_integrator *integrator);
    told by a coarse run, of some hundred steps. */
 DIRACSTEP_API int diracstep_plan(const diracstep_integrator *integrator, diracstep_table *table);
 
-/* Takes steps until `steps` are done or one fails; the state is then that before the failed step. */
+/* Takes steps until `steps` are done, an event ends the motion (see diracstep_statistics) or one fails; the
+ * state is then that before the failed step.  The checks of a run go along, see diracstep_doubt; with
+ * `pushed` that of the step size alone. */
 DIRACSTEP_API int diracstep_step(diracstep_integrator *integrator, long steps);
 
 /* One step of size h, which may change from step to step and be negative; not where steps vary. */
@@ -169,7 +183,7 @@ DIRACSTEP_API int diracstep_step_by(diracstep_integrator *integrator, double h);
 /* Sets a further generalised force, n numbers, which acts from here on; zero at first.  Needs `pushed`. */
 DIRACSTEP_API int diracstep_push(diracstep_integrator *integrator, const double *force);
 
-/* Reads the current point. */
+/* Reads the current point; where an event has ended the motion that of the event, its p as read last. */
 DIRACSTEP_API int diracstep_read(diracstep_integrator *integrator, int momentum, diracstep_state *state);
 
 /* The time of the current point. */
@@ -187,8 +201,9 @@ DIRACSTEP_API int diracstep_save(const diracstep_integrator *integrator, char *b
                                  size_t *size);
 DIRACSTEP_API int diracstep_restore(diracstep_integrator *integrator, const char *bytes, size_t size);
 
-/* "", or why what was read so far is not to be believed: what the last run's checks found, and derivatives
- * taken by differences that two step sizes do not agree on.  Valid until the next call of this thread. */
+/* "", or why what was read so far is not to be believed: what the checks of the last run found, or those of
+ * diracstep_step since the start, and derivatives taken by differences that two step sizes do not agree on.
+ * Valid until the next call of this thread. */
 DIRACSTEP_API const char *diracstep_doubt(const diracstep_integrator *integrator);
 
 /* What was done since the start. */
@@ -198,20 +213,39 @@ typedef struct diracstep_statistics {
   double step;              /* its size; 0 where steps vary */
   double smallest, largest; /* size of a step that varies, without sign; else 0 */
   long resets; /* of the controller of steps that vary: more than one in 1000 ask for a smaller eps */
+  int stopped; /* 1: an event has ended the motion, the last one that diracstep_read_event knows */
   int order;
   const char *method; /* valid as long as the integrator */
 } diracstep_statistics;
 DIRACSTEP_API int diracstep_read_statistics(const diracstep_integrator *integrator,
                                             diracstep_statistics *statistics);
 
+/* ---- Events ---- */
+
+/* Where an event was met.  What it points to is there until the next step, run, reset or restore. */
+typedef struct diracstep_event {
+  const char *name;
+  double time;
+  const double *q, *v;             /* n numbers: the point just before … */
+  const double *after_q, *after_v; /* … and what the event made of it; NULL where it does not act */
+  double impulse; /* Λ_c of a contact, momentum over the unit of its row; NaN where there is none */
+} diracstep_event;
+
+/* How many events were met since the start, in runs and in single steps. */
+DIRACSTEP_API long diracstep_count_events(const diracstep_integrator *integrator);
+
+/* The k-th of them, from 0, in the order of time. */
+DIRACSTEP_API int diracstep_read_event(const diracstep_integrator *integrator, long k,
+                                       diracstep_event *event);
+
 /* ---- Runs ---- */
 
 /* The caller's arrays: point k has row k.  Those that are NULL are not written. */
 typedef struct diracstep_points {
-  long room;                               /* points for which there is room */
-  long count;                              /* points written */
-  double *t;                               /* room numbers */
-  double *q, *v, *p, *lambda, *invariants; /* room × n, n, n, m, i */
+  long room;                                         /* points for which there is room */
+  long count;                                        /* points written */
+  double *t;                                         /* room numbers */
+  double *q, *v, *p, *lambda, *invariants, *outputs; /* room × n, n, n, m, i, o */
   double *energy;
   /* Called when there is no room for the next point: enlarges the arrays and `room`, and returns 0.  Where it
    * is NULL or returns anything else the run fails there. */
@@ -232,7 +266,9 @@ typedef struct diracstep_course {
                     * has reached is kept */
 } diracstep_course;
 
-/* Runs from the current point.  What was kept before a failure is valid. */
+/* Runs from the current point, or to an event that ends the motion: its point is then the last one.  What was
+ * kept before a failure is valid.  DIRACSTEP_MISUSE for times where steps vary or events act or end the
+ * motion. */
 DIRACSTEP_API int diracstep_run(diracstep_integrator *integrator, const diracstep_course *course,
                                 diracstep_points *points);
 
@@ -302,11 +338,12 @@ typedef struct diracstep_ensemble {
 } diracstep_ensemble;
 
 /* Steps each member and writes its end, in the order of the starts: the last point that could be read where
- * it failed.  `failures`, or NULL, becomes the number and the failure of those that did.  Steps of fixed size
- * only. */
+ * it failed, that of the event where one ended its motion.  Steps of fixed size only.  `told`, or NULL,
+ * becomes the number of a member, "failed" or "doubted", and why; members spread evenly over the starts, at
+ * most twenty, are run with the checks of a run. */
 DIRACSTEP_API int diracstep_run_ensemble(const diracstep_model *model, const diracstep_options *options,
                                          const diracstep_ensemble *ensemble, diracstep_points *ends,
-                                         diracstep_table *failures);
+                                         diracstep_table *told);
 
 #ifdef __cplusplus
 }

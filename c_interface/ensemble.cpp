@@ -43,20 +43,25 @@ void require_room_for_all(const diracstep_ensemble& ensemble, const diracstep_po
 }
 
 void run(const diracstep_model& model, const diracstep_options& options, const diracstep_ensemble& ensemble,
-         diracstep_points& ends, diracstep_table* failures) {
+         diracstep_points& ends, diracstep_table* told) {
   const CatalogueScene& entry = entry_of(model);
   require_room_for_all(ensemble, ends);
   if (steps_vary(options) || options.pushed != 0)
     throw Misuse("ensembles need steps of fixed size, and no push");
   IntegratorOptions stepping = stepping_from(model, options);
   const double start = start_of_all(model, ensemble);
-  stepping.step = step_from(model, options, start);
+  stepping.step = open_step(model, options, start);
+  diracstep_options chosen = options;
+  chosen.fixed = 1;
+  choose_method(model, chosen, stepping);
+  stepping.step = fitted_step(options, start, stepping.step);
   const long steps =
       ensemble.steps > 0 ? ensemble.steps : fit_steps(start, end_from(model, options), stepping.step).steps;
-  const auto members = run_ensemble(entry.scene, model.registry, solvers_from(options), stepping,
-                                    starts_of(model, ensemble), steps, momentum_from(ensemble.momentum),
-                                    ensemble.threads, [&] { return !stopped(ensemble.stop); });
-  PointWriter writer(ends, entry.scene->rows(), entry.invariants, !entry.scene->lagrangian);
+  const auto members =
+      run_ensemble(entry.scene, model.registry, solvers_from(options), stepping, starts_of(model, ensemble),
+                   steps, momentum_from(ensemble.momentum), ensemble.threads,
+                   [&] { return !stopped(ensemble.stop); }, {entry.all_rows, entry.events});
+  PointWriter writer(ends, entry);
   std::vector<std::string> cells;
   long unread = 0;
   for (std::size_t k = 0; k < members.size(); ++k) {
@@ -64,10 +69,13 @@ void run(const diracstep_model& model, const diracstep_options& options, const d
       writer.write(members[k].end, static_cast<long>(k));
     else
       ++unread;
-    if (!members[k].last.ok()) cells.insert(cells.end(), {std::to_string(k), members[k].last.failure});
+    if (!members[k].last.ok())
+      cells.insert(cells.end(), {std::to_string(k), "failed", members[k].last.failure});
+    else if (!members[k].doubt.empty())
+      cells.insert(cells.end(), {std::to_string(k), "doubted", members[k].doubt});
   }
   ends.count = ensemble.members;
-  if (failures != nullptr) *failures = keep(2, std::move(cells));
+  if (told != nullptr) *told = keep(3, std::move(cells));
   if (stopped(ensemble.stop) && unread > 0)
     throw Interruption("interrupted; " + std::to_string(unread) + " members were not stepped");
 }
@@ -76,10 +84,10 @@ void run(const diracstep_model& model, const diracstep_options& options, const d
 
 int diracstep_run_ensemble(const diracstep_model* model, const diracstep_options* options,
                            const diracstep_ensemble* ensemble, diracstep_points* ends,
-                           diracstep_table* failures) {
+                           diracstep_table* told) {
   return guarded([&] {
-    if (failures != nullptr) *failures = {};
+    if (told != nullptr) *told = {};
     run(given(model, "the model"), options != nullptr ? *options : diracstep_options{},
-        given(ensemble, "the ensemble"), given(ends, "where the ends go"), failures);
+        given(ensemble, "the ensemble"), given(ends, "where the ends go"), told);
   });
 }

@@ -3,7 +3,7 @@
 #include <diracstep/c_interface/diracstep.h>
 
 #include <cmath>
-#include <diracstep/core/adaptive/adaptive_integrator.hpp>
+#include <diracstep/core/adaptive/checked_motion.hpp>
 #include <diracstep/core/integrator/integrator.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/plugins/loaded_plugin.hpp>
@@ -24,22 +24,47 @@ struct diracstep_model {
   diracstep::Parameters changes;
 };
 
-/// Steps of fixed size or of varying size, and what the last run's checks found.
+namespace diracstep::c_interface {
+
+using FixedMotion = EventSteps<Integrator>;
+using VariableMotion = EventSteps<AdaptiveIntegrator>;
+
+/// What the checks of steps taken one by one have found; they begin anew where another motion begins.
+struct StepChecks {
+  std::optional<CheckedMotion<Integrator>> fixed;
+  std::optional<CheckedMotion<AdaptiveIntegrator>> varying;
+  std::optional<StepSizeCheck> pushed;  ///< in place of them: a force that is changed between steps
+  std::string found;                    ///< by those before
+
+  std::string text() const;
+  void see(const Sample& point);
+  void begin_anew();
+  void forget();
+};
+
+}  // namespace diracstep::c_interface
+
+/// A motion by steps of fixed size or of varying size, through the events of its scene.
 struct diracstep_integrator {
-  std::variant<diracstep::Integrator, diracstep::AdaptiveIntegrator> stepper;
-  std::shared_ptr<const diracstep::Scene> scene;  ///< completed
-  std::vector<diracstep::Invariant> invariants;
-  bool invariants_by_momentum, has_events;
-  diracstep::Parameters parameters;
-  std::vector<diracstep::PlanLine> notes;  ///< of the model, for the plan
-  double end;                              ///< where a run ends that names none
+  using Motion = std::variant<std::unique_ptr<diracstep::c_interface::FixedMotion>,
+                              std::unique_ptr<diracstep::c_interface::VariableMotion>>;
+  diracstep::CatalogueScene entry;                      ///< with the force of `push`
+  std::shared_ptr<const diracstep::Scene> scene;        ///< of the model, completed
+  std::function<Motion(const diracstep::Start*)> make;  ///< from the scene's start without one
+  std::vector<diracstep::PlanLine> notes;               ///< of the model, for the plan
+  double end;                                           ///< where a run ends that names none
   std::shared_ptr<diracstep::Vector> push = {};
-  std::function<diracstep::Integrator()> side = {};  ///< where steps vary: one more, for the checks of a run
-  std::string doubt = {};
+  /// One more of the scene that is stepped, for the checks where steps vary.
+  std::function<diracstep::Integrator(const diracstep::Integrator&)> side = {};
+  Motion motion = {};
+  diracstep::c_interface::StepChecks checks = {};  ///< of single steps
+  std::string doubt = {};                          ///< of the last run
   diracstep::Sample sample = {};
 
-  diracstep::Integrator* fixed() { return std::get_if<diracstep::Integrator>(&stepper); }
   const diracstep::Integrator& stepping() const;
+  /// The point of the event that has ended the motion, or null.
+  const diracstep::Sample* event_at_end() const;
+  double time() const;
 };
 
 namespace diracstep::c_interface {
@@ -92,16 +117,31 @@ SolverFactory solvers_from(const diracstep_options& options);
 /// All but the step.
 IntegratorOptions stepping_from(const diracstep_model& model, const diracstep_options& options);
 StepControl control_from(const diracstep_options& options);
-/// Where the motion ends, and the step that leads there from the scene's start or another, with its sign.
 /// Whether the options ask for steps of varying size.
 inline bool steps_vary(const diracstep_options& options) {
   return options.eps > 0.0 || std::isnan(options.eps);
 }
+/// What is left open filled in as the command `run` does it: the method, and eps where strong damping makes
+/// steps vary.
+void choose_method(const diracstep_model& model, diracstep_options& options, IntegratorOptions& stepping);
+/// Where the motion ends, and the step in that direction from where it starts; before choose_method(), which
+/// takes it for that of fixed steps.
 double end_from(const diracstep_model& model, const diracstep_options& options);
-double step_from(const diracstep_model& model, const diracstep_options& options);
-double step_from(const diracstep_model& model, const diracstep_options& options, double start);
+double open_step(const diracstep_model& model, const diracstep_options& options, double start);
+/// So that whole steps lead to the end of the options, where these have one.
+double fitted_step(const diracstep_options& options, double start, double step);
 
 /// Whether the caller has asked for the end; false without a flag.
 bool stopped(const int* flag);
+
+/// The motion of a handle by steps of one size; throws Misuse where they vary, `what` needs one.
+FixedMotion& fixed_of(const diracstep_integrator& handle, const char* what);
+
+/// About so many steps lead to `end`; more than there are numbers for count as none.
+long steps_left(const Integrator& integrator, double end);
+/// The checks of a run from where a motion stands, to about `end`.
+std::function<RunChecks()> checks_of(const diracstep_integrator& handle, FixedMotion& motion, double end);
+std::function<VariableRunChecks()> checks_of(const diracstep_integrator& handle, VariableMotion& motion,
+                                             double end);
 
 }  // namespace diracstep::c_interface

@@ -1,8 +1,7 @@
 #include <diracstep/c_interface/handles.hpp>
+#include <diracstep/c_interface/point_writer.hpp>
 #include <diracstep/c_interface/pushed_force.hpp>
-#include <diracstep/core/adaptive/damping_survey.hpp>
 #include <diracstep/core/adaptive/rate_survey.hpp>
-#include <diracstep/core/runs/step_loop.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
 
 using namespace diracstep;
@@ -10,75 +9,82 @@ using namespace diracstep::c_interface;
 
 namespace {
 
-/// Throws Misuse where steps vary.
-template <class Handle>
-auto& fixed_of(Handle& handle, const char* what) {
-  auto* const fixed = std::get_if<Integrator>(&handle.stepper);
-  if (fixed == nullptr) throw Misuse(std::string(what) + " needs steps of fixed size");
-  return *fixed;
+std::shared_ptr<const Scene> pushed(const std::shared_ptr<const Scene>& scene,
+                                    const std::shared_ptr<Vector>& push) {
+  if (!scene) return scene;
+  auto copy = std::make_shared<Scene>(*scene);
+  copy->force = std::make_shared<const PushedForce>(scene->force, push);
+  return copy;
 }
 
-void require_ok(const StepReport& report) {
-  if (!report.failure.empty()) throw Failure(report.failure);
+std::shared_ptr<const Scene> started(const std::shared_ptr<const Scene>& scene, const Start* start) {
+  if (!scene || start == nullptr) return scene;
+  auto copy = std::make_shared<Scene>(*scene);
+  copy->start = *start;
+  return copy;
 }
 
-std::shared_ptr<const Scene> pushed(const Scene& scene, const std::shared_ptr<const Vector>& push) {
-  Scene copy = scene;
-  copy.force = std::make_shared<const PushedForce>(scene.force, push);
-  return std::make_shared<const Scene>(std::move(copy));
-}
-
-AdaptiveIntegrator varying(const diracstep_model& model, const std::shared_ptr<const Scene>& scene,
-                           const IntegratorOptions& stepping, const diracstep_options& options) {
+AdaptiveOptions adaptive_from(const diracstep_model& model, const diracstep_options& options) {
   AdaptiveOptions adaptive{.eps = options.eps, .control = control_from(options)};
   if (const double end = end_from(model, options); end != model.scene->start.time) adaptive.end = end;
   adaptive.smallest_step = options.smallest_step;
   if (options.max_steps != 0) adaptive.max_steps = options.max_steps;
-  return {scene, model.registry, solvers_from(options), stepping, adaptive};
+  return adaptive;
 }
 
 std::vector<PlanLine> notes_of(const diracstep_model& model, const diracstep_options& options) {
   std::vector<PlanLine> notes;
   for (const std::string& change : model.entry.changes) notes.push_back({"scene", "changed", change});
-  if (options.method == nullptr && options.order == 0 && model.entry.recommended.stated)
+  if (options.method == nullptr && options.order == 0 && !steps_vary(options) &&
+      model.entry.recommended.stated)
     notes.push_back({"method", model.entry.recommended.method, "the scene's file recommends it"});
   return notes;
 }
 
-/// The method where none is named, and where eps is not given in radians, which say how a reversible step is
-/// to vary; a force that its owner changes is not known yet.
-void choose_method(const diracstep_model& model, const diracstep_options& options,
-                   IntegratorOptions& stepping) {
-  if (stepping.method != automatic_method || options.eps > 0.0 || options.pushed != 0) return;
-  const double end = end_from(model, options);
-  if (end == model.scene->start.time) return;
-  const DefaultMethod choice = default_method_of_motion(
-      entry_of(model).scene, model.registry, solvers_from(options), end, std::abs(stepping.step), stepping,
-      {stepping.order, 0.0, stepping.constraint_rule, large_from(stepping.dense_limit)});
-  if (model.registry.method(choice.method).info.damped) stepping.method = choice.method;
+/// Makes motions of a scene by one method; of `more` the options of steps that vary.
+template <class Stepper, class... More>
+auto maker(const diracstep_model& model, const CatalogueScene& entry, const SolverFactory& solvers,
+           const IntegratorOptions& stepping, const More&... more) {
+  const auto make_stepper = [registry = model.registry, solvers, stepping,
+                             more...](const std::shared_ptr<const Scene>& scene) {
+    return std::make_unique<Stepper>(scene, registry, solvers, stepping, more...);
+  };
+  return [scene = entry.scene, all = entry.all_rows, events = entry.events, solvers,
+          make_stepper](const Start* start) -> diracstep_integrator::Motion {
+    return std::make_unique<EventSteps<Stepper>>(started(scene, start), started(all, start), events, solvers,
+                                                 Momentum::projected, make_stepper);
+  };
 }
 
-std::unique_ptr<diracstep_integrator> make(const diracstep_model& model, const diracstep_options& options) {
-  const CatalogueScene& entry = entry_of(model);
-  std::shared_ptr<const Scene> scene = entry.scene;
+std::unique_ptr<diracstep_integrator> make(const diracstep_model& model, diracstep_options options) {
+  CatalogueScene entry = entry_of(model);
   std::shared_ptr<Vector> push;
   if (options.pushed != 0) {
-    push = std::make_shared<Vector>(Vector::Zero(scene->dimension()));
-    scene = pushed(*scene, push);
+    push = std::make_shared<Vector>(Vector::Zero(entry.scene->dimension()));
+    entry.scene = pushed(entry.scene, push);
+    entry.all_rows = pushed(entry.all_rows, push);
   }
+  require_inputs_until(entry, end_from(model, options), "the end");
+  std::vector<PlanLine> notes = notes_of(model, options);
   IntegratorOptions stepping = stepping_from(model, options);
-  stepping.step = step_from(model, options);
+  const double start = entry.scene->start.time, end = end_from(model, options);
+  const SolverFactory solvers = solvers_from(options);
+  stepping.step = open_step(model, options, start);
   choose_method(model, options, stepping);
-  using Stepper = std::variant<Integrator, AdaptiveIntegrator>;
-  Stepper stepper = steps_vary(options)
-                        ? Stepper(varying(model, scene, stepping, options))
-                        : Stepper(Integrator(scene, model.registry, solvers_from(options), stepping));
+  std::function<diracstep_integrator::Motion(const Start*)> make_motion;
+  if (steps_vary(options)) {
+    stepping.step = std::copysign(stepping.step, end - start);
+    make_motion = maker<AdaptiveIntegrator>(model, entry, solvers, stepping, adaptive_from(model, options));
+  } else {
+    stepping.step = fitted_step(options, start, stepping.step);
+    make_motion = maker<Integrator>(model, entry, solvers, stepping);
+  }
   auto handle = std::make_unique<diracstep_integrator>(diracstep_integrator{
-      std::move(stepper), model.scene, entry.invariants, !entry.scene->lagrangian, !entry.events.empty(),
-      entry.parameters, notes_of(model, options), end_from(model, options), std::move(push)});
-  if (const auto* const made = std::get_if<AdaptiveIntegrator>(&handle->stepper))
-    handle->side = [scene, registry = model.registry, solvers = solvers_from(options),
-                    used = made->options()] { return Integrator(scene, registry, solvers, used); };
+      std::move(entry), model.scene, std::move(make_motion), std::move(notes), end, std::move(push)});
+  handle->side = [registry = model.registry, solvers](const Integrator& stepped) {
+    return Integrator(std::make_shared<const Scene>(stepped.scene()), registry, solvers, stepped.options());
+  };
+  handle->motion = handle->make(nullptr);
   return handle;
 }
 
@@ -101,9 +107,26 @@ Eigen::Map<const Vector> column(const double* numbers, const diracstep_integrato
 
 }  // namespace
 
+FixedMotion& c_interface::fixed_of(const diracstep_integrator& handle, const char* what) {
+  const auto* const fixed = std::get_if<std::unique_ptr<FixedMotion>>(&handle.motion);
+  if (fixed == nullptr) throw Misuse(std::string(what) + " needs steps of fixed size (option `fixed`)");
+  return **fixed;
+}
+
 const Integrator& diracstep_integrator::stepping() const {
-  if (const auto* const varying = std::get_if<AdaptiveIntegrator>(&stepper)) return varying->integrator();
-  return std::get<Integrator>(stepper);
+  if (const auto* const fixed = std::get_if<std::unique_ptr<FixedMotion>>(&motion))
+    return (*fixed)->stepper();
+  return std::get<std::unique_ptr<VariableMotion>>(motion)->stepper().integrator();
+}
+
+const Sample* diracstep_integrator::event_at_end() const {
+  return std::visit([](const auto& made) { return made->stopped() ? &made->end_of_stopped() : nullptr; },
+                    motion);
+}
+
+double diracstep_integrator::time() const {
+  const Sample* const event = event_at_end();
+  return event != nullptr ? event->time : stepping().time();
 }
 
 int diracstep_create(const diracstep_model* model, const diracstep_options* options,
@@ -120,7 +143,8 @@ void diracstep_destroy(diracstep_integrator* integrator) { delete integrator; }
 int diracstep_plan(const diracstep_integrator* integrator, diracstep_table* table) {
   return guarded([&] {
     const diracstep_integrator& from = given(integrator, "the integrator");
-    std::vector<PlanLine> lines = std::visit([](const auto& made) { return made.plan(); }, from.stepper);
+    std::vector<PlanLine> lines =
+        std::visit([](const auto& motion) { return motion->stepper().plan(); }, from.motion);
     const Integrator& stepping = from.stepping();
     if (from.end != from.scene->start.time)
       lines.push_back(variable_steps_line(from.scene, kinsol(), from.end, stepping.options().step, "eps"));
@@ -131,70 +155,63 @@ int diracstep_plan(const diracstep_integrator* integrator, diracstep_table* tabl
   });
 }
 
-int diracstep_step(diracstep_integrator* integrator, long steps) {
-  return guarded([&] {
-    auto& stepper = given(integrator, "the integrator").stepper;
-    if (steps < 0) throw Misuse("steps is " + std::to_string(steps) + "; 0 or more are needed");
-    require_ok(std::visit([&](auto& made) { return take_steps(made, steps); }, stepper));
-  });
-}
-
-int diracstep_step_by(diracstep_integrator* integrator, double h) {
-  return guarded(
-      [&] { require_ok(fixed_of(given(integrator, "the integrator"), "a step of this size").step(h)); });
-}
-
-int diracstep_push(diracstep_integrator* integrator, const double* force) {
-  return guarded([&] {
-    const diracstep_integrator& to = given(integrator, "the integrator");
-    if (!to.push) throw Misuse("the integrator was created without the option 'pushed'");
-    const auto numbers = column(&given(force, "the force"), to);
-    if (!numbers.allFinite()) throw Misuse("the force is not finite");
-    *to.push = numbers;
-  });
-}
-
 int diracstep_read(diracstep_integrator* integrator, int momentum, diracstep_state* state) {
   return guarded([&] {
     diracstep_integrator& from = given(integrator, "the integrator");
     diracstep_state& to = given(state, "the state");
     const Momentum wanted = momentum_from(momentum);
-    Sample& sample = from.sample;
-    const SolveReport report =
-        std::visit([&](auto& made) { return made.sample(wanted, sample); }, from.stepper);
-    if (!report.ok()) throw Failure(std::string("reading the state: ") + describe(report.status));
+    if (const Sample* const event = from.event_at_end()) {
+      from.sample = *event;
+    } else {
+      const SolveReport report = std::visit(
+          [&](auto& motion) {
+            motion->read_momentum(wanted);
+            return motion->sample(from.sample);
+          },
+          from.motion);
+      if (!report.ok()) throw Failure(std::string("reading the state: ") + describe(report.status));
+    }
+    const Sample& sample = from.sample;
+    from.checks.see(sample);
     to.time = sample.time;
     to.energy = sample.energy;
     write(sample.q, to.q);
     write(sample.v, to.v);
     write(sample.p, to.p);
-    const Eigen::Index rows = std::min<Eigen::Index>(from.scene->rows(), sample.lambda.size());
-    write(sample.lambda.head(rows), to.lambda);  // an integrator may know more rows than the scene
+    write_forces(from.entry, sample, to.lambda);
+    write_numbers(from.entry, sample, to.invariants, to.outputs);
   });
 }
 
 double diracstep_time(const diracstep_integrator* integrator) {
-  return integrator != nullptr ? integrator->stepping().time() : 0.0;
+  return integrator != nullptr ? integrator->time() : 0.0;
 }
 
 int diracstep_reset(diracstep_integrator* integrator, double time, const double* q, const double* v) {
   return guarded([&] {
     diracstep_integrator& handle = given(integrator, "the integrator");
     if ((q == nullptr) != (v == nullptr)) throw Misuse("only one of q and v is NULL; both or none must be");
+    const std::optional<Start> start =
+        q == nullptr ? std::nullopt : std::optional<Start>({time, column(q, handle), column(v, handle), {}});
+    FixedMotion* const fixed = start ? &fixed_of(handle, "another start") : nullptr;
     handle.doubt.clear();
-    if (q == nullptr)
-      std::visit([](auto& made) { made.reset(); }, handle.stepper);
+    handle.checks.forget();
+    if (!handle.entry.events.empty())
+      handle.motion = handle.make(start ? &*start : nullptr);
+    else if (start)
+      fixed->stepper().reset(*start);
     else
-      fixed_of(handle, "another start").reset({time, column(q, handle), column(v, handle)});
+      std::visit([](auto& motion) { motion->stepper().reset(); }, handle.motion);
   });
 }
 
 int diracstep_save(const diracstep_integrator* integrator, char* bytes, size_t room, size_t* size) {
   return guarded([&] {
     const diracstep_integrator& from = given(integrator, "the integrator");
+    if (from.event_at_end() != nullptr) throw Misuse("an event has ended the motion: there is no next step");
     Snapshot snapshot;
     snapshot.section("parameters");
-    for (const auto& [name, value] : from.parameters) snapshot.put(name, value);
+    for (const auto& [name, value] : from.entry.parameters) snapshot.put(name, value);
     if (from.push) snapshot.put("push", *from.push);
     fixed_of(from, "a snapshot").save(snapshot);
     const std::string saved = snapshot.bytes();
@@ -206,18 +223,24 @@ int diracstep_save(const diracstep_integrator* integrator, char* bytes, size_t r
 int diracstep_restore(diracstep_integrator* integrator, const char* bytes, size_t size) {
   return guarded([&] {
     diracstep_integrator& handle = given(integrator, "the integrator");
-    Integrator& to = fixed_of(handle, "a snapshot");
+    (void)fixed_of(handle, "a snapshot");
     const Snapshot snapshot = Snapshot::from_bytes({&given(bytes, "the snapshot"), size});
+    handle.checks.begin_anew();
     try {
+      if (!handle.entry.events.empty())
+        handle.motion = handle.make(nullptr);  // its list of events begins here
       SnapshotReader reader(snapshot);
-      read_parameters(reader, handle.parameters);
+      read_parameters(reader, handle.entry.parameters);
       Vector push = handle.push ? *handle.push : Vector();
       if (handle.push) reader.read("push", push);
-      to.restore(reader);
+      fixed_of(handle, "a snapshot").restore(reader);
       reader.require_end();
       if (handle.push) *handle.push = push;
     } catch (const Misuse&) {
-      to.reset();
+      if (handle.entry.events.empty())
+        fixed_of(handle, "a snapshot").stepper().reset();
+      else
+        handle.motion = handle.make(nullptr);
       throw;
     }
   });
@@ -226,16 +249,17 @@ int diracstep_restore(diracstep_integrator* integrator, const char* bytes, size_
 const char* diracstep_doubt(const diracstep_integrator* integrator) {
   begin_call();
   if (integrator == nullptr) return "";
+  if (!integrator->doubt.empty()) return keep(integrator->doubt);
+  if (std::string found = integrator->checks.text(); !found.empty()) return keep(std::move(found));
   const Scene& scene = integrator->stepping().scene();
-  if (!integrator->doubt.empty() || !scene.doubt) return keep(integrator->doubt);
-  return keep(scene.doubt());
+  return keep(scene.doubt ? scene.doubt() : std::string());
 }
 
 int diracstep_read_statistics(const diracstep_integrator* integrator, diracstep_statistics* statistics) {
   return guarded([&] {
     const diracstep_integrator& from = given(integrator, "the integrator");
     diracstep_statistics& to = given(statistics, "where the statistics go");
-    const Work& work = from.stepping().work();
+    const Work work = std::visit([](const auto& motion) { return motion->work(); }, from.motion);
     const IntegratorOptions& options = from.stepping().options();
     to = {};
     to.steps = work.steps;
@@ -244,13 +268,15 @@ int diracstep_read_statistics(const diracstep_integrator* integrator, diracstep_
     to.residuals = work.residual_evaluations;
     to.jacobians = work.jacobian_evaluations;
     to.retries = work.retries.total();
+    to.stopped = from.event_at_end() != nullptr ? 1 : 0;
     to.order = options.order;
     to.method = options.method.c_str();
-    if (const auto* const varying = std::get_if<AdaptiveIntegrator>(&from.stepper)) {
-      to.order = varying->options().order;
-      to.smallest = varying->control().smallest_step;
-      to.largest = varying->control().largest_step;
-      to.resets = varying->control().resets;
+    if (const auto* const made = std::get_if<std::unique_ptr<VariableMotion>>(&from.motion)) {
+      const AdaptiveIntegrator& varying = (*made)->stepper();
+      to.order = varying.options().order;
+      to.smallest = varying.control().smallest_step;
+      to.largest = varying.control().largest_step;
+      to.resets = varying.control().resets;
     } else {
       to.step = options.step;
     }

@@ -90,6 +90,26 @@ Cells plugins(const diracstep_model& model) {
   return cells;
 }
 
+Cells outputs(const CatalogueScene& entry) {
+  Cells cells;
+  for (const Output& output : entry.outputs) cells.push_back(output.name);
+  return cells;
+}
+
+Cells inputs(const CatalogueScene& entry) {
+  Cells cells;
+  for (const InputRange& input : entry.input_ranges)
+    cells.insert(cells.end(), {input.name, to_text(input.first, 17), to_text(input.last, 17)});
+  return cells;
+}
+
+Cells events(const CatalogueScene& entry) {
+  Cells cells;
+  for (const Event& event : entry.events)
+    cells.insert(cells.end(), {event.name, event.acts() ? "act" : event.stop ? "stop" : "record"});
+  return cells;
+}
+
 diracstep_table list(const diracstep_model& model, int what) {
   switch (what) {
     case DIRACSTEP_METHODS:
@@ -105,9 +125,15 @@ diracstep_table list(const diracstep_model& model, int what) {
     case DIRACSTEP_COORDINATES:
       return keep(3, coordinates(entry_of(model)));
     case DIRACSTEP_ROWS:
-      return keep(1, entry_of(model).scene->row_names());
+      return keep(1, entry_of(model).shown().row_names());
     case DIRACSTEP_INVARIANTS:
       return keep(2, invariants(entry_of(model)));
+    case DIRACSTEP_OUTPUTS:
+      return keep(1, outputs(entry_of(model)));
+    case DIRACSTEP_INPUTS:
+      return keep(3, inputs(entry_of(model)));
+    case DIRACSTEP_EVENTS:
+      return keep(2, events(entry_of(model)));
     case DIRACSTEP_PARAMETERS:
       return keep(4, parameters(entry_of(model)));
     default:

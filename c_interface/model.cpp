@@ -129,8 +129,9 @@ int diracstep_read_facts(const diracstep_model* model, diracstep_facts* facts) {
     const CatalogueScene& entry = entry_of(from);
     const Start& start = from.scene->start;
     given(facts, "where the facts go") = {from.scene->dimension(),
-                                          from.scene->rows(),
+                                          entry.shown().rows(),
                                           static_cast<int>(entry.invariants.size()),
+                                          static_cast<int>(entry.outputs.size()),
                                           start.time,
                                           start.q.data(),
                                           start.v.data(),

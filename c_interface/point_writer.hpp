@@ -4,12 +4,17 @@
 
 namespace diracstep::c_interface {
 
+/// The forces of the scene's rows; an integrator may know more, whose forces are left out.  Nothing where
+/// `to` is null; so below.
+void write_forces(const CatalogueScene& entry, const Sample& point, double* to);
+/// The invariants and the outputs at a point.
+void write_numbers(const CatalogueScene& entry, const Sample& point, double* invariants, double* outputs);
+
 /// Writes points into the caller's arrays, one row each.
 class PointWriter {
  public:
-  /// `rows`: of the scene; an integrator may know more, whose forces are left out.
-  PointWriter(diracstep_points& points, int rows, const std::vector<Invariant>& invariants, bool by_momentum)
-      : points_(points), rows_(rows), invariants_(invariants), by_momentum_(by_momentum) {
+  /// The entry must outlive this.
+  PointWriter(diracstep_points& points, const CatalogueScene& entry) : points_(points), entry_(entry) {
     points.count = 0;
   }
 
@@ -22,9 +27,7 @@ class PointWriter {
 
  private:
   diracstep_points& points_;
-  Eigen::Index rows_;
-  const std::vector<Invariant>& invariants_;
-  bool by_momentum_;
+  const CatalogueScene& entry_;
   double last_time_ = 0.0;
 };
 

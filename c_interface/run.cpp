@@ -1,7 +1,7 @@
+#include <algorithm>
 #include <cmath>
 #include <diracstep/c_interface/point_writer.hpp>
 #include <diracstep/core/adaptive/adaptive_run.hpp>
-#include <diracstep/core/adaptive/variable_run_checks.hpp>
 #include <diracstep/core/runs/run_points.hpp>
 
 using namespace diracstep;
@@ -34,12 +34,26 @@ void PointWriter::write(const Sample& point, long row) {
   write_row(point.q, points_.q, row);
   write_row(point.v, points_.v, row);
   write_row(point.p, points_.p, row);
-  if (points_.lambda != nullptr)
-    std::copy_n(point.lambda.begin(), std::min(rows_, point.lambda.size()), points_.lambda + row * rows_);
-  if (points_.invariants == nullptr) return;
-  double* to = points_.invariants + row * static_cast<long>(invariants_.size());
-  for (const Invariant& invariant : invariants_)
-    *to++ = invariant.at(point.time, point.q, by_momentum_ ? point.p : point.v);
+  const auto row_of = [row](double* columns, std::size_t width) {
+    return columns != nullptr ? columns + row * static_cast<long>(width) : nullptr;
+  };
+  write_forces(entry_, point, row_of(points_.lambda, static_cast<std::size_t>(entry_.shown().rows())));
+  write_numbers(entry_, point, row_of(points_.invariants, entry_.invariants.size()),
+                row_of(points_.outputs, entry_.outputs.size()));
+}
+
+void write_forces(const CatalogueScene& entry, const Sample& point, double* to) {
+  if (to == nullptr) return;
+  const Eigen::Index rows = entry.shown().rows(), known = std::min(rows, point.lambda.size());
+  std::fill_n(std::copy_n(point.lambda.begin(), known, to), rows - known, 0.0);
+}
+
+void write_numbers(const CatalogueScene& entry, const Sample& point, double* invariants, double* outputs) {
+  if (invariants != nullptr)
+    for (const Invariant& invariant : entry.invariants)
+      *invariants++ = invariant.at(point.time, point.q, entry.scene->lagrangian ? point.v : point.p);
+  if (outputs != nullptr)
+    for (const Output& output : entry.outputs) *outputs++ = output.at(point.point());
 }
 
 void require_sense(const diracstep_course& course) {
@@ -53,127 +67,132 @@ void require_sense(const diracstep_course& course) {
 
 namespace {
 
-constexpr const char* events_not_met =
-    "the events of the scene are not looked for in runs through this interface; diracstep run does";
-
 long every_of(const diracstep_course& course) { return course.every > 0 ? course.every : 1; }
 
-/// The steps of an integrator with the checks around each, until the caller asks for the end.
-template <class Stepper, class Checks>
+/// The steps of a checked motion, until the caller asks for the end.
+template <class Stepper>
 struct WatchedSteps {
-  Stepper& stepper;
-  Checks& checks;
+  CheckedMotion<Stepper>& checked;
   const int* stop;
   bool& was_stopped;
 
   StepReport step() const {
     was_stopped = stopped(stop);
-    if (was_stopped) return refusal();
-    before();
-    StepReport report = stepper.step();
-    if (report.ok()) after();
-    return report;
+    return was_stopped ? refusal() : checked.step();
   }
 
  private:
   StepReport refusal() const {
     StepReport report;
     report.solve.status = SolveStatus::refused;
-    report.time = stepper.time();
+    report.time = checked.motion().time();
     return report;
-  }
-  void before() const {
-    if constexpr (std::is_same_v<Stepper, Integrator>)
-      checks.before_step(stepper);
-    else
-      checks.before_step();
-  }
-  void after() const {
-    if constexpr (std::is_same_v<Stepper, Integrator>)
-      checks.after_step(stepper);
-    else
-      checks.after_step();
   }
 };
 
-/// One run of an integrator of either kind.
-template <class Stepper, class Checks>
+double next_size(const Integrator& stepper) { return stepper.options().step; }
+double next_size(const AdaptiveIntegrator& stepper) { return stepper.next_size(); }
+
+/// One run of a motion of either kind.
+template <class Stepper>
 class Run {
  public:
-  Run(diracstep_integrator& handle, Stepper& stepper, Checks checks, const diracstep_course& course,
+  Run(diracstep_integrator& handle, EventSteps<Stepper>& motion, const diracstep_course& course,
       diracstep_points& points)
       : handle_(handle),
-        stepper_(stepper),
-        checks_(std::move(checks)),
+        motion_(motion),
         course_(course),
-        momentum_(momentum_from(course.momentum)),
-        writer_(points, handle.scene->rows(), handle.invariants, handle.invariants_by_momentum) {}
+        end_(end_of(handle, course)),
+        checked_(motion, checks_of(handle, motion, planned_end())),
+        writer_(points, handle.entry) {
+    motion.read_momentum(momentum_from(course.momentum));
+  }
 
-  template <class Size>
-  void go(double end, Size size) {
-    const Observer keep = [&](const Sample& point) {
-      writer_.write(point);
-      return true;
-    };
-    detail::RunOf<Stepper, WatchedSteps<Stepper, Checks>, Checks> run(
-        stepper_, {stepper_, checks_, course_.stop, stopped_}, momentum_, every_of(course_), keep, &checks_);
-    const RunReport report = steps(run, end, size);
-    handle_.doubt = joined_doubts({checks_.text(), handle_.has_events ? events_not_met : ""});
-    if (report.ok()) return;
+  void go() {
+    const StepReport report = motion_.events().empty() ? without_events() : through_events();
+    handle_.doubt = checked_.text();
+    if (report.ok() && !stopped_) return;
     keep_last();
-    if (stopped_) throw Interruption("interrupted at t = " + to_text(stepper_.time(), 17));
-    throw Failure(report.last.failure);
+    if (stopped_) throw Interruption("interrupted at t = " + to_text(handle_.time(), 17));
+    throw Failure(report.failure);
   }
 
  private:
+  static double end_of(const diracstep_integrator& handle, const diracstep_course& course) {
+    if (course.times > 0) return course.time[course.times - 1];
+    return course.ends != 0 ? course.end : handle.end;
+  }
+
+  /// For the checks, which want to know how long a run will be.
+  double planned_end() const {
+    if (course_.steps == 0) return end_;
+    return motion_.time() + static_cast<double>(course_.steps) * next_size(motion_.stepper());
+  }
+
+  StepReport without_events() {
+    if (course_.times > 0 && motion_.sample(handle_.sample).ok()) checked_.see(handle_.sample);
+    const Observer keep = [this](const Sample& point) { return write(point); };
+    detail::RunOf<Stepper, WatchedSteps<Stepper>, CheckedMotion<Stepper>> run(
+        motion_.stepper(), {checked_, course_.stop, stopped_}, momentum_from(course_.momentum),
+        every_of(course_), keep, &checked_);
+    const RunReport report = steps(run, [this] { return next_size(motion_.stepper()); });
+    if (report.ok()) checked_.finish();
+    return report.last;
+  }
+
   template <class Steps, class Size>
-  RunReport steps(Steps& run, double end, Size size) {
+  RunReport steps(Steps& run, Size size) {
     if (course_.steps > 0) return run.steps(course_.steps);
     if (course_.times > 0) return run.at({course_.time, static_cast<std::size_t>(course_.times)}, size);
-    return run.until(end, size);
+    return run.until(end_, size);
+  }
+
+  StepReport through_events() {
+    if (course_.times > 0) return at_times_through_events();
+    return run_through_events(
+        checked_, {.steps = course_.steps, .end = end_, .every = every_of(course_)},
+        [this](const Sample& point) { return write(point); },
+        [this] { return !(stopped_ = stopped(course_.stop)); });
+  }
+
+  /// Events that only note; the others move the nodes, which the points shown are not to depend on.
+  StepReport at_times_through_events() {
+    const bool moves =
+        std::ranges::any_of(motion_.events(), [](const Event& e) { return e.stop || e.acts(); });
+    if (moves || !detail::Stepping<Stepper>::on_a_grid)
+      throw Misuse(
+          "times go with steps of fixed size and with events that neither stop the motion nor change it; "
+          "`every` shows each so-many-th step");
+    return without_events();
+  }
+
+  /// Times to show are those asked for, to the bit, also where a node lies there.
+  bool write(const Sample& point) {
+    if (course_.times > 0 && detail::Stepping<Stepper>::on_a_grid) {
+      handle_.sample = point;
+      handle_.sample.time = course_.time[shown_++];
+      writer_.write(handle_.sample);
+    } else {
+      writer_.write(point);
+    }
+    return true;
   }
 
   /// The point that a run which ended early has reached.
   void keep_last() {
-    if (writer_.has(stepper_.time()) || course_.times > 0) return;
-    if (stepper_.sample(momentum_, handle_.sample).ok()) writer_.write(handle_.sample);
+    if (writer_.has(motion_.time()) || course_.times > 0) return;
+    if (motion_.sample(handle_.sample).ok()) writer_.write(handle_.sample);
   }
 
   diracstep_integrator& handle_;
-  Stepper& stepper_;
-  Checks checks_;
+  EventSteps<Stepper>& motion_;
   const diracstep_course& course_;
-  Momentum momentum_;
+  double end_;
+  CheckedMotion<Stepper> checked_;
   PointWriter writer_;
+  long shown_ = 0;
   bool stopped_ = false;
 };
-
-double end_of(const diracstep_integrator& handle, const diracstep_course& course) {
-  if (course.times > 0) return course.time[course.times - 1];
-  return course.ends != 0 ? course.end : handle.end;
-}
-
-/// About so many steps; more than there are numbers for count as none.
-long steps_of(const Integrator& integrator, const diracstep_integrator& handle,
-              const diracstep_course& course) {
-  if (course.steps > 0) return course.steps;
-  const double ratio = (end_of(handle, course) - integrator.time()) / integrator.options().step;
-  return ratio > 0.0 && ratio < 1e15 ? std::lround(std::ceil(ratio - 1e-9)) : 0;
-}
-
-void run(diracstep_integrator& handle, Integrator& stepper, const diracstep_course& course,
-         diracstep_points& points) {
-  RunChecks checks(stepper, steps_of(stepper, handle, course));
-  Run<Integrator, RunChecks>(handle, stepper, std::move(checks), course, points)
-      .go(end_of(handle, course), [&] { return stepper.options().step; });
-}
-
-void run(diracstep_integrator& handle, AdaptiveIntegrator& stepper, const diracstep_course& course,
-         diracstep_points& points) {
-  VariableRunChecks checks(stepper, handle.side());
-  Run<AdaptiveIntegrator, VariableRunChecks>(handle, stepper, std::move(checks), course, points)
-      .go(end_of(handle, course), [&] { return stepper.next_size(); });
-}
 
 }  // namespace
 
@@ -183,9 +202,13 @@ int diracstep_run(diracstep_integrator* integrator, const diracstep_course* cour
     diracstep_integrator& handle = given(integrator, "the integrator");
     const diracstep_course chosen = course != nullptr ? *course : diracstep_course{};
     require_sense(chosen);
-    handle.doubt.clear();
     diracstep_points& into = given(points, "where the points go");
-    std::visit([&](auto& stepper) { run(handle, stepper, chosen, into); }, handle.stepper);
+    if (handle.event_at_end() != nullptr)
+      throw Misuse("an event has ended the motion at t = " + to_text(handle.time(), 17) + "; reset it");
+    if (chosen.ends != 0) require_inputs_until(handle.entry, chosen.end, "the end");
+    handle.doubt.clear();
+    handle.checks.begin_anew();
+    std::visit([&](auto& motion) { Run(handle, *motion, chosen, into).go(); }, handle.motion);
   });
 }
 
@@ -193,7 +216,9 @@ long diracstep_expect(const diracstep_integrator* integrator, const diracstep_co
   if (integrator == nullptr) return 0;
   const diracstep_course chosen = course != nullptr ? *course : diracstep_course{};
   if (chosen.times > 0) return chosen.times;
-  const auto* const fixed = std::get_if<Integrator>(&integrator->stepper);
+  const auto* const fixed = std::get_if<std::unique_ptr<FixedMotion>>(&integrator->motion);
   if (fixed == nullptr) return 0;
-  return steps_of(*fixed, *integrator, chosen) / every_of(chosen) + 2;  // the start and the end
+  const double end = chosen.ends != 0 ? chosen.end : integrator->end;
+  const long steps = chosen.steps > 0 ? chosen.steps : steps_left((*fixed)->stepper(), end);
+  return steps / every_of(chosen) + 2;  // the start and the end
 }

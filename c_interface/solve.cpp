@@ -28,6 +28,9 @@ ErrorControlOptions wanted(const diracstep_model& model, const diracstep_options
   else if (!has_accelerations(*model.scene))
     search.first_step = std::abs(model.entry.natural_step);
   search.integrator = stepping_from(model, options);
+  search.integrator.method = automatic_method;
+  search.integrator.order = options.order;
+  search.integrator.step = options.step != 0.0 ? options.step : model.entry.natural_step;
   if (error.max_solves != 0) search.max_solves = error.max_solves;
   if (error.max_time != 0.0) search.max_time = error.max_time;
   search.go_on = [stop = course.stop] { return !stopped(stop); };
@@ -67,11 +70,14 @@ void solve(const diracstep_model& model, const diracstep_options& options, const
            const diracstep_error& error, diracstep_points& points, diracstep_found& found) {
   require_sense(course);
   const CatalogueScene& entry = entry_of(model);
+  if (!entry.events.empty())
+    throw Misuse("an error asked for does not go with the events of the scene: name a method and a step");
   const double end = course.ends != 0 ? course.end : end_from(model, options);
+  require_inputs_until(entry, end, "the end");
   const SolverFactory solvers = solvers_from(options);
   const ErrorControlReport report =
       solve_to_error(entry.scene, model.registry, solvers, end, wanted(model, options, course, error));
-  PointWriter writer(points, entry.scene->rows(), entry.invariants, !entry.scene->lagrangian);
+  PointWriter writer(points, entry);
   found = found_from(report);
   if (!report.ok()) {
     if (report.end.q.size() > 0) writer.write(report.end);

@@ -6,8 +6,8 @@
 #include <diracstep/command/interrupt.hpp>
 #include <diracstep/command/progress.hpp>
 #include <diracstep/command/run_control.hpp>
+#include <diracstep/core/adaptive/checked_motion.hpp>
 #include <diracstep/core/runs/run.hpp>
-#include <diracstep/core/runs/run_checks.hpp>
 #include <diracstep/core/runs/step_loop.hpp>
 
 namespace diracstep::command {
@@ -41,10 +41,11 @@ class Run {
         result_(result),
         every_look_(std::max(1L, steps / points_looked_at)),
         next_checkpoint_(Clock::now() + between_checkpoints),
-        progress_(static_cast<double>(taken()) / static_cast<double>(steps)) {
-    begin_checks();
+        progress_(static_cast<double>(taken()) / static_cast<double>(steps)),
+        checked_(motion,
+                 [&motion, steps] { return RunChecks(motion.stepper(), steps - motion.work().steps); }) {
     if (taken() > 0 && std::ranges::none_of(motion.events(), &Event::acts))
-      checks_->see(start_of(motion.scene()));
+      checked_.see(start_of(motion.scene()));
     const auto before_here = [&](double t) { return ahead_of_here(t) < -same_time; };
     next_time_ = std::ranges::find_if_not(keeping.times, before_here);
   }
@@ -61,27 +62,18 @@ class Run {
     else if (result_.failure.empty() && !motion_.stopped() && taken() < steps_)
       result_.failure = fmt::format("{} at t = {:.10g}", interruption(), motion_.time());
     if (motion_.stopped())
-      end_at(motion_.hits().back());
+      end_at(motion_.end_of_stopped());
     else if (motion_.time() != kept_time_)
       keep();
     take_events(motion_, result_);
     result_.work = motion_.work();
-    if (result_.failure.empty() && !motion_.stopped()) checks_->finish(motion_.stepper());
-    end_checks();
-    result_.doubt = joined_doubts(doubts_);
+    if (result_.failure.empty() && !motion_.stopped()) checked_.finish();
+    result_.doubt = checked_.text();
   }
 
-  /// With the checks around it, which begin anew where an event has acted.
   StepReport step() {
-    checks_->before_step(motion_.stepper());
-    StepReport report = motion_.step();
-    if (motion_.acted()) {
-      end_checks();
-      begin_checks();
-      if (report.ok() && !motion_.stopped()) look();
-    } else if (report.ok()) {
-      checks_->after_step(motion_.stepper());
-    }
+    StepReport report = checked_.step();
+    if (motion_.acted() && report.ok() && !motion_.stopped()) look();
     return report;
   }
 
@@ -109,19 +101,10 @@ class Run {
   long taken() const { return motion_.work().steps; }
   const Integrator& integrator() const { return motion_.stepper(); }
 
-  void begin_checks() { checks_.emplace(motion_.stepper(), steps_ - taken()); }
-  /// What they say, once each.
-  void end_checks() {
-    std::string text = checks_->text();
-    if (doubts_.empty() || text.empty()) doubts_.push_back(std::move(text));
-    std::erase(doubts_, "");
-  }
-
   /// The point at which an event ends the run is the last one of its file.
-  void end_at(const EventHit& hit) {
-    const Sample& sample = hit.after ? *hit.after : hit.sample;
-    if (keeping_.file != nullptr) keeping_.file->write(sample);
-    result_.end = sample;
+  void end_at(const Sample& end) {
+    if (keeping_.file != nullptr) keeping_.file->write(end);
+    result_.end = end;
   }
 
   /// In steps of this run.
@@ -172,14 +155,14 @@ class Run {
       return;
     }
     kept_time_ = motion_.time();
-    checks_->see(sample);
+    checked_.see(sample);
     if (keeping_.file != nullptr && keeping_.times.empty()) keeping_.file->write(sample);
     result_.end = std::move(sample);
   }
 
   /// At the energy only; a point that cannot be read is told of where it is kept.
   void look() {
-    if (motion_.stepper().sample(Momentum::projected, looked_at_).ok()) checks_->see(looked_at_);
+    if (motion_.stepper().sample(Momentum::projected, looked_at_).ok()) checked_.see(looked_at_);
   }
 
   void show(long k) {
@@ -191,14 +174,13 @@ class Run {
   EventSteps<Integrator>& motion_;
   const Keeping& keeping_;
   RunResult& result_;
-  std::optional<RunChecks> checks_;
-  std::vector<std::string> doubts_;
   long every_look_;
   Sample looked_at_;
   std::vector<double>::const_iterator next_time_;
   double kept_time_ = std::nan("");
   Clock::time_point next_checkpoint_;
   Progress progress_;
+  CheckedMotion<Integrator> checked_;
 };
 
 }  // namespace

@@ -11,8 +11,8 @@
 #include <diracstep/command/run_identity.hpp>
 #include <diracstep/command/verbs.hpp>
 #include <diracstep/command/verbs/run_arguments.hpp>
-#include <diracstep/core/adaptive/adaptive_event_steps.hpp>
 #include <diracstep/core/adaptive/adaptive_run.hpp>
+#include <diracstep/core/adaptive/checked_motion.hpp>
 #include <diracstep/core/adaptive/damping_survey.hpp>
 #include <diracstep/core/adaptive/error_control.hpp>
 #include <diracstep/core/adaptive/rate_monitor.hpp>
@@ -168,78 +168,26 @@ void run_variable(const RunArguments& options, const CatalogueScene& entry, Adap
 
 using VariableMotion = EventSteps<AdaptiveIntegrator>;
 
-/// Variable steps through the events of a scene.  The checks of a run without are those of its first part,
-/// and begin anew behind each event that acts.
-class VariableEventRun {
- public:
-  VariableEventRun(const RunArguments& options, VariableMotion& motion, std::function<Integrator()> side,
-                   double end, TrajectoryFile* file, RunResult& result)
-      : options_(options), motion_(motion), side_(std::move(side)), end_(end), file_(file), result_(result) {
-    begin_checks();
-  }
-
-  void go() {
-    Sample here;
-    if (const SolveReport solve = motion_.sample(here); solve.ok()) keep(here);
-    StepReport report;
-    bool at_end = false;
-    while (report.ok() && !motion_.stopped() && !at_end && !interrupted()) {
-      const double size = motion_.stepper().next_size(), left = (end_ - motion_.time()) / size;
-      report = left < 1.0 ? motion_.read_up_to(end_, here, at_end) : step();
-      if (!report.ok() || motion_.stopped()) break;
-      if (motion_.acted() && left < 1.0) renew_checks();
-      if (!at_end) report.solve = motion_.sample(here);
-      if (report.ok() && (at_end || ++points_ % options_.every == 0)) keep(here);
-    }
-    if (motion_.stopped()) {
-      const EventHit& last = motion_.hits().back();
-      keep(last.after ? *last.after : last.sample);
-    }
-    result_.failure = report.failure;
-    if (result_.failure.empty() && !report.ok()) result_.failure = describe(report.solve.status);
-    if (result_.failure.empty() && interrupted())
-      result_.failure = fmt::format("{} at t = {:.10g}", interruption(), motion_.time());
-    take_events(motion_, result_);
-    result_.work = motion_.work();
-    end_checks();
-    result_.doubt = joined_doubts(doubts_);
-  }
-
- private:
-  StepReport step() {
-    checks_->before_step();
-    StepReport report = motion_.step();
-    if (motion_.acted())
-      renew_checks();
-    else if (report.ok())
-      checks_->after_step();
-    return report;
-  }
-  void renew_checks() {
-    end_checks();
-    begin_checks();
-  }
-  void begin_checks() { checks_.emplace(motion_.stepper(), side_()); }
-  void end_checks() {
-    if (std::string text = checks_->text(); doubts_.empty() && !text.empty())
-      doubts_.push_back(std::move(text));
-  }
-  void keep(const Sample& sample) {
-    checks_->see(sample);
-    if (file_ != nullptr) file_->write(sample);
-    result_.end = sample;
-  }
-
-  const RunArguments& options_;
-  VariableMotion& motion_;
-  std::function<Integrator()> side_;
-  double end_;
-  TrajectoryFile* file_;
-  RunResult& result_;
-  std::optional<VariableRunChecks> checks_;
-  std::vector<std::string> doubts_;
-  long points_ = 0;
-};
+/// Variable steps through the events of a scene, to the end.
+void run_variable(const RunArguments& options, VariableMotion& motion,
+                  const std::function<Integrator()>& side, double end, TrajectoryFile* file,
+                  RunResult& result) {
+  CheckedMotion<AdaptiveIntegrator> checked(motion,
+                                            [&] { return VariableRunChecks(motion.stepper(), side()); });
+  const auto keep = [&](const Sample& sample) {
+    if (file != nullptr) file->write(sample);
+    result.end = sample;
+    return true;
+  };
+  result.failure = run_through_events(checked, {.end = end, .every = options.every}, keep, [] {
+                     return !interrupted();
+                   }).failure;
+  if (result.failure.empty() && interrupted())
+    result.failure = fmt::format("{} at t = {:.10g}", interruption(), motion.time());
+  take_events(motion, result);
+  result.work = motion.work();
+  result.doubt = checked.text();
+}
 
 void tell_control(const AdaptiveIntegrator& integrator, RunResult& result) {
   result.variable =
@@ -282,7 +230,7 @@ IntegratorOptions run_once(const RunArguments& options, const CatalogueScene& en
       VariableRunChecks checks(motion.stepper(), side());
       run_variable(options, entry, motion.stepper(), checks, end, points, result);
     } else {
-      VariableEventRun(options, motion, side, end, points, result).go();
+      run_variable(options, motion, side, end, points, result);
     }
     tell_control(motion.stepper(), result);
     chosen = motion.stepper().options();

@@ -2,6 +2,8 @@
 #include <atomic>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/runs/ensemble.hpp>
+#include <diracstep/core/runs/event_steps.hpp>
+#include <diracstep/core/runs/run.hpp>
 #include <diracstep/core/runs/step_loop.hpp>
 #include <exception>
 #include <mutex>
@@ -11,15 +13,57 @@ namespace diracstep {
 
 namespace {
 
-EnsembleMember run_member(Integrator& integrator, const Start& start, long steps, Momentum momentum) {
+constexpr std::size_t checked_members = 20;
+constexpr long points_looked_at = 100;  // for the energy
+
+/// Steps one member after the other, each alone.
+using Worker = std::function<EnsembleMember(std::size_t number)>;
+
+void note_reading(const SolveReport& read, EnsembleMember& member) {
+  if (!member.last.ok() || read.ok()) return;
+  member.last.solve = read;
+  member.last.failure = std::string("reading the end: ") + describe(read.status);
+}
+
+void take_checked_steps(Integrator& integrator, long steps, EnsembleMember& member) {
+  RunChecks checks(integrator, steps);
+  member.last = run_steps(integrator, steps, Momentum::projected, std::max(1L, steps / points_looked_at),
+                          nullptr, &checks)
+                    .last;
+  member.doubt = checks.text();
+}
+
+Worker worker(const std::shared_ptr<Integrator>& integrator, std::span<const Start> starts, long steps,
+              Momentum momentum) {
+  const std::size_t between =
+      std::max<std::size_t>(1, (starts.size() + checked_members - 1) / checked_members);
+  return [=](std::size_t number) {
+    EnsembleMember member;
+    integrator->reset(starts[number]);
+    if (number % between == 0)
+      take_checked_steps(*integrator, steps, member);
+    else
+      member.last = take_steps(*integrator, steps);
+    note_reading(integrator->sample(momentum, member.end), member);
+    return member;
+  };
+}
+
+std::shared_ptr<const Scene> started(const std::shared_ptr<const Scene>& scene, const Start& start) {
+  if (!scene) return scene;
+  auto copy = std::make_shared<Scene>(*scene);
+  copy->start = start;
+  return copy;
+}
+
+EnsembleMember member_through_events(EventSteps<Integrator>& motion, long steps) {
   EnsembleMember member;
-  integrator.reset(start);
-  member.last = take_steps(integrator, steps);
-  const SolveReport read = integrator.sample(momentum, member.end);
-  if (member.last.ok() && !read.ok()) {
-    member.last.solve = read;
-    member.last.failure = std::string("reading the end: ") + describe(read.status);
-  }
+  member.last = step_while(
+      motion, [&](long k) { return k < steps && !motion.stopped(); }, [](long) { return true; });
+  if (motion.stopped())
+    member.end = motion.end_of_stopped();
+  else
+    note_reading(motion.sample(member.end), member);
   return member;
 }
 
@@ -51,17 +95,29 @@ std::size_t thread_count(int asked, std::size_t members) {
 std::vector<EnsembleMember> run_ensemble(const std::shared_ptr<const Scene>& scene, const Registry& registry,
                                          const SolverFactory& solvers, const IntegratorOptions& options,
                                          std::span<const Start> starts, long steps, Momentum momentum,
-                                         int threads, const std::function<bool()>& goes_on) {
+                                         int threads, const std::function<bool()>& goes_on,
+                                         const EnsembleEvents& events) {
   std::vector<EnsembleMember> members(starts.size());
-  std::vector<std::unique_ptr<Integrator>> integrators;
+  const auto make = [&](const std::shared_ptr<const Scene>& of) {
+    return std::make_unique<Integrator>(of, registry, solvers, options);
+  };
+  std::vector<Worker> workers;
   for (std::size_t k = 0; k < thread_count(threads, starts.size()); ++k)
-    integrators.push_back(std::make_unique<Integrator>(scene, registry, solvers, options));
+    if (events.events.empty())
+      workers.push_back(worker(make(scene), starts, steps, momentum));
+    else
+      workers.emplace_back([&](std::size_t number) {
+        EventSteps<Integrator> motion(started(scene, starts[number]),
+                                      started(events.all_rows, starts[number]), events.events, solvers,
+                                      momentum, make);
+        return member_through_events(motion, steps);
+      });
   std::atomic<std::size_t> next = 0;
   FirstException exception;
-  const auto work = [&](Integrator& integrator) {
+  const auto work = [&](const Worker& step) {
     try {
       for (std::size_t k = next++; k < members.size() && (!goes_on || goes_on()); k = next++)
-        members[k] = run_member(integrator, starts[k], steps, momentum);
+        members[k] = step(k);
     } catch (...) {
       exception.keep();
       next = members.size();  // the others stop after the member they are at
@@ -69,8 +125,8 @@ std::vector<EnsembleMember> run_ensemble(const std::shared_ptr<const Scene>& sce
   };
   {
     std::vector<std::jthread> pool;
-    for (std::size_t k = 1; k < integrators.size(); ++k) pool.emplace_back([&, k] { work(*integrators[k]); });
-    if (!integrators.empty()) work(*integrators.front());
+    for (std::size_t k = 1; k < workers.size(); ++k) pool.emplace_back([&, k] { work(workers[k]); });
+    if (!workers.empty()) work(workers.front());
   }
   exception.rethrow();
   return members;

@@ -32,6 +32,7 @@ struct Stepping<Integrator> {
   static const Integrator& integrator(const Integrator& stepper) { return stepper; }
   static double size(const Integrator& stepper) { return stepper.options().step; }
   static StepReport step_to(Integrator& stepper, double t) { return stepper.step(t - stepper.time()); }
+  static StepReport step(Integrator& stepper, double size) { return stepper.step(size); }
   /// The motion at a time behind a node, by a step of another integrator of the same scene.
   static StepReport read(Integrator& beside, const Node& from, double t, Momentum momentum, Sample& sample) {
     beside.restart(from.time, from.q, from.p, from.v);
@@ -99,7 +100,9 @@ class EventSteps {
 
   /// The next step, to the next node of fixed steps, or to a node or an event that acts of variable ones; or
   /// to an event that stops the run.
-  StepReport step();
+  StepReport step() { return step(Stepping::size(stepper())); }
+  /// Fixed steps: the same with a step of another size; variable ones choose theirs.
+  StepReport step(double size);
 
   /// The motion at a time that the next step would pass, where no event acts before it; else the run goes to
   /// the first that does, and `reached` is false.
@@ -119,10 +122,17 @@ class EventSteps {
   /// Of all steppers; parts of a fixed step count as one.
   Work work() const;
 
+  /// How points are read from here on.
+  void read_momentum(Momentum momentum) { momentum_ = momentum; }
+
   const std::vector<Event>& events() const { return search_.events(); }
   const std::vector<EventHit>& hits() const { return hits_; }
   /// The last hit ends the run; it is where the motion ends.
   bool stopped() const { return stopped_; }
+  const Sample& end_of_stopped() const {
+    const EventHit& last = hits_.back();
+    return last.after ? *last.after : last.sample;
+  }
   /// Whether an event acted in the last step.
   bool acted() const { return acted_; }
 
@@ -217,19 +227,19 @@ StepReport EventSteps<Stepper>::begin() {
 }
 
 template <class Stepper>
-StepReport EventSteps<Stepper>::step() {
+StepReport EventSteps<Stepper>::step(double size) {
   acted_ = false;
-  if (search_.empty()) return stepper().step();
+  if (search_.empty()) return Stepping::step(stepper(), size);
   if (!begun_)
     if (StepReport report = begin(); !report.ok()) return report;
-  const double size = Stepping::size(stepper()), end = time() + size;
+  const double end = time() + size;
   for (bool first = true;; first = false) {
     const detail::Node from = node();
     StepReport report;
     if constexpr (Stepping::on_a_grid)
-      report = first ? stepper().step() : Stepping::step_to(stepper(), end);
+      report = first ? Stepping::step(stepper(), size) : Stepping::step_to(stepper(), end);
     else
-      report = stepper().step();
+      report = Stepping::step(stepper(), size);
     if (!report.ok()) return report;
     Sample here;
     report.solve = sample(here);

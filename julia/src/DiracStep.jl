@@ -13,7 +13,7 @@ using Libdl
 
 export load, parse_scene, integrator, step!, state, reset!, save, restore!, Scene, Integrator, Run
 
-const interface_version = Cuint(3)  # DIRACSTEP_VERSION_OF_C_INTERFACE
+const interface_version = Cuint(4)  # DIRACSTEP_VERSION_OF_C_INTERFACE
 const momenta = (projected = 0, plus = 1, minus = 2)
 const library = Ref{String}("libdiracstep.so.0.1")
 
@@ -51,12 +51,13 @@ struct Facts
     dimension::Cint
     rows::Cint
     invariants::Cint
+    outputs::Cint
     start_time::Cdouble
     start_q::Ptr{Cdouble}
     start_v::Ptr{Cdouble}
     end_time::Cdouble
     step::Cdouble
-    Facts() = new(0, 0, 0, 0.0, C_NULL, C_NULL, 0.0, 0.0)
+    Facts() = new(0, 0, 0, 0, 0.0, C_NULL, C_NULL, 0.0, 0.0)
 end
 struct Options
     method::Cstring
@@ -71,6 +72,7 @@ struct Options
     substeps::Cint
     compensated_sums::Cint
     pushed::Cint
+    fixed::Cint
     eps::Cdouble
     control::Cstring
     smallest_step::Cdouble
@@ -89,6 +91,8 @@ mutable struct ReadState
     v::Ptr{Cdouble}
     p::Ptr{Cdouble}
     lambda::Ptr{Cdouble}
+    invariants::Ptr{Cdouble}
+    outputs::Ptr{Cdouble}
 end
 mutable struct Points
     room::Clong
@@ -99,6 +103,7 @@ mutable struct Points
     p::Ptr{Cdouble}
     lambda::Ptr{Cdouble}
     invariants::Ptr{Cdouble}
+    outputs::Ptr{Cdouble}
     energy::Ptr{Cdouble}
     enlarge::Ptr{Cvoid}
     data::Ptr{Cvoid}
@@ -169,14 +174,14 @@ mutable struct Integrator
     scene::Scene
 end
 
-"An integrator at the scene's start; `until` fits a fixed step to the end, `eps` above 0 lets steps vary."
+"An integrator at the scene's start; steps are of one size, which `until` fits to the end, unless `eps` above 0 lets them vary."
 function integrator(scene::Scene; method = nothing, order = 0, step = 0.0, until = nothing, eps = 0.0)
     handle = Ref{Ptr{Cvoid}}(C_NULL)
     none = Cstring(C_NULL)
     name = method === nothing ? nothing : String(method)
     GC.@preserve name begin
         options = Ref(Options(name === nothing ? none : Base.unsafe_convert(Cstring, name), order, step, until === nothing ? 0 : 1,
-                              until === nothing ? 0.0 : until, none, none, none, 0, 0, 0, 0, eps, none, 0.0, 0))
+                              until === nothing ? 0.0 : until, none, none, none, 0, 0, 0, 0, eps == 0 ? 1 : 0, eps, none, 0.0, 0))
         check(ccall(symbol("create"), Cint, (Ptr{Cvoid}, Ref{Options}, Ref{Ptr{Cvoid}}), scene.handle, options, handle))
     end
     finalizer(made -> ccall(symbol("destroy"), Cvoid, (Ptr{Cvoid},), made.handle), Integrator(handle[], scene))
@@ -190,7 +195,7 @@ function state(made::Integrator; momentum = :projected)
     n, m = length(made.scene.coordinates), length(made.scene.rows)
     q, v, p, lambda = zeros(n), zeros(n), zeros(n), zeros(m)
     GC.@preserve q v p lambda begin
-        read = Ref(ReadState(0.0, 0.0, pointer(q), pointer(v), pointer(p), pointer(lambda)))
+        read = Ref(ReadState(0.0, 0.0, pointer(q), pointer(v), pointer(p), pointer(lambda), C_NULL, C_NULL))
         check(ccall(symbol("read"), Cint, (Ptr{Cvoid}, Cint, Ref{ReadState}), made.handle, momenta[momentum], read))
     end
     (t = read[].time, q = q, v = v, p = p, lambda = lambda, energy = read[].energy)
@@ -233,7 +238,7 @@ function run(scene::Scene; until = scene.until, every = 1, momentum = :projected
     n, m = length(scene.coordinates), length(scene.rows)
     t, energy, q, v, p, lambda = zeros(room), zeros(room), zeros(n, room), zeros(n, room), zeros(n, room), zeros(m, room)
     GC.@preserve t energy q v p lambda begin
-        points = Ref(Points(room, 0, pointer(t), pointer(q), pointer(v), pointer(p), pointer(lambda), C_NULL, pointer(energy),
+        points = Ref(Points(room, 0, pointer(t), pointer(q), pointer(v), pointer(p), pointer(lambda), C_NULL, C_NULL, pointer(energy),
                             C_NULL, C_NULL))
         check(ccall(symbol("run"), Cint, (Ptr{Cvoid}, Ref{Course}, Ref{Points}), made.handle, course, points))
     end

@@ -74,7 +74,8 @@ foreach(script postinst prerm)  # byte code, as Debian's packages of Python have
 endforeach()
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/python/diracstep DESTINATION lib/python3/dist-packages COMPONENT python
         FILES_MATCHING PATTERN "*.py" PATTERN "py.typed" PATTERN "__pycache__" EXCLUDE)
-install(DIRECTORY ${PROJECT_SOURCE_DIR}/examples/notebooks DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/python3-diracstep
-        COMPONENT python)
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/examples/notebooks ${PROJECT_SOURCE_DIR}/examples/differentiation
+        DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/python3-diracstep COMPONENT python
+        FILES_MATCHING PATTERN "*.ipynb" PATTERN "*.py")
 install(FILES ${PROJECT_BINARY_DIR}/changelog.gz DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/diracstep COMPONENT command)
 include(CPack)

@@ -14,9 +14,10 @@ from __future__ import annotations
 
 from ._library import version
 from .callbacks import GeneratingFunction
+from .command import Equilibrium, Fit, SolvedStart
 from .errors import CallbackCost, Doubt, Error, Failure, Interrupted, Misuse
 from .integrator import Gradient, Integrator, Jacobian, State
-from .run import Ensemble, Points, Run, Search, Statistics
+from .run import Ensemble, Event, Points, Run, Search, Statistics
 from .scene import Scene, catalogue, load, methods, parse
 from .study import Study
 from .symbols import (acos, acosh, asin, asinh, atan, atan2, atanh, cos, cosh, exp, log, maximum, minimum, pi, sin, sinh, sqrt, tan,
@@ -24,7 +25,8 @@ from .symbols import (acos, acosh, asin, asinh, atan, atan2, atanh, cos, cosh, e
 
 __version__ = version()
 
-__all__ = ["CallbackCost", "Doubt", "Ensemble", "Error", "Failure", "GeneratingFunction", "Gradient", "Integrator",
-           "Interrupted", "Jacobian", "Misuse", "Points", "Run", "Scene", "Search", "State", "Statistics", "Study", "acos", "acosh", "asin", "asinh",
-           "atan", "atan2", "atanh", "catalogue", "cos", "cosh", "exp", "load", "log", "maximum", "methods", "minimum",
-           "parse", "pi", "sin", "sinh", "sqrt", "tan", "tanh", "version"]
+__all__ = ["CallbackCost", "Doubt", "Ensemble", "Equilibrium", "Error", "Event", "Failure", "Fit", "GeneratingFunction",
+           "Gradient", "Integrator", "Interrupted", "Jacobian", "Misuse", "Points", "Run", "Scene", "Search", "SolvedStart",
+           "State", "Statistics", "Study", "acos", "acosh", "asin", "asinh", "atan", "atan2", "atanh", "catalogue", "cos",
+           "cosh", "exp", "load", "log", "maximum", "methods", "minimum", "parse", "pi", "sin", "sinh", "sqrt", "tan",
+           "tanh", "version"]

@@ -13,13 +13,13 @@ from typing import Any, Callable
 
 from .errors import raised
 
-VERSION = 3  # DIRACSTEP_VERSION_OF_C_INTERFACE
+VERSION = 4  # DIRACSTEP_VERSION_OF_C_INTERFACE
 PLUGIN_VERSION = 1  # DIRACSTEP_PLUGIN_VERSION
 FILE = "libdiracstep.so.0.1"
 
 OK, FAILED, MISUSE, INTERRUPTED = range(4)
 MOMENTA = {"projected": 0, "plus": 1, "minus": 2}
-ABOUT, COORDINATES, ROWS, INVARIANTS, PARAMETERS, METHODS, RULES, SCENES, PLUGINS = range(9)
+ABOUT, COORDINATES, ROWS, INVARIANTS, PARAMETERS, METHODS, RULES, SCENES, PLUGINS, OUTPUTS, INPUTS, EVENTS = range(12)
 
 Numbers = POINTER(c_double)
 
@@ -102,7 +102,7 @@ class Source(Structure):
 
 
 class Facts(Structure):
-    _fields_ = [("dimension", c_int), ("rows", c_int), ("invariants", c_int), ("start_time", c_double),
+    _fields_ = [("dimension", c_int), ("rows", c_int), ("invariants", c_int), ("outputs", c_int), ("start_time", c_double),
                 ("start_q", Numbers), ("start_v", Numbers), ("end_time", c_double), ("step", c_double)]
 
 
@@ -121,19 +121,24 @@ class Table(Structure):
 class Options(Structure):
     _fields_ = [("method", c_char_p), ("order", c_int), ("step", c_double), ("ends", c_int), ("end", c_double),
                 ("rule", c_char_p), ("solver", c_char_p), ("jacobian", c_char_p), ("project_start", c_int),
-                ("substeps", c_int), ("compensated_sums", c_int), ("pushed", c_int), ("eps", c_double),
+                ("substeps", c_int), ("compensated_sums", c_int), ("pushed", c_int), ("fixed", c_int), ("eps", c_double),
                 ("control", c_char_p), ("smallest_step", c_double), ("max_steps", c_long)]
 
 
 class State(Structure):
     _fields_ = [("time", c_double), ("energy", c_double), ("q", c_void_p), ("v", c_void_p), ("p", c_void_p),
-                ("lambda_", c_void_p)]
+                ("lambda_", c_void_p), ("invariants", c_void_p), ("outputs", c_void_p)]
+
+
+class Event(Structure):
+    _fields_ = [("name", c_char_p), ("time", c_double), ("q", Numbers), ("v", Numbers), ("after_q", Numbers),
+                ("after_v", Numbers), ("impulse", c_double)]
 
 
 class Statistics(Structure):
     _fields_ = [("steps", c_long), ("solves", c_long), ("iterations", c_long), ("residuals", c_long),
                 ("jacobians", c_long), ("retries", c_long), ("step", c_double), ("smallest", c_double),
-                ("largest", c_double), ("resets", c_long), ("order", c_int), ("method", c_char_p)]
+                ("largest", c_double), ("resets", c_long), ("stopped", c_int), ("order", c_int), ("method", c_char_p)]
 
 
 class Points(Structure):
@@ -142,8 +147,8 @@ class Points(Structure):
 
 ENLARGE = CFUNCTYPE(c_int, c_void_p, POINTER(Points))
 Points._fields_ = [("room", c_long), ("count", c_long), ("t", c_void_p), ("q", c_void_p), ("v", c_void_p),
-                   ("p", c_void_p), ("lambda_", c_void_p), ("invariants", c_void_p), ("energy", c_void_p),
-                   ("enlarge", ENLARGE), ("data", c_void_p)]
+                   ("p", c_void_p), ("lambda_", c_void_p), ("invariants", c_void_p), ("outputs", c_void_p),
+                   ("energy", c_void_p), ("enlarge", ENLARGE), ("data", c_void_p)]
 
 
 class Course(Structure):
@@ -195,6 +200,8 @@ _PROTOTYPES: dict[str, tuple[Any, list[Any]]] = {
     "restore": (c_int, [c_void_p, c_char_p, c_size_t]),
     "doubt": (c_char_p, [c_void_p]),
     "read_statistics": (c_int, [c_void_p, POINTER(Statistics)]),
+    "count_events": (c_long, [c_void_p]),
+    "read_event": (c_int, [c_void_p, c_long, POINTER(Event)]),
     "differentiate": (c_int, [c_void_p, c_void_p, POINTER(Derivatives)]),
     "run": (c_int, [c_void_p, POINTER(Course), POINTER(Points)]),
     "expect": (c_long, [c_void_p, POINTER(Course)]),

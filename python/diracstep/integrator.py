@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import threading
 import time
+import warnings
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NoReturn, Sequence
 
@@ -12,10 +13,10 @@ import numpy as np
 
 from . import _library as c
 from .arrays import column, real, whole
-from .errors import Misuse
+from .errors import Doubt, Misuse
 from .options import momentum_from, options_from
 from .plan import TextTable
-from .run import Statistics
+from .run import Event, Statistics
 
 if TYPE_CHECKING:
     from .scene import Scene
@@ -33,6 +34,8 @@ class State:
     p: np.ndarray  #: n numbers, the representative asked for
     lambda_: np.ndarray  #: m numbers: forces of the rows
     energy: float
+    invariants: np.ndarray  #: i numbers that the scene declares as kept
+    outputs: np.ndarray  #: o numbers, formulas of the scene's file
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,12 +58,17 @@ class Gradient:
 
 
 class Integrator:
-    """Steps a scene with one method; made by ``Scene.integrator``.  Threads take turns."""
+    """Steps a scene with one method; made by ``Scene.integrator``.  Threads take turns.
 
-    def __init__(self, scene: Scene, until: float | None, pushed: bool, given: dict[str, Any]) -> None:
+    Events of the scene are looked for, and act.  The checks of a run go along with ``step()``; ``state()`` warns with Doubt of
+    what they have found.
+    """
+
+    def __init__(self, scene: Scene, until: float | None, pushed: bool, given: dict[str, Any], fixed: bool = True) -> None:
         self.scene = scene
         self._lock = threading.Lock()
-        self._options = options_from(given, until, pushed)
+        self._options = options_from(given, until, pushed, fixed)
+        self._told = ""  # doubts that were warned of
         handle = ctypes.c_void_p()
         scene._check(c.lib.create(scene._handle, ctypes.byref(self._options), ctypes.byref(handle)))
         self._handle: int = handle.value or 0
@@ -75,8 +83,10 @@ class Integrator:
         raise TypeError("an integrator is not copied or pickled; save() and restore() carry its state to another one")
 
     def step(self, count: int = 1, *, size: float | None = None) -> None:
-        """Takes so many steps, or one of another size.  After a Failure the state is that before the failed step; Ctrl-C
-        ends many steps within a fraction of a second, where the motion has come to by then."""
+        """Takes so many steps, or one of another size; fewer where an event of the scene ends the motion, and then no more.
+
+        After a Failure the state is that before the failed step; Ctrl-C ends many steps within a fraction of a second, where the
+        motion has come to by then."""
         if size is None:
             if isinstance(count, int) and count == 1:
                 self._take(1)
@@ -85,7 +95,7 @@ class Integrator:
             while left > 0:  # Ctrl-C is heard between the parts
                 begin = time.perf_counter()
                 self._take(min(part, left))
-                left -= part
+                left = 0 if self.stopped else left - part
                 if time.perf_counter() - begin < 0.05:
                     part *= 2
             return
@@ -115,13 +125,35 @@ class Integrator:
         return c.lib.time(self._handle)
 
     def state(self, momentum: str = "projected") -> State:
-        """The current point."""
-        n, m = len(self.scene._coordinates), len(self.scene._rows)
-        q, v, p, force = np.empty(n), np.empty(n), np.empty(n), np.empty(m)
-        read = c.State(q=q.ctypes.data, v=v.ctypes.data, p=p.ctypes.data, lambda_=force.ctypes.data)
+        """The current point.  Warns with Doubt where it is not to be believed, once for each reason."""
+        columns = {name: np.empty(width) for name, width in self.scene._widths.items()}
+        read = c.State(**{name: array.ctypes.data for name, array in columns.items()})
         with self._lock:
             self._check(c.lib.read(self._handle, momentum_from(momentum), ctypes.byref(read)))
-        return State(read.time, q, v, p, force, read.energy)
+            doubt = c.lib.doubt(self._handle).decode()
+        if doubt and doubt != self._told:
+            self._told = doubt
+            warnings.warn(f"{self.scene.name}: {doubt}", Doubt, stacklevel=2)
+        return State(t=read.time, energy=read.energy, **columns)
+
+    @property
+    def events(self) -> list[Event]:
+        """The events of the scene that were met since the start, in the order of time."""
+        n = len(self.scene._coordinates)
+        met: list[Event] = []
+        with self._lock:
+            for k in range(c.lib.count_events(self._handle)):
+                read = c.Event()
+                self._check(c.lib.read_event(self._handle, k, ctypes.byref(read)))
+                q, v, after_q, after_v = (np.ctypeslib.as_array(column, (n,)).copy() if column else None
+                                          for column in (read.q, read.v, read.after_q, read.after_v))
+                met.append(Event(read.name.decode(), read.time, q, v, after_q, after_v, read.impulse))  # type: ignore[arg-type]
+        return met
+
+    @property
+    def stopped(self) -> bool:
+        """Whether an event of the scene has ended the motion: there are no further steps until ``reset()``."""
+        return self.statistics.stopped
 
     def jacobian(self, steps: int, parameters: Sequence[str] = ()) -> Jacobian:
         """Takes so many steps; the exact derivatives of their end by q, by v and by parameters of the scene where they began.
@@ -151,9 +183,10 @@ class Integrator:
         def write(_: Any, end: Any, q: Any, v: Any, p: Any) -> int:
             try:
                 at = end.contents
-                numbers = [np.ctypeslib.as_array(ctypes.cast(address, c.Numbers), (size,)).copy() if size else np.empty(0)
+                seen = [np.ctypeslib.as_array(ctypes.cast(address, c.Numbers), (size,)).copy() if size else np.empty(0)
                            for address, size in ((at.q, n), (at.v, n), (at.p, n), (at.lambda_, m))]
-                given = cotangent(State(at.time, *numbers, at.energy)) if callable(cotangent) else cotangent
+                state = State(at.time, seen[0], seen[1], seen[2], seen[3], at.energy, np.empty(0), np.empty(0))
+                given = cotangent(state) if callable(cotangent) else cotangent
                 for name, to in (("q", q), ("v", v), ("p", p)):
                     if name in given:
                         np.ctypeslib.as_array(to, (n,))[:] = column(given[name], self.scene._coordinates, name)
@@ -184,7 +217,7 @@ class Integrator:
     def reset(self, q: Any = None, v: Any = None, t: float | None = None) -> None:
         """Starts anew: at the scene's start, or at a consistent point of one's own.  A column that is not given is the scene's;
         one given by names is 0 where nothing is said."""
-        scene = self.scene
+        scene, self._told = self.scene, ""
         if q is None and v is None and t is None:
             with self._lock:
                 self._check(c.lib.reset(self._handle, 0.0, None, None))
@@ -234,7 +267,8 @@ class Integrator:
         read = c.Statistics()
         self._check(c.lib.read_statistics(self._handle, ctypes.byref(read)))
         return Statistics(read.method.decode(), read.order, read.step, read.steps, read.solves, read.iterations,
-                          read.residuals, read.jacobians, read.retries, read.smallest, read.largest, read.resets)
+                          read.residuals, read.jacobians, read.retries, read.smallest, read.largest, read.resets,
+                          bool(read.stopped))
 
     def __repr__(self) -> str:
         return f"<integrator of {self.scene.name} at t = {self.time:g}>"

@@ -15,8 +15,11 @@ KNOWN = ("method", "order", "step", "rule", "solver", "jacobian", "project_start
          "eps", "control", "smallest_step", "max_steps")
 
 
-def options_from(given: dict[str, Any], until: float | None, pushed: bool = False) -> c.Options:
-    """The options of the library; raises Misuse for a keyword that is not known."""
+def options_from(given: dict[str, Any], until: float | None, pushed: bool = False, fixed: bool = False) -> c.Options:
+    """The options of the library; raises Misuse for a keyword that is not known.
+
+    fixed: steps of one size, unless the options say that they vary.
+    """
     unknown = [name for name in given if name not in KNOWN]
     if unknown:
         raise Misuse(f"no option {unknown[0]!r}; there are " + ", ".join(KNOWN))
@@ -43,6 +46,7 @@ def options_from(given: dict[str, Any], until: float | None, pushed: bool = Fals
             raise Misuse(f"eps is {options.eps}; a number of radians above 0 is needed")
     elif given.get("adaptive"):
         options.eps = math.nan  # what is usual for the method, which may be chosen for it
+    options.fixed = int(fixed or given.get("adaptive") is False)
     options.pushed = int(pushed)
     if until is not None:
         options.ends, options.end = 1, real(until, "until")

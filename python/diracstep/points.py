@@ -9,14 +9,14 @@ import numpy as np
 
 from . import _library as c
 
-COLUMNS = ("t", "q", "v", "p", "lambda_", "invariants", "energy")
+COLUMNS = ("t", "q", "v", "p", "lambda_", "invariants", "outputs", "energy")
 
 
 class Points:
     """NumPy's arrays, which the library fills row by row; they grow where the number of points is not known."""
 
-    def __init__(self, dimension: int, rows: int, invariants: int, room: int, grows: bool = True) -> None:
-        widths = {"q": dimension, "v": dimension, "p": dimension, "lambda_": rows, "invariants": invariants}
+    def __init__(self, widths: dict[str, int], room: int, grows: bool = True) -> None:
+        """widths: numbers of a point in each column that holds several."""
         self.arrays: dict[str, np.ndarray] = {
             name: np.empty((room, widths[name]) if name in widths else room) for name in COLUMNS}
         self.struct = c.Points(room=room)

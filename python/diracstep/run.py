@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Mapping, Sequence
 
 import numpy as np
 
+from .arrays import column, real
 from .errors import Misuse
 from .plan import TextTable
 
 if TYPE_CHECKING:
+    from .integrator import Gradient, Jacobian
     from .scene import Scene
 
 
@@ -30,6 +32,20 @@ class Statistics:
     smallest: float = 0.0  #: size of a step that varies
     largest: float = 0.0
     resets: int = 0  #: of the controller of steps that vary
+    stopped: bool = False  #: whether an event has ended the motion
+
+
+@dataclass(frozen=True, eq=False)
+class Event:
+    """Where an event of the scene was met.  The arrays own their memory."""
+
+    name: str
+    t: float
+    q: np.ndarray  #: n numbers, just before it
+    v: np.ndarray  #: n numbers, just before it
+    after_q: np.ndarray | None  #: what it made of them; None where it does not act
+    after_v: np.ndarray | None
+    impulse: float  #: of a contact, momentum over the unit of its row; NaN where there is none
 
 
 @dataclass(frozen=True)
@@ -54,7 +70,7 @@ class Points:
 
     ``t``, ``energy``: N numbers.  ``q``, ``v``, ``p``: N × n, a column for each coordinate; v lies in the distribution, p is the
     representative asked for.  ``lambda_``: N × m, the forces of the rows.  ``invariants``: N × i, what the scene declares as
-    kept.  Units are those of the scene.  The arrays own their memory.
+    kept.  ``outputs``: N × o, formulas of the scene's file.  Units are those of the scene.  The arrays own their memory.
     """
 
     scene: Scene
@@ -65,6 +81,7 @@ class Points:
     lambda_: np.ndarray
     energy: np.ndarray
     invariants: np.ndarray
+    outputs: np.ndarray
 
     def __len__(self) -> int:
         """The number of points."""
@@ -79,6 +96,8 @@ class Run(Points):
     search: Search | None = None  #: where an error was asked for
     doubt: str = ""  #: empty, or why the points are not to be believed
     interrupted: bool = False  #: whether Ctrl-C ended it
+    events: list[Event] = field(default_factory=list)  #: of the scene, in the order of time; the last ends a ``stopped`` run
+    _again: Any = None  #: makes an integrator at the start that takes the steps of this run; None where there is none
     _places: dict[str, tuple[np.ndarray, int]] = field(default_factory=dict, init=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -87,20 +106,27 @@ class Run(Points):
             places[name] = (self.lambda_, index)
         for index, name in enumerate(scene.invariants):
             places[name] = (self.invariants, index)
+        for index, name in enumerate(scene.outputs):
+            places[name] = (self.outputs, index)
         for index, name in enumerate(scene.coordinates):
             places["v_" + name] = (self.v, index)
             places["p_" + name] = (self.p, index)
             places[name] = (self.q, index)
 
     def __getitem__(self, name: str) -> np.ndarray:
-        """One quantity along the run: ``"x"``, ``"v_x"``, ``"p_x"``, the name of a row for its force, of an invariant, or
-        ``"t"`` and ``"energy"``."""
+        """One quantity along the run: ``"x"``, ``"v_x"``, ``"p_x"``, the name of a row for its force, of an invariant, of an
+        output of the scene's file, or ``"t"`` and ``"energy"``."""
         if name in self._places:
             array, index = self._places[name]
             return array[:, index]
         if name in ("t", "energy"):
             return getattr(self, name)
         raise KeyError(f"no quantity {name!r}; there are t, energy, " + ", ".join(self._places))
+
+    @property
+    def stopped(self) -> bool:
+        """Whether an event of the scene has ended the motion."""
+        return self.statistics is not None and self.statistics.stopped
 
     @property
     def names(self) -> list[str]:
@@ -118,6 +144,47 @@ class Run(Points):
                 table[name] = values
             return table
         return pandas.DataFrame(columns)
+
+    # ---- derivatives ----
+    def jacobian(self, parameters: Sequence[str] = ()) -> Jacobian:
+        """The exact derivatives of the end of this run by its start, q and v, and by parameters of the scene.
+
+        The motion is taken once more, with its derivatives.  Of runs of fixed steps without events.
+        """
+        return self._stepped("jacobian", parameters)
+
+    def gradient(self, cotangent: Any, parameters: Sequence[str] = ()) -> Gradient:
+        """The exact derivatives of a function of the end of this run by its start and by parameters, by the adjoint: about four
+        motions, whatever their number.
+
+        cotangent: the derivatives of the function by the end, {"q": n numbers, "v": …, "p": …}, or a function of the end, a
+        ``State``, that gives them.
+        """
+        return self._stepped("gradient", cotangent, parameters)
+
+    def vjp(self, *, q: Any = None, v: Any = None, p: Any = None, parameters: Sequence[str] = ()) -> Gradient:
+        """Cotangents of the end, n numbers each, pulled back to the start and to parameters: gradient() of what is linear."""
+        given = {name: column for name, column in (("q", q), ("v", v), ("p", p)) if column is not None}
+        return self.gradient(given, parameters)
+
+    def jvp(self, *, q: Any = None, v: Any = None, parameters: Mapping[str, float] | None = None) -> dict[str, np.ndarray]:
+        """What a direction at the start and in the parameters becomes at the end: {"q": n numbers, "v": …, "p": …}.
+
+        q, v: n numbers, or by coordinate; parameters: by name.  A product with jacobian(), which is taken for it.
+        """
+        names, moved = self.scene.coordinates, parameters or {}
+        direction = np.concatenate([np.zeros(len(names)) if given is None else column(given, names, what)
+                                    for given, what in ((q, "q"), (v, "v"))] + [[real(value, name) for name, value in moved.items()]])
+        found = self.jacobian(list(moved))
+        return {what: getattr(found, what) @ direction for what in "qvp"}
+
+    def _stepped(self, what: str, *arguments: Any) -> Any:
+        if self._again is None or self.statistics is not None and self.statistics.step == 0.0:
+            raise Misuse("derivatives need a run of steps of fixed size to its end (adaptive=False, or a step)")
+        integrator, steps = self._again()
+        if what == "jacobian":
+            return integrator.jacobian(steps, *arguments)
+        return integrator.gradient(steps, *arguments)
 
     def plot(self, *names: str, x: str = "t", ax: Any = None, **style: Any) -> Any:
         """Draws quantities (all coordinates without names) over the time or another quantity; the axes of matplotlib."""
@@ -172,10 +239,12 @@ class Run(Points):
 class Ensemble(Points):
     """Ends of many motions of one scene: row k is that of start k.
 
-    ``failures`` says why some stopped early; their rows are the last points that could be read.
+    ``failures`` says why some stopped early; their rows are the last points that could be read.  ``doubts`` says which
+    members are not to be believed, of at most twenty that were looked at.
     """
 
     failures: dict[int, str]
+    doubts: dict[int, str] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         return f"<ensemble of {self.scene.name}: {len(self)} ends, {len(self.failures)} failed>"

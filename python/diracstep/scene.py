@@ -14,13 +14,14 @@ import numpy as np
 from . import _library as c
 from .arrays import column, real, table, whole
 from .callbacks import CallbackScene, GeneratingFunction
+from .command import Equilibrium, Fit, SolvedStart, Verbs, fit, sweep
 from .errors import CallbackCost, Doubt, Failure, Interrupted, Misuse, raised
 from .integrator import Integrator
 from .options import momentum_from, options_from, stop_flag
 from .plan import TextTable
 from .points import Points
 from .progress import Progress
-from .run import Ensemble, Run, Search, Statistics
+from .run import Ensemble, Event, Run, Search, Statistics
 from .scene_text import SceneText, start_values
 from .study import Study, run_study
 
@@ -44,7 +45,8 @@ class Scene:
     lagrangian, hamiltonian, dissipation: one formula each, an energy (Rayleigh's function: a power).
     rows: one expression, a list, or {name: expression}, each zero along the motion; or a list of such functions.
     force: generalised forces, a column or {coordinate: force}.
-    q, v, p, t: where the motion starts; a column or {coordinate: value}, 0 where nothing is said.
+    q, v, p, t: where the motion starts; a column or {coordinate: value}, 0 where nothing is said.  start: the same by name in
+    one, {"x": 1.0, "v_x": 0.5}.
     until, step: where runs end that are given no other end, and a coarse but sensible step.
     invariants: {name: function}, quantities that the motion keeps.
     tolerances: {coordinate: absolute tolerance in its unit}, for one far smaller than the others.
@@ -54,7 +56,8 @@ class Scene:
     def __init__(self, coordinates: Sequence[str], lagrangian: Callable[..., Any] | None = None, *,
                  hamiltonian: Callable[..., Any] | None = None, dissipation: Callable[..., Any] | None = None, rows: Any = None,
                  force: Callable[..., Any] | None = None, parameters: Mapping[str, float] | None = None, q: Any = None,
-                 v: Any = None, p: Any = None, t: float = 0.0, until: float = 1.0, step: float = 0.1,
+                 v: Any = None, p: Any = None, t: float = 0.0, start: Mapping[str, float] | None = None, until: float = 1.0,
+                 step: float = 0.1,
                  invariants: Mapping[str, Callable[..., Any]] | None = None, name: str = "scene", description: str = "",
                  callback: bool = False, plugins: Sequence[str] = (), methods: Sequence[GeneratingFunction] = (),
                  drop_redundant: bool = False, tolerances: Mapping[str, float] | None = None) -> None:
@@ -63,6 +66,10 @@ class Scene:
         coordinates, parameters = list(coordinates), dict(parameters or {})
         if not coordinates:
             raise Misuse("a scene needs coordinates")
+        if start is not None:
+            if q is not None or v is not None or p is not None:
+                raise Misuse("start goes with no q, v or p: it holds them by name")
+            q, v, p = _parts_of(start, coordinates)
         if callback:
             if lagrangian is None or hamiltonian or dissipation or invariants or p is not None:
                 raise Misuse("callback=True needs a lagrangian, and knows no hamiltonian, dissipation, invariants or start p")
@@ -117,11 +124,16 @@ class Scene:
         self._coordinates = tuple(coordinates or (name for name, _, _ in listed))
         self._rows = tuple(name for name, in self._lines(c.ROWS))
         self._invariants = tuple(name for name, _ in self._lines(c.INVARIANTS))
+        self._outputs = tuple(name for name, in self._lines(c.OUTPUTS))
+        n = facts.dimension
+        self._widths = {"q": n, "v": n, "p": n, "lambda_": facts.rows, "invariants": facts.invariants, "outputs": facts.outputs}
+        self.inputs: dict[str, tuple[float, float]] = {  #: tables of the time, and between which times they have values
+            name: (float(first), float(last)) for name, first, last in self._lines(c.INPUTS)}
+        self.events: dict[str, str] = {name: what for name, what in self._lines(c.EVENTS)}  #: by name: "record", "stop" or "act"
         self.units: dict[str, str] = {name: unit for name, (_, unit, _) in zip(self._coordinates, listed)}
         self.parameters: dict[str, float] = {name: float(value) for name, value, _, _ in self._lines(c.PARAMETERS)}
         self.about: list[tuple[str, str]] = [(what, text) for what, text in self._lines(c.ABOUT)]  #: what the scene says of itself
         self.name: str = self.about[0][1]
-        n = facts.dimension
         self.start_time: float = facts.start_time
         self.start_q = np.ctypeslib.as_array(facts.start_q, (n,)).copy()
         self.start_v = np.ctypeslib.as_array(facts.start_v, (n,)).copy()
@@ -144,6 +156,11 @@ class Scene:
         """Names of what the motion keeps."""
         return list(self._invariants)
 
+    @property
+    def outputs(self) -> list[str]:
+        """Names of the formulas of the scene's file that runs tell: [outputs], powers of elements, voltages of nodes."""
+        return list(self._outputs)
+
     def with_parameters(self, **parameters: float) -> Scene:
         """The same scene with other values of parameters and sizes; nothing is compiled again."""
         if self._callbacks is not None:
@@ -156,8 +173,9 @@ class Scene:
         """The same scene with absolute tolerances, in their units, of coordinates that are far smaller than others."""
         if self._callbacks is not None:
             raise Misuse("the tolerances of a scene of callbacks are stated where it is made")
+        again: dict[str, Any] = {**self._again, "tolerances": {**self._tolerances, **tolerances}}
         made = Scene.__new__(Scene)
-        made._open(**{**self._again, "tolerances": {**self._tolerances, **tolerances}}, parameters=self._changes)
+        made._open(**again, parameters=self._changes)
         return made
 
     def __del__(self) -> None:
@@ -168,13 +186,15 @@ class Scene:
         raise TypeError("a scene is not copied or pickled: it belongs to the library; make it again, or with with_parameters()")
 
     # ---- runs ----
-    def run(self, *, until: float | None = None, steps: int | None = None, at: Any = None, error: float | None = None,
-            every: int = 1, momentum: str = "projected", progress: bool | None = None, max_solves: int = 0, max_time: float = 0.0,
+    def run(self, *, until: float | None = None, steps: int | None = None, at: Any = None, every_time: float | None = None,
+            error: float | None = None, every: int = 1, momentum: str = "projected", progress: bool | None = None,
+            max_solves: int = 0, max_time: float = 0.0,
             tolerances: Mapping[str, float] | None = None, **options: Any) -> Run:
         """One motion from the scene's start, as a Run.
 
         until: time of the end, the scene's own without it; a fixed ``step`` is made so much smaller that whole steps lead there.
-        steps: so many steps instead.  at: ascending times to show instead of the steps.
+        steps: so many steps instead.  at: times to show instead of the steps, in their order; every_time: the start and each so
+        much time later.  Values between steps have the order of the method, and the motion keeps its bits.
         error: a relative error at the end; the library finds method and steps, repeating the run until its estimate is below
         (``max_solves`` and ``max_time`` in seconds limit that; ``adaptive=True`` or ``False`` decides whether steps vary).
         every: keeps each so-many-th point.  momentum: the representative kept as p: projected, plus or minus.
@@ -182,21 +202,27 @@ class Scene:
         tolerances: {coordinate: absolute tolerance in its unit}, see with_tolerances.
         Further options: method, order, step, rule, solver ("newton", "fixed-point", "automatic", "direct"), jacobian, project_start,
         substeps, compensated_sums; adaptive, eps (radians of a step), control, smallest_step, max_steps for steps that vary.
+        What is left open is chosen as by the command ``diracstep run``: a motion that is damped strongly is stepped by
+        damped/radau:3 with steps that vary, unless a step, ``steps`` or ``adaptive=False`` is given.
 
+        Events of the scene act, and end the run where they say so: see ``Run.events``.
         Warns with Doubt where the library's checks find the result not to be believed.  Raises Misuse, or Failure, which holds
         what was computed in ``run``.  Ctrl-C ends the run and keeps what is computed.
         """
-        if sum(choice is not None for choice in (steps, at, error)) > 1 or (steps is not None or at is not None) and until is not None:
-            raise Misuse("until, steps and at exclude each other, and steps and at go with no error")
+        if sum(choice is not None for choice in (steps, at, every_time, error)) > 1 or steps is not None and until is not None:
+            raise Misuse("steps, at, every_time and error exclude each other, and steps goes with no until")
         if tolerances:
             return self.with_tolerances(tolerances).run(
-                until=until, steps=steps, at=at, error=error, every=every, momentum=momentum, progress=progress,
-                max_solves=max_solves, max_time=max_time, **options)
+                until=until, steps=steps, at=at, every_time=every_time, error=error, every=every, momentum=momentum,
+                progress=progress, max_solves=max_solves, max_time=max_time, **options)
+        if every_time is not None:
+            at = self._times(real(every_time, "every_time"), self.until if until is None else real(until, "until"))
         course, kept = _course(every, momentum, steps, at)
         if error is not None:
             return self._search(course, error, until, options, max_solves, max_time, progress)
-        end = None if steps is not None else kept[-1] if at is not None else self.until if until is None else until
-        integrator = Integrator(self, end if at is None else None, False, options)
+        end = None if steps is not None else self._end(until, kept, options)
+        fixed = steps is not None or at is not None and bool(self.events)
+        integrator = Integrator(self, end, False, options, fixed)
         room = c.lib.expect(integrator._handle, ctypes.byref(course))
         if room > 2**40:
             raise Misuse(f"{room} points would be kept; take a larger every")
@@ -205,7 +231,30 @@ class Scene:
             code, message = c.call_interruptibly(
                 lambda: c.lib.run(integrator._handle, ctypes.byref(course), points.reference()), course.flag,
                 bar.show)
-        return self._finished(points, code, message, statistics=integrator.statistics, doubt=integrator.doubt)
+        taken = integrator.statistics
+
+        def again() -> tuple[Integrator, int]:
+            return self.integrator(until=end, **options), taken.steps
+
+        return self._finished(points, code, message, statistics=taken, doubt=integrator.doubt,
+                              events=integrator.events, again=None if at is not None else again)
+
+    def _end(self, until: float | None, times: np.ndarray, options: dict[str, Any]) -> float:
+        """Where steps are to lead: as far as the times to show, where that is farther than the end of the scene."""
+        if until is not None or not times.size:
+            return self.until if until is None else real(until, "until")
+        last, varies = float(times[-1]), bool(options.get("adaptive") or options.get("eps"))
+        inside = (last - self.start_time) * (self.until - last) >= 0.0
+        return self.until if inside and not varies else last
+
+    def _times(self, between: float, end: float) -> np.ndarray:
+        if between <= 0.0:
+            raise Misuse(f"every_time is {between}; a number above 0 is needed")
+        span = end - self.start_time
+        count = np.floor(abs(span) / between + 1e-9)
+        if count > 1e8:
+            raise Misuse(f"every_time = {between:g} asks for {count:g} points; 1e8 are the most")
+        return self.start_time + np.copysign(np.arange(count + 1.0) * between, span)
 
     def _search(self, course: Any, error: float, until: float | None, options: dict[str, Any], max_solves: int, max_time: float,
                 progress: bool | None) -> Run:
@@ -226,15 +275,27 @@ class Scene:
         with Progress(progress, points, 0, self.start_time, None) as bar:
             code, message = c.call_interruptibly(call, course.flag, bar.show)
         search = told[0] if told else None
-        return self._finished(points, code, message, search=search, doubt=search.warning if search else "")
+        again = None
+        if search and not search.varies:
+            found_steps = {**options, "method": search.method, "order": search.order, "step": search.step}
+            again = lambda: self._found_again(until, found_steps)  # noqa: E731
+        return self._finished(points, code, message, search=search, doubt=search.warning if search else "", again=again)
+
+    def _found_again(self, until: float | None, options: dict[str, Any]) -> tuple[Integrator, int]:
+        """An integrator for what a search has found, and the steps that lead to the end."""
+        end = self.until if until is None else until
+        integrator = self.integrator(until=end, **options)
+        return integrator, round((end - self.start_time) / integrator.statistics.step)
 
     def _points(self, room: int) -> Points:
-        return Points(len(self._coordinates), len(self._rows), len(self._invariants), room)
+        return Points(self._widths, room)
 
     def _finished(self, points: Points, code: int, message: str, *, statistics: Statistics | None = None,
-                  search: Search | None = None, doubt: str = "") -> Run:
+                  search: Search | None = None, doubt: str = "", events: list[Event] | None = None,
+                  again: Any = None) -> Run:
         arrays: dict[str, Any] = points.finish()
-        run = Run(self, **arrays, statistics=statistics, search=search, doubt=doubt, interrupted=code == c.INTERRUPTED)
+        run = Run(self, **arrays, statistics=statistics, search=search, doubt=doubt, interrupted=code == c.INTERRUPTED,
+                  events=events or [], _again=again if code == c.OK else None)
         if points.failure is not None:
             raise points.failure
         if code == c.INTERRUPTED:
@@ -250,7 +311,8 @@ class Scene:
         """The ends of many motions, stepped by threads in C++ (0: one for each processor); the same bits for any number.
 
         q, v: N × n, consistent starts; v is the scene's where it is left out.  t: N starting times, the scene's without;
-        equal ones where no steps are given.  Ends are read, not checked: ``doubt`` belongs to runs.
+        equal ones where no steps are given.  Events of the scene act, and a motion that one ends is read there.
+        Warns with Doubt where the checks of a run, which go along with at most twenty members, find one not to be believed.
         Ctrl-C ends it with KeyboardInterrupt.
         """
         starts_q = np.asarray(q)
@@ -259,19 +321,20 @@ class Scene:
         starts_q = table(starts_q, shape, "q")
         starts_v = None if v is None else table(v, shape, "v")
         times = None if t is None else table(t, (members,), "t")
-        flag, points = stop_flag(), Points(len(self._coordinates), len(self._rows), len(self._invariants), members, grows=False)
+        flag, points = stop_flag(), Points(self._widths, members, grows=False)
         request = c.Ensemble(members=members, q=starts_q.ctypes.data, v=_address(starts_v), time=_address(times),
                              steps=0 if steps is None else whole(steps, "steps", 1), momentum=momentum_from(momentum),
                              threads=whole(threads, "threads", most=2**31 - 1), stop=ctypes.pointer(flag))
         request.kept = starts_q, starts_v, times  # the call may go on after a second Ctrl-C has left this function
         chosen = options_from(options, None if steps is not None else self.until if until is None else until)
-        failures: dict[int, str] = {}
+        told: dict[str, dict[int, str]] = {"failed": {}, "doubted": {}}
         table_of = c.Table()
 
         def call() -> int:
             code = c.lib.run_ensemble(self._handle, ctypes.byref(chosen), ctypes.byref(request), points.reference(),
                                       ctypes.byref(table_of))
-            failures.update((int(member), text) for member, text in table_of.lines())
+            for member, what, why in table_of.lines():
+                told[what][int(member)] = why
             return code
 
         for array in points.arrays.values():
@@ -282,10 +345,14 @@ class Scene:
                 raise KeyboardInterrupt(message)
             if code != c.OK:
                 self._raise(code, message)
-        return Ensemble(self, **points.arrays, failures=failures)
+        if told["doubted"]:
+            member, why = next(iter(told["doubted"].items()))
+            warnings.warn(f"{self.name}: member {member}: {why}", Doubt, stacklevel=2)
+        return Ensemble(self, **points.arrays, failures=told["failed"], doubts=told["doubted"])
 
     def integrator(self, *, until: float | None = None, pushed: bool = False, **options: Any) -> Integrator:
-        """An integrator at the scene's start, to be stepped by hand; options as for ``run``.
+        """An integrator at the scene's start, to be stepped by hand; options as for ``run``.  Steps are of one size unless
+        ``adaptive`` or ``eps`` says otherwise.
 
         until: where the motion will end: a fixed step is then fitted to it.  pushed: ``push`` will be used.
         """
@@ -294,7 +361,7 @@ class Scene:
     @property
     def plan(self) -> TextTable:
         """What is assembled for this scene, and what is left out and why."""
-        return self.integrator().plan
+        return Integrator(self, None, False, {}, fixed=False).plan
 
     def study(self, *, methods: Sequence[str] = (), orders: Sequence[int] = (), steps: Sequence[float] = (),
               rtols: Sequence[float] = (), until: float | None = None, ida: bool = True, erk: bool = True, repeat: int = 1,
@@ -305,6 +372,50 @@ class Scene:
         """
         return run_study(self, methods=methods, orders=orders, steps=steps, rtols=rtols, until=until, ida=ida, erk=erk,
                          repeat=repeat, budget=budget)
+
+    def equilibrium(self, *, along: bool = False) -> Equilibrium:
+        """Where the scene rests, from its start as the guess, and its small motions there: eigenvalues and modes.
+
+        along: a steady motion, in which coordinates with a velocity at the start keep moving.
+        Made by ``diracstep equilibrium``.  Raises Failure where none is found; warns with Doubt where the linear equations change.
+        """
+        with Verbs(self) as verbs:
+            return Equilibrium(self, verbs.call("equilibrium", *(["--along"] if along else [])))
+
+    def start(self) -> SolvedStart:
+        """The start that runs take, with momenta, accelerations and forces of rows, and where each value is from.
+
+        Made by ``diracstep start``.
+        """
+        with Verbs(self) as verbs:
+            return SolvedStart(self, verbs.call("start"))
+
+    def fit(self, data: Any, parameters: Sequence[str], *, start: Mapping[str, float] | None = None,
+            sigma: Mapping[str, float] | None = None, confidence: float = 0.95, step: float | None = None,
+            method: str | None = None) -> Fit:
+        """Parameters for which the motion is nearest to data, with confidence intervals.
+
+        data: a file, or {"t": …, "x": …, "v_x": …}, columns of one length, NaN where nothing was measured.
+        start: where the search begins, by parameter.  sigma: standard deviations by column, 1 without.
+        Made by ``diracstep fit``.  Raises Failure where the search does not end at a least sum of squares.
+        """
+        options = ["--confidence", repr(real(confidence, "confidence"))]
+        options += [] if step is None else ["--step", repr(real(step, "step"))]
+        options += [] if method is None else ["--method", method]
+        return fit(self, data, parameters, start or {}, sigma or {}, options)
+
+    def sweep(self, grid: Mapping[str, Sequence[float]], record: Sequence[str], *, extrema: Sequence[str] = (),
+              events: Sequence[str] = (), until: float | None = None, step: float | None = None, method: str | None = None,
+              order: int | None = None, error: float | None = None, out: str | os.PathLike[str] | None = None,
+              threads: int = 0) -> np.ndarray:
+        """One run for every combination of values: a structured array with a row for each.
+
+        grid: values by parameter, or by "start.x", "start.v_x".  record: columns of the end, of which extrema are taken over the
+        run where ``extrema`` names them; events: of the scene.  out: a folder to keep, which a further call continues.
+        A member that fails has its reason in the column ``status`` and NaN in the others.  Made by ``diracstep sweep``.
+        """
+        settings = {"end": until, "step": step, "method": method, "order": order, "error": error}
+        return sweep(self, grid, record, extrema, events, settings, out, whole(threads, "threads"))
 
     # ---- inside ----
     def _lines(self, what: int) -> list[tuple[str, ...]]:
@@ -346,6 +457,19 @@ def _source(name: str | None, text: str | None, callbacks: CallbackScene | None,
     own = (c.Parameter * max(1, len(tolerances)))(*(c.Parameter(key.encode(), value) for key, value in tolerances.items()))
     source.tolerances, source.tolerance = len(tolerances), own
     return source, (parameters, files, linked, own)
+
+
+def _parts_of(start: Mapping[str, float], coordinates: Sequence[str]) -> tuple[Any, ...]:
+    """q, v and p by coordinate, None where there are none, of a start by names."""
+    parts: tuple[dict[str, float], ...] = {}, {}, {}
+    for name, value in start.items():
+        for part, prefix in zip(parts, ("", "v_", "p_")):
+            if name.startswith(prefix) and name[len(prefix):] in coordinates:
+                part[name[len(prefix):]] = value
+                break
+        else:
+            raise Misuse(f"start: no coordinate {name!r}; there are " + ", ".join(coordinates) + ", and v_ and p_ of them")
+    return tuple(part or None for part in parts)
 
 
 def _course(every: int, momentum: str, steps: int | None, at: Any) -> tuple[Any, np.ndarray]:

@@ -5,17 +5,11 @@ References and baselines are parts of the command and not of libdiracstep, so it
 
 from __future__ import annotations
 
-import json
-import os
-import shutil
-import subprocess
-import tempfile
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Sequence
 
 import numpy as np
 
-from .errors import Failure, Misuse
+from .command import Verbs
 from .run import _pyplot
 
 if TYPE_CHECKING:
@@ -66,40 +60,14 @@ def _label(row: dict[str, Any]) -> str:
     return f"{row['method']}, order {order}" if order else str(row["method"])
 
 
-def _command() -> str:
-    given = os.environ.get("DIRACSTEP_COMMAND") or shutil.which("diracstep")
-    if not given:
-        raise ImportError("studies are made by the command diracstep (Debian package diracstep), which was not found; "
-                          "DIRACSTEP_COMMAND may give its path")
-    return given
-
-
 def run_study(scene: Scene, *, methods: Sequence[str], orders: Sequence[int], steps: Sequence[float], rtols: Sequence[float],
               until: float | None, ida: bool, erk: bool, repeat: int, budget: float) -> Study:
-    if scene._callbacks is not None:
-        raise Misuse("a study needs a scene of formulas, not of callbacks")
-    with tempfile.TemporaryDirectory() as folder:
-        where = scene.name
-        if scene.text is not None:
-            where = str(Path(folder) / f"{scene.name}.toml")
-            Path(where).write_text(scene.text, encoding="utf-8")
-        call = [_command(), "study", where, "--json", "--repeat", str(repeat), "--budget", repr(float(budget))]
-        for option, values in (("--methods", methods), ("--orders", orders), ("--steps", steps), ("--rtols", rtols)):
-            if len(values):
-                call += [option, ",".join(str(value) for value in values)]
-        for name, value in scene._changes.items():
-            call += ["--set", f"{name}={value!r}"]
-        for name, value in scene._tolerances.items():
-            call += ["--tolerance", f"{name}={value!r}"]
-        call += ["--end", repr(float(until))] if until is not None else []
-        call += ["--drop-redundant"] if scene._again["drop_redundant"] else []
-        call += [] if ida else ["--without-ida"]
-        call += [] if erk else ["--without-erk"]
-        for plugin in scene._again["plugins"]:
-            call += ["--plugin", os.fspath(plugin)]
-        done = subprocess.run(call, capture_output=True, text=True, check=False)
-    if done.returncode == 2:
-        raise Misuse(done.stderr.strip())
-    if done.returncode != 0:
-        raise Failure(done.stderr.strip())
-    return Study(scene.name, json.loads(done.stdout))
+    arguments = ["--repeat", str(repeat), "--budget", repr(float(budget))]
+    for option, values in (("--methods", methods), ("--orders", orders), ("--steps", steps), ("--rtols", rtols)):
+        if len(values):
+            arguments += [option, ",".join(str(value) for value in values)]
+    arguments += ["--end", repr(float(until))] if until is not None else []
+    arguments += [] if ida else ["--without-ida"]
+    arguments += [] if erk else ["--without-erk"]
+    with Verbs(scene) as verbs:
+        return Study(scene.name, verbs.call("study", *arguments, *verbs.tolerances()))

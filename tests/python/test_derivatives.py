@@ -45,3 +45,38 @@ def test_what_cannot_be_differentiated_is_refused():
         scene.integrator(step=0.1).gradient(3, lambda end: {"q": 1 // 0})
     with pytest.raises(ds.Misuse, match="pushed"):
         scene.integrator(step=0.1, pushed=True).jacobian(3)
+
+
+def test_a_run_is_differentiated_where_it_ends():
+    scene = ds.load("chaplygin_sleigh")
+    run = scene.run(method="type1/gl:2", step=0.1, until=2.0)
+    found = run.jacobian(["a", "m"])
+    reference = scene.integrator(method="type1/gl:2", step=0.1, until=2.0).jacobian(20, ["a", "m"])
+    for name in "qvp":
+        assert np.array_equal(getattr(found, name), getattr(reference, name))
+    pushed = run.jvp(q=[1.0, 0.0, 0.2], v={"th": 2.0}, parameters={"a": -1.0})
+    weights = {"q": np.array([0.5, 1.0, -1.0]), "p": np.array([0.0, 2.0, 1.0])}
+    pulled = run.vjp(**weights, parameters=["a"])
+    there = weights["q"] @ pushed["q"] + weights["p"] @ pushed["p"]
+    back = pulled.q @ [1.0, 0.0, 0.2] + 2.0 * pulled.v[2] - pulled.parameters["a"]
+    assert there == pytest.approx(back, abs=1e-11)  # (y, J x) = (Jᵀ y, x)
+    square = run.gradient(lambda end: {"q": 2 * end.q}, ["a"])
+    assert square.parameters["a"] == pytest.approx(2 * run.q[-1] @ found.q[:, 6], abs=1e-11)
+
+
+def test_the_gradient_of_a_run_of_an_error_and_of_steps(spring):
+    searched = spring.run(error=1e-8, adaptive=False, until=2.0)
+    for run in (searched, spring.run(steps=20, step=0.1), spring.run(until=2.0)):
+        slope = run.gradient({"q": [1.0]}, ["k"])
+        assert slope.q[0] == pytest.approx(np.cos(2.0), abs=1e-6) and slope.v[0] == pytest.approx(np.sin(2.0), abs=1e-6)
+        assert slope.parameters["k"] == pytest.approx(-np.sin(2.0), abs=1e-6)  # x = cos(√k t)
+
+
+def test_runs_that_cannot_be_differentiated_say_so(spring):
+    for run in (spring.run(adaptive=True), spring.run(at=[0.05, 1.0])):
+        with pytest.raises(ds.Misuse, match="fixed size"):
+            run.gradient({"q": [1.0]})
+    with pytest.raises(ds.Misuse, match="no coordinate 'y'"):
+        spring.run(steps=3).jvp(q={"y": 1.0})
+    with pytest.raises(ds.Misuse, match="no parameter 'm'"):
+        spring.run(steps=3).vjp(q=[1.0], parameters=["m"])

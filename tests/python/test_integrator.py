@@ -128,4 +128,6 @@ def test_a_failed_step_leaves_the_state():
     integrator = falling.integrator()
     with pytest.raises(ds.Failure, match="t = "):
         integrator.step(1000)
-    assert np.isfinite(integrator.state().q).all() and integrator.time > 0
+    with pytest.warns(ds.Doubt, match="the step is too large"):
+        state = integrator.state()
+    assert np.isfinite(state.q).all() and state.t > 0
