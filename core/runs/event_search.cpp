@@ -24,7 +24,8 @@ bool only_sets_values(const Event& event) {
 /// How often a clock has ticked at t; ticks within round-off of t have.
 double ticks_at(double t, double start, double every) {
   const double passed = std::abs(t - start);
-  const double round_off = 16.0 * std::numeric_limits<double>::epsilon() * std::max(std::abs(t), std::abs(start));
+  const double round_off =
+      16.0 * std::numeric_limits<double>::epsilon() * std::max(std::abs(t), std::abs(start));
   double ticks = std::floor(passed / every);
   while ((ticks + 1.0) * every <= passed + round_off && ticks + 1.0 > ticks) ticks += 1.0;
   return ticks;
@@ -144,11 +145,11 @@ bool EventSearch::keep_first_that_acts(const Sample& point) {
   bool acting = false;
   for (auto first = met_.begin(), last = first; first != met_.end() && !acting; first = last) {
     last = std::find_if(first, met_.end(), [&](const EventHit& hit) { return apart(*first, hit); });
-    std::stable_sort(first, last,
-                     [](const EventHit& a, const EventHit& b) { return a.event < b.event; });
+    std::stable_sort(first, last, [](const EventHit& a, const EventHit& b) { return a.event < b.event; });
     for (auto hit = first; hit != last; ++hit) {
       const Event& event = events_[hit->event];
-      if (!event.at) watches_[hit->event].ticks = std::round(std::abs(hit->sample.time - start_) / event.every);
+      if (!event.at)
+        watches_[hit->event].ticks = std::round(std::abs(hit->sample.time - start_) / event.every);
       if (event.condition && !(event.condition(hit->sample.point()) > 0.0)) continue;
       acting = acting || event.acts() || event.stop;
       kept.push_back(*hit);

@@ -308,8 +308,7 @@ TEST_F(ActingEvents, ASlidingModeIsTold) {
       relay +
       "[[events]]\nname = \"down\"\nwhen = \"x + v_x\"\ndirection = \"rising\"\nset = { u = \"-1\" }\n"
       "[[events]]\nname = \"up\"\nwhen = \"x + v_x\"\ndirection = \"falling\"\nset = { u = \"1\" }\n";
-  const std::string one =
-      relay + "[[events]]\nname = \"flip\"\nwhen = \"x + v_x\"\nset = { u = \"-u\" }\n";
+  const std::string one = relay + "[[events]]\nname = \"flip\"\nwhen = \"x + v_x\"\nset = { u = \"-u\" }\n";
   for (const std::string& text : {two, one})
     for (const char* steps : {"", "--step 0.07", "--step 1", "--adaptive"}) {
       const Outcome outcome = run("run " + scene(text) + " " + steps);
