@@ -9,7 +9,7 @@ namespace diracstep {
 namespace {
 
 constexpr std::size_t most_parts_of_a_step = 40;
-constexpr int most_tries = 60, most_halvings = 20, most_returns = 2;
+constexpr int most_tries = 60, most_halvings = 20, most_returns = 2, most_hidden = 4;
 constexpr double finest_part = 1e-14, returned_within = 1e-6;  // of the step
 constexpr double reach_of_estimates = 2.0;                     // in changes within a step
 
@@ -41,10 +41,29 @@ int StepDivision::first_change() const {
   return -1;
 }
 
+/// Where between the ends of a step, in parts of it, a kink is on another side than at both; 0 where none.
+double StepDivision::hidden_place(Interval step, const State& start, const State& end) {
+  if (start.q.size() != start.v.size()) return 0.0;  // points that cannot be subtracted
+  velocity_ = (end.q - start.q) / step.size;
+  speed_up_ = velocity_ - start.v;  // in the time of the step
+  for (const double place : {0.5, 0.25, 0.75}) {
+    position_ = start.q + place * step.size * velocity_ - 0.5 * place * (1.0 - place) * step.size * speed_up_;
+    between_.resize(kinks_->count());
+    kinks_->evaluate(step.start + place * step.size, position_, velocity_ + (place - 0.5) * speed_up_,
+                     between_);
+    for (Eigen::Index k = 0; k < between_.size(); ++k)
+      if (kinks_->kinds()[static_cast<std::size_t>(k)] == Kinks::Kind::kink && before_[k] * after_[k] > 0.0 &&
+          between_[k] * before_[k] < 0.0)
+        return place;
+  }
+  return 0.0;
+}
+
 bool StepDivision::crosses(Interval step, const State& start, const State& end) {
   const double end_time = step.start + step.size;
   read(step.start, start, false, before_);
   read(end_time, end, false, after_);
+  if (hidden_place(step, start, end) > 0.0) return true;
   const auto nearest = before_.cwiseAbs().cwiseMin(after_.cwiseAbs()).array();
   const auto change = (after_ - before_).cwiseAbs().array();
   if (!(before_.array() * after_.array() <= 0.0 || nearest <= reach_of_estimates * change).any())
@@ -64,13 +83,15 @@ StepSequence::Outcome StepDivision::solve(Interval step, const State& start, Gue
   if (kinks_ == nullptr || (outcome.ok() && !crosses(step, start, sequence_->end()))) return outcome;
   undivided_ = parts_;
   const bool followed = follow(start, work);
-  if (followed && parts_.size() > undivided_.size()) {
+  if (followed && !passed_.empty()) {
     StepSequence::Outcome in_parts = sequence_->solve(parts_, start, Guess::plain, work);
-    divided_ = true;
-    if (in_parts.ok()) return in_parts;
+    if (in_parts.ok()) {
+      divided_ = true;
+      return in_parts;
+    }
   }
   parts_ = undivided_;
-  divided_ = false;
+  divided_ = divided_ && stuck_.empty();
   passed_.clear();
   // end() is that of the last try.
   return outcome.ok() ? sequence_->solve(parts_, start, Guess::plain, work) : outcome;
@@ -80,7 +101,7 @@ StepSequence::Outcome StepDivision::solve(Interval step, const State& start, Gue
 bool StepDivision::follow(const State& start, Work& work) {
   State from = start;
   const double whole = std::abs(undivided_.back().start + undivided_.back().size - undivided_.front().start);
-  int crossed = -1, returns = 0;
+  int crossed = -1, returns = 0, hidden = 0;
   parts_.clear();
   for (const Interval& given : undivided_)
     for (double left = given.size;;) {
@@ -92,8 +113,16 @@ bool StepDivision::follow(const State& start, Work& work) {
         if (k > 0) part.size *= 0.5;
         solved = sequence_->solve({&part, 1}, from, Guess::plain, work).ok();
       }
-      if (!solved) return give_up(crossed, part.start);
+      if (!solved) return crossed >= 0 && give_up(crossed, part.start);
       read(part.start + part.size, sequence_->end(), true, after_);
+      if (const double place =
+              first_change() < 0 && hidden < most_hidden ? hidden_place(part, from, sequence_->end()) : 0.0;
+          place > 0.0) {
+        ++hidden;
+        part.size *= place;
+        if (!sequence_->solve({&part, 1}, from, Guess::plain, work).ok()) return false;
+        read(part.start + part.size, sequence_->end(), true, after_);
+      }
       int number = first_change(), last = -1;
       // Each function once: several vanish together, as those of v > 0 and v < 0.
       for (int k = 0; k < kinks_->count() && number >= 0 && std::abs(part.size) > finest_part * whole; ++k) {

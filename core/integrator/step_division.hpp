@@ -14,9 +14,11 @@ namespace diracstep {
 ///
 /// A step at whose end a switching function has another sign than at its start is solved again, shorter,
 /// until it ends a round-off of the time behind the zero, by a bracketed secant method on its size; the rest
-/// follows.  Pairs of zeros within a step show in no sign at its end and are not seen.  Where the motion
-/// crosses one kink again and again, as at a force that jumps and points back from both sides, the step is
-/// solved undivided, and stuck() says so.
+/// follows.  A pair of zeros within a step shows in no sign at its end: it is looked for at three places
+/// along a parabola through the ends, whose curvature is that of the mean velocities of this and the last
+/// step; so pairs that are narrow beside a step, and flat ones, are not seen.  Where the motion crosses one
+/// kink again and again, as at a force that jumps and points back from both sides, the step is solved
+/// undivided, and stuck() says so.
 ///
 /// What is done depends on the step and its start alone.
 class StepDivision {
@@ -41,6 +43,7 @@ class StepDivision {
  private:
   void read(double t, const State& at, bool exactly, Vector& switches);
   bool crosses(Interval step, const State& start, const State& end);
+  double hidden_place(Interval step, const State& start, const State& end);
   int first_change() const;
   bool follow(const State& start, Work& work);
   bool shorten(int number, Interval& part, const State& from, Work& work);
@@ -55,7 +58,7 @@ class StepDivision {
   std::vector<KinkPassed> passed_;
   std::string stuck_;
   bool divided_ = false;
-  Vector before_, after_, velocity_;
+  Vector before_, after_, between_, velocity_, speed_up_, position_;
 };
 
 }  // namespace diracstep
