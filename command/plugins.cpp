@@ -99,6 +99,19 @@ std::function<CatalogueScene(const Parameters&)> scene_maker(const Session& sess
   };
 }
 
+std::string acting_events(const CatalogueScene& entry) {
+  std::string names;
+  for (const Event& event : entry.events)
+    if (event.acts() || event.stop) names += (names.empty() ? "" : ", ") + event.name;
+  return names;
+}
+
+void tell_events_left_out(const CatalogueScene& entry) {
+  if (const std::string names = acting_events(entry); !names.empty())
+    say(fmt::format("the events of scene '{}' ({}) are not looked for: this is its motion without them",
+                    entry.scene->name, names));
+}
+
 CatalogueScene make_scene(const Session& session, const std::string& name, const Parameters& changes) {
   CatalogueScene entry = scene_maker(session, name)(changes);
   for (const std::string& change : entry.changes) say(entry.scene->name + ": " + change);

@@ -46,6 +46,11 @@ void load_plugins(Session& session);
 /// Misuse as diracstep::make_scene does.
 CatalogueScene make_scene(const Session& session, const std::string& name, const Parameters& changes = {});
 
+/// "bounce, lands": the events of a scene that change its motion or end it; empty where there are none.
+std::string acting_events(const CatalogueScene& entry);
+/// Says on standard error that these are not looked for, where there are some.
+void tell_events_left_out(const CatalogueScene& entry);
+
 /// Makes such scenes with many values of the parameters, and tells nothing.  The session must outlive it.
 std::function<CatalogueScene(const Parameters&)> scene_maker(const Session& session, const std::string& name);
 

@@ -190,6 +190,7 @@ std::string as_json(const CatalogueScene& entry, const Found& found) {
 
 void equilibrium(const EquilibriumArguments& options, Session& session) {
   const CatalogueScene entry = make_scene(session, options.scene, parameters(options.set));
+  tell_events_left_out(entry);
   const Found found = find(options, entry);
   print(options.json ? as_json(entry, found) : as_text(entry, found));
   if (!found.at.ok()) {

@@ -105,6 +105,9 @@ void plan(const PlanArguments& options, Session& session) {
   else
     add_direct_line(entry, session, used, lines);
   if (chosen && damped) lines.insert(lines.begin(), {"method", "by default", chosen->reason});
+  if (const std::string acting = acting_events(entry); !acting.empty())
+    lines.push_back({"events", acting,
+                     "a step in which one acts is taken up to its time, and the motion goes on from there"});
   for (const std::string& change : entry.changes) lines.push_back({"scene", "changed", change});
   if (choice.name != options.method.name)
     lines.push_back({"method", choice.name, "the scene's file recommends it"});

@@ -15,6 +15,7 @@
 #include <diracstep/core/adaptive/checked_motion.hpp>
 #include <diracstep/core/adaptive/damping_survey.hpp>
 #include <diracstep/core/adaptive/error_control.hpp>
+#include <diracstep/core/adaptive/error_with_events.hpp>
 #include <diracstep/core/adaptive/rate_monitor.hpp>
 #include <diracstep/core/adaptive/variable_run_checks.hpp>
 #include <diracstep/core/numerics/errors.hpp>
@@ -266,13 +267,18 @@ ErrorControlReport search(const RunArguments& options, const CatalogueScene& ent
   wanted.max_solves = options.max_solves.value_or(wanted.max_solves);
   wanted.max_time = options.max_time.value_or(wanted.max_time);
   wanted.go_on = [] { return !interrupted(); };
+  if (!entry.events.empty()) {
+    if (!options.step) wanted.first_step = std::abs(entry.natural_step);
+    return solve_events_to_error(entry.scene, entry.all_rows, entry.events, session.registry, session.solvers,
+                                 end, wanted);
+  }
   return solve_to_error(entry.scene, session.registry, session.solvers, end, wanted);
 }
 
 /// The run that the search ended with: its end, and again point by point where a file or another momentum is
 /// asked for.
 IntegratorOptions take_found(const RunArguments& options, const CatalogueScene& entry, const Session& session,
-                             RunResult& result) {
+                             double end, RunResult& result) {
   const ErrorControlReport& found = *result.search;
   result.failure = found.refusal;
   if (const std::string ended = "interrupted"; interrupted() && result.failure.ends_with(ended))
@@ -287,6 +293,7 @@ IntegratorOptions take_found(const RunArguments& options, const CatalogueScene& 
   used.method = found.method;
   used.order = found.order;
   used.step = found.step;
+  if (found.ok() && !entry.events.empty()) return run_once(options, entry, session, used, end, result);
   if (!found.ok() || (options.out.empty() && result.momentum == Momentum::projected)) return used;
   std::optional<TrajectoryFile> file;
   open_trajectory(file, options, entry, std::nullopt);
@@ -306,8 +313,8 @@ IntegratorOptions take_found(const RunArguments& options, const CatalogueScene& 
 /// Throws Misuse for runs that do not look for events, where the scene has some.
 void require_events_found(const CatalogueScene& entry, const RunArguments& options) {
   if (entry.events.empty()) return;
-  if (options.error)
-    throw Misuse("--error does not go with the events of the scene: name a method and a step");
+  if (options.error && options.adaptive)
+    throw Misuse("--error takes fixed steps through the events of the scene: leave --adaptive out");
   const bool times = !options.at.empty() || options.every_time,
              ends = std::ranges::any_of(entry.events, [](const Event&e) { return e.stop || e.acts(); });
   if (times && (options.adaptive || ends))
@@ -388,7 +395,7 @@ void run(const RunArguments& given, Session& session) {
   used.substeps = options.substeps;
   if (options.error) {
     result.search = search(options, entry, session, end, used);
-    used = take_found(options, entry, session, result);
+    used = take_found(options, entry, session, end, result);
   } else {
     choose_method(options, entry, session, end, given.step.has_value(), used);
     used = run_once(options, entry, session, used, end, result);

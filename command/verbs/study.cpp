@@ -393,6 +393,7 @@ class Screen {
 void study(const StudyArguments& options, Session& session) {
   require_files(options, session);
   std::vector<CatalogueScene> scenes = chosen_scenes(options, session);
+  std::ranges::for_each(scenes, tell_events_left_out);
   const StudyOptions chosen = study_options(options);
   const std::string before = options.compare.empty() ? "" : earlier_study(options.compare);
   std::optional<OutputDirectory> out = report_directory(options);

@@ -109,7 +109,7 @@ AdaptiveIntegrator::AdaptiveIntegrator(const std::shared_ptr<const Scene>& scene
   if (adaptive_.control == StepControl::local_error) {
     whole_.emplace(std::make_shared<const Scene>(main_.scene()), registry, solvers, options_);
     local_.emplace(adaptive_.eps, main_.options().order, span(), adaptive_.smallest_step);
-    if (adaptive_.end) landings_ = landings(main_.scene(), *adaptive_.end);
+    if (adaptive_.end) instants_ = instants_on_the_way(main_.scene(), *adaptive_.end);
   } else {
     meter_.emplace(make_meter(main_.scene(), solvers, adaptive_, options_.step, report_.accelerations));
   }

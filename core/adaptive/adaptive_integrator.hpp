@@ -117,7 +117,7 @@ class AdaptiveIntegrator {
   void go_on_local_control();
   StepReport error_step();
   StepReport side_steps_to(double t);
-  double up_to_landing(double size) const;
+  double up_to_instant(double size) const;
   StepReport control_step(double size);
   StepReport solve_size(double eps, double guess, double& size);
   bool measure(bool growth);
@@ -136,8 +136,8 @@ class AdaptiveIntegrator {
   std::optional<RateMeter> meter_;
   std::optional<Integrator> whole_;  ///< the whole steps beside halves of them
   Work local_work_;                  ///< of these and of the main sequence
-  std::vector<Landing> landings_;
-  std::size_t landing_ = 0;  ///< the next one
+  std::vector<double> instants_;     ///< that steps by their local error end at
+  std::size_t instant_ = 0;          ///< the next one
   double sign_;
   Rate rate_;  ///< at the current node
   Vector v_;   ///< there

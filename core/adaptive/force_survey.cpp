@@ -162,7 +162,7 @@ ForceSurveyReport ForceSurvey::along(const std::vector<PathPoint>& path, long pa
     gap = std::copysign(force_.closest(b), b - a);
     report.stretches.back().end -= gap;
     whole_ = false;
-    if (switches_at(cubic, next)) continue;  // every run has a node there: KinkSteps
+    if (switches_at(cubic, next)) continue;  // every run has a node there: StepDivision
     report.missed = HUGE_VAL;
     report.time = b;
   }

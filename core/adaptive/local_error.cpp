@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <cmath>
 #include <diracstep/core/adaptive/local_error.hpp>
-#include <diracstep/core/adaptive/step_plan.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/numerics/scales.hpp>
 #include <limits>
@@ -10,7 +9,7 @@ namespace diracstep {
 
 namespace {
 
-constexpr std::size_t most_pulses = 200;
+constexpr std::size_t most_instants = 200;
 constexpr double below_eps = 0.9, most_growth = 10.0, most_shrinking = 0.1, after_failure = 0.25;
 constexpr double of_the_rate = 1e-6;  // of T ẏ, which counts as a size
 constexpr double of_the_largest = 1e-10, above_round_off = 4e-16;
@@ -28,20 +27,14 @@ double largest_ratio(const Vector& fine, const Vector& whole, const Vector& size
 
 }  // namespace
 
-std::vector<Landing> landings(const Scene& scene, double end) {
-  std::vector<Landing> all;
+std::vector<double> instants_on_the_way(const Scene& scene, double end) {
+  std::vector<double> all;
   if (!scene.kinks) return all;
-  const std::vector<Stretch> stretches = known_stretches(scene, end);
-  for (std::size_t k = 1; k < stretches.size(); ++k)
-    all.push_back({stretches[k - 1].end, stretches[k].begin});
   const double start = scene.start.time;
-  auto pulses = scene.kinks->instants(std::min(start, end), std::max(start, end));
-  std::erase_if(pulses, [](const Kinks::Instant& instant) { return !(instant.width > 0.0); });
-  if (pulses.size() <= most_pulses)
-    for (const Kinks::Instant& pulse : pulses) all.push_back({pulse.time, pulse.time});
-  std::ranges::sort(all, [forward = end > start](const Landing& a, const Landing& b) {
-    return forward ? a.time < b.time : a.time > b.time;
-  });
+  for (const Kinks::Instant& instant : scene.kinks->instants(std::min(start, end), std::max(start, end)))
+    all.push_back(instant.time);
+  if (all.size() > most_instants) all.clear();
+  if (end < start) std::ranges::reverse(all);
   return all;
 }
 

@@ -5,15 +5,11 @@
 
 namespace diracstep {
 
-/// A time that steps are to end at, since the scene's functions jump or have a pulse there, and where they go
-/// on: behind a jump, so that no step reads both of its sides.
-struct Landing {
-  double time, resume;
-};
-
-/// Those on the way to `end` that the scene's formulas show (Scene::kinks); none where they are more than
-/// 200.
-std::vector<Landing> landings(const Scene& scene, double end);
+/// The times on the way to `end` near which the scene's functions jump or change fast, as its formulas show
+/// (Kinks::instants), in the order of the motion; none where they are more than 200.  Steps by their local
+/// error end there: both the whole and its halves could pass a pulse by, and behind a jump a small step is
+/// tried first.
+std::vector<double> instants_on_the_way(const Scene& scene, double end);
 
 /// The size of ordinary variable steps, by their local error: for methods of the damping family, which are
 /// not reversible at any size.

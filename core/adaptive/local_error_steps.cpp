@@ -20,21 +20,21 @@ void AdaptiveIntegrator::start_local_control() {
   local_->start(main_);
   whole_->reset();
   local_work_ = {};
-  landing_ = 0;
-  next_size_ = up_to_landing(sign_ * local_->first_size());
+  instant_ = 0;
+  next_size_ = up_to_instant(sign_ * local_->first_size());
 }
 
 /// From a point that the motion has jumped to.
 void AdaptiveIntegrator::go_on_local_control() {
-  landing_ = 0;
-  while (landing_ < landings_.size() && sign_ * (landings_[landing_].resume - time()) <= 0.0) ++landing_;
-  next_size_ = up_to_landing(sign_ * std::min(std::abs(next_size_), local_->first_size()));
+  instant_ = 0;
+  while (instant_ < instants_.size() && sign_ * (instants_[instant_] - time()) <= 0.0) ++instant_;
+  next_size_ = up_to_instant(sign_ * std::min(std::abs(next_size_), local_->first_size()));
 }
 
-/// The size, or a part of what is left to the next time that a step has to end at.
-double AdaptiveIntegrator::up_to_landing(double size) const {
-  if (landing_ == landings_.size()) return size;
-  const double left = landings_[landing_].time - main_.time();
+/// The size, or a part of what is left to the next instant.
+double AdaptiveIntegrator::up_to_instant(double size) const {
+  if (instant_ == instants_.size()) return size;
+  const double left = instants_[instant_] - main_.time();
   if (std::abs(size) < 0.5 * std::abs(left)) return size;
   return std::abs(size) < 0.99 * std::abs(left) ? 0.5 * left : left;
 }
@@ -49,12 +49,11 @@ StepReport AdaptiveIntegrator::error_step() {
   local_work_.steps = report.ok() ? steps + 1 : steps;
   if (!report.ok()) return report;
   note(size);
-  if (landing_ < landings_.size() && is_same_time(time(), landings_[landing_].time, size)) {
-    main_.restart(landings_[landing_++].resume, Vector(main_.position()), Vector(main_.momentum()),
-                  Vector(main_.velocity_estimate()));
+  if (instant_ < instants_.size() && is_same_time(time(), instants_[instant_], size)) {
+    ++instant_;
     next_size_ = sign_ * std::min(std::abs(next_size_), local_->first_size());
   }
-  next_size_ = up_to_landing(next_size_);
+  next_size_ = up_to_instant(next_size_);
   return report;
 }
 

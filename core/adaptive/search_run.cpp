@@ -13,7 +13,11 @@ StepReport run_fixed(Integrator& integrator, const ErrorControlReport::Steps& st
   long left = steps.plan.steps() * steps.refinement;
   return steps.plan.run(
       integrator, steps.refinement, [&] { return at_node(read, --left == 0); },
-      [&] { return at_node(read, false); });
+      [&](const KinkPassed& kink) {
+        return at_node(
+            [&](Momentum momentum, Sample& sample) { return integrator.sample(kink, momentum, sample); },
+            false);
+      });
 }
 
 StepReport run_variable(AdaptiveIntegrator& integrator, double end, const AtNode& at_node) {

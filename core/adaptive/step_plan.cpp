@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <cmath>
-#include <diracstep/core/adaptive/kink_steps.hpp>
 #include <diracstep/core/adaptive/step_plan.hpp>
 #include <diracstep/core/runs/run.hpp>
 #include <limits>
@@ -45,10 +44,8 @@ double StepPlan::mean_step(long refinement) const {
 }
 
 StepReport StepPlan::run(Integrator& integrator, long refinement, const std::function<bool()>& at_node,
-                         const std::function<bool()>& at_part) const {
+                         const std::function<bool(const KinkPassed&)>& at_kink) const {
   StepReport report;
-  KinkSteps steps(integrator);
-  bool goes_on = true;
   for (const Stretch& stretch : stretches_) {
     if (&stretch != &stretches_.front()) {
       const Vector q = integrator.position(), p = integrator.momentum(), v = integrator.velocity_estimate();
@@ -56,8 +53,13 @@ StepReport StepPlan::run(Integrator& integrator, long refinement, const std::fun
     }
     const double h = step_in(stretch, refinement);
     for (long k = 0; k < stretch.steps * refinement; ++k) {
-      report = steps.step(h, [&] { return goes_on = at_part(); });
-      if (!report.ok() || !goes_on || !at_node()) return report;
+      report = integrator.step(h);
+      if (!integrator.stuck_at_kink().empty()) {
+        report.solve.status = SolveStatus::no_convergence;
+        report.failure = integrator.stuck_at_kink();
+      }
+      if (!report.ok() || !std::ranges::all_of(integrator.kinks_passed(), at_kink) || !at_node())
+        return report;
     }
   }
   return report;

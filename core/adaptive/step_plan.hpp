@@ -38,10 +38,10 @@ class StepPlan {
   /// The mean step of a run, with its sign.
   double mean_step(long refinement) const;
 
-  /// Steps through the motion; `at_node` is called after each step, `at_part` where a step is divided at a
-  /// kink (KinkSteps), and both end the run with false.
+  /// Steps through the motion; `at_kink` is called where a step has passed a kink in q or v, `at_node` after
+  /// each step, and both end the run with false.  Fails where a step crosses a kink again and again.
   StepReport run(Integrator& integrator, long refinement, const std::function<bool()>& at_node,
-                 const std::function<bool()>& at_part) const;
+                 const std::function<bool(const KinkPassed&)>& at_kink) const;
 
  private:
   static double step_in(const Stretch& stretch, long refinement) {

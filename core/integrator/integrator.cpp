@@ -3,8 +3,8 @@
 #include <diracstep/core/integrator/point_reader.hpp>
 #include <diracstep/core/integrator/prepared_scene.hpp>
 #include <diracstep/core/integrator/step_design.hpp>
+#include <diracstep/core/integrator/step_division.hpp>
 #include <diracstep/core/integrator/step_sequence.hpp>
-#include <diracstep/core/integrator/time_kinks.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/system/contradictory_rows.hpp>
 #include <sstream>
@@ -49,10 +49,9 @@ Integrator::Integrator(PreparedScene prepared, const Registry& registry, const S
       reader_(std::make_unique<PointReader>(scene_, solvers, matrices_.full)),
       sequence_(std::make_unique<StepSequence>(
           scene_, design_step(scene_, registry, method_, options_, matrices_.full), solvers, *reader_)),
-      time_kinks_(std::make_unique<TimeKinks>(scene_->kinks, scene_->start.time, options_.step)),
+      division_(std::make_unique<StepDivision>(scene_, options_.step, *reader_, *sequence_)),
       solved_stages_(std::make_unique<std::vector<SolvedStage>>()),
       left_out_(scene_->whole ? std::make_unique<LeftOutRows>(*scene_) : nullptr) {
-  parts_.reserve(4);
   reset(scene_->start);
 }
 
@@ -123,14 +122,12 @@ StepReport Integrator::take(double h, Guess guess) {
   const Interval step{time(), h};
   if (const std::string fault = fault_of_own_rows(options_, *scene_, step.start, state_.q); !fault.empty())
     return failed({.status = SolveStatus::refused}, step.start, fault);
-  time_kinks_->divide(step, parts_);
-  met_kinks_ = parts_.size() > 1 || parts_.front().size != h;
-  StepSequence::Outcome outcome =
-      sequence_->solve(parts_, state_, parts_.size() == 1 ? guess : Guess::plain, work_);
-  std::size_t pieces = parts_.size();
+  StepSequence::Outcome outcome = division_->solve(step, state_, guess, work_);
+  const std::vector<Interval>& parts = division_->parts();
+  std::size_t pieces = parts.size();
   for (int more = 2; !outcome.ok() && more <= options_.substeps; more *= 2) {
     pieces_.clear();
-    for (const Interval& part : parts_)
+    for (const Interval& part : parts)
       for (int k = 0; k < more; ++k)
         pieces_.push_back({part.start + k * (part.size / more), part.size / more});
     StepSequence::Outcome divided = sequence_->solve(pieces_, state_, Guess::plain, work_);
@@ -168,13 +165,14 @@ std::string Integrator::kink_ahead(double h) const {
 /// Empty, or what rows left out as redundant demand otherwise than the others: at the end of the step just
 /// solved, along a line to there, and at the pulses that the formulas show.
 std::string Integrator::broken_left_out_row(const Vector& end) {
-  const Interval step{parts_.front().start, parts_.back().start + parts_.back().size - parts_.front().start};
+  const std::vector<Interval>& parts = division_->parts();
+  const Interval step{parts.front().start, parts.back().start + parts.back().size - parts.front().start};
   std::vector<double> times;
   if (left_out_->has_rates()) {
-    for (const Interval& part : parts_)
+    for (const Interval& part : parts)
       for (const double place : {0.146, 0.382, 0.618, 0.854, 1.0})
         times.push_back(part.start + place * part.size);
-    time_kinks_->add_pulses(step, times);
+    division_->add_pulses(step, times);
   }
   std::string text = left_out_->broken_at(step.start + step.size, end);
   for (const double t : times) {
@@ -201,9 +199,17 @@ void Integrator::accept_step(double h, std::size_t pieces) {
   ++work_.steps;
 }
 
+bool Integrator::met_kinks() const { return division_->divided(); }
+std::span<const KinkPassed> Integrator::kinks_passed() const { return division_->passed(); }
+const std::string& Integrator::stuck_at_kink() const { return division_->stuck(); }
+
 void Integrator::record_stages(bool wanted) {
   solved_stages_->clear();
   sequence_->record_into(wanted ? solved_stages_.get() : nullptr);
+}
+
+SolveReport Integrator::sample(const KinkPassed& at, Momentum momentum, Sample& sample) {
+  return reader_->read(at.time, at.at, momentum, sample);
 }
 
 SolveReport Integrator::sample(Momentum momentum, Sample& sample) {

@@ -3,6 +3,7 @@
 #include <diracstep/core/integrator/clock.hpp>
 #include <diracstep/core/integrator/guess.hpp>
 #include <diracstep/core/integrator/integrator_options.hpp>
+#include <diracstep/core/integrator/kink_passed.hpp>
 #include <diracstep/core/integrator/sample.hpp>
 #include <diracstep/core/integrator/solved_stage.hpp>
 #include <diracstep/core/integrator/step_report.hpp>
@@ -12,14 +13,16 @@
 #include <diracstep/core/system/scene.hpp>
 #include <memory>
 #include <optional>
+#include <span>
+#include <string>
 #include <vector>
 
 namespace diracstep {
 
 class LeftOutRows;
 class PointReader;
+class StepDivision;
 class StepSequence;
-class TimeKinks;
 struct PreparedScene;
 
 /// Steps a scene with one method.  Owns every workspace and its solvers, and shares nothing: integrators on
@@ -41,7 +44,8 @@ class Integrator {
   void reset(const Start& start);
 
   /// One step, of the size in the options.  Where a function of the scene jumps or has a kink at a known time
-  /// (Scene::kinks) the step is taken in parts that meet there, so that it keeps its order.
+  /// or where the motion crosses it (Scene::kinks), the step is taken in parts that meet there, so that it
+  /// keeps its order (step_division.hpp).
   StepReport step() { return step(options_.step); }
 
   /// One step of size h, which may change from step to step and be negative.  Throws Misuse for a step that
@@ -63,7 +67,11 @@ class Integrator {
   const Vector& velocity_estimate() const { return state_.v; }
   const Work& work() const { return work_; }
   /// Whether the last step was taken in parts at such times.
-  bool met_kinks() const { return met_kinks_; }
+  bool met_kinks() const;
+  /// Where it crossed kinks in q and v.
+  std::span<const KinkPassed> kinks_passed() const;
+  /// Empty, or why the last step crossed a kink undivided: the motion crosses it again and again.
+  const std::string& stuck_at_kink() const;
   const Scene& scene() const { return *scene_; }
   const IntegratorOptions& options() const { return options_; }
   const MethodInfo& method() const { return method_.info; }
@@ -71,6 +79,8 @@ class Integrator {
   /// Reads the current point.  Stepping goes on as if nothing was read, bit by bit; the work is not counted.
   /// `minus` solves the next step, its first stage where it is composed, on a copy: it takes as long again.
   SolveReport sample(Momentum momentum, Sample& sample);
+  /// Reads a point that the last step passed; not `minus`.
+  SolveReport sample(const KinkPassed& at, Momentum momentum, Sample& sample);
 
   std::vector<PlanLine> plan() const;
 
@@ -116,11 +126,10 @@ class Integrator {
   MatrixForm matrices_;
   std::unique_ptr<PointReader> reader_;  // the sequence refers to it, also after a move
   std::unique_ptr<StepSequence> sequence_;
-  std::unique_ptr<TimeKinks> time_kinks_;
+  std::unique_ptr<StepDivision> division_;
   std::unique_ptr<std::vector<SolvedStage>> solved_stages_;  // the sequence refers to it, also after a move
   std::unique_ptr<LeftOutRows> left_out_;                    ///< null where no rows are left out
-  std::vector<Interval> parts_, pieces_;                     ///< of the step
-  bool met_kinks_ = false;
+  std::vector<Interval> pieces_;                             ///< of the step
 
   Clock clock_;
   State state_;

@@ -12,6 +12,24 @@ constexpr int most_readings = 100;
 constexpr double round_off_of_times = 4.0 * std::numeric_limits<double>::epsilon();
 constexpr double same_instant = 1e-9;  // in steps
 constexpr double round_off_of_values = 1e-13;
+constexpr double just_crossed = std::numeric_limits<double>::min();  // the sign is what counts
+
+/// Whether all that an event does is to set coordinates and states, as the relay of a controller.  Jumps of
+/// the velocity are reflections, and rows hold what vanishes: these turn a motion back by intent.
+bool only_sets_values(const Event& event) {
+  return !event.set.empty() && !event.restitution && event.on.empty() && event.off.empty() &&
+         std::ranges::none_of(event.set, &Event::Setting::second);
+}
+
+/// How often a clock has ticked at t; ticks within round-off of t have.
+double ticks_at(double t, double start, double every) {
+  const double passed = std::abs(t - start);
+  const double round_off =
+      16.0 * std::numeric_limits<double>::epsilon() * std::max(std::abs(t), std::abs(start));
+  double ticks = std::floor(passed / every);
+  while ((ticks + 1.0) * every <= passed + round_off && ticks + 1.0 > ticks) ticks += 1.0;
+  return ticks;
+}
 
 }  // namespace
 
@@ -103,7 +121,7 @@ StepReport EventSearch::tick(std::size_t event, const Sample& point, const Read&
                      ", more than " + to_text(most_ticks) + " times in a step of " + to_text(std::abs(step));
     return report;
   }
-  for (double ticks = watch.ticks + 1.0;; ticks += 1.0) {
+  for (double ticks = watch.ticks + 1.0;; ticks += 1.0) {  // counted where they are kept
     const double t = start_ + std::copysign(ticks * events_[event].every, step);
     const double left = (point.time - t) / step;
     if (!(left > -same_instant)) return {};
@@ -112,47 +130,79 @@ StepReport EventSearch::tick(std::size_t event, const Sample& point, const Read&
       if (StepReport report = read(t, hit.sample); !report.ok()) return report;
     met_.push_back(std::move(hit));
     if (events_[event].acts()) return {};
-    watch.ticks = ticks;
   }
 }
 
-/// Whether the last of them acts or stops the run; an event whose condition does not hold is none.
+/// Whether the last of them acts or stops the run; an event whose condition does not hold is none.  Those of
+/// one instant come in the order of the scene.
 bool EventSearch::keep_first_that_acts(const Sample& point) {
   const double step = point.time - last_time_, sense = step >= 0.0 ? 1.0 : -1.0;
+  const auto apart = [&](const EventHit& one, const EventHit& other) {
+    return std::abs(one.sample.time - other.sample.time) > same_instant * std::abs(step);
+  };
   std::ranges::stable_sort(met_, {}, [&](const EventHit& hit) { return sense * hit.sample.time; });
   std::vector<EventHit> kept;
   bool acting = false;
-  for (const EventHit& hit : met_) {
-    const Event& event = events_[hit.event];
-    if (acting && std::abs(hit.sample.time - kept.back().sample.time) > same_instant * std::abs(step)) break;
-    if (event.condition && !(event.condition(hit.sample.point()) > 0.0)) continue;
-    acting = acting || event.acts() || event.stop;
-    kept.push_back(hit);
+  for (auto first = met_.begin(), last = first; first != met_.end() && !acting; first = last) {
+    last = std::find_if(first, met_.end(), [&](const EventHit& hit) { return apart(*first, hit); });
+    std::stable_sort(first, last, [](const EventHit& a, const EventHit& b) { return a.event < b.event; });
+    for (auto hit = first; hit != last; ++hit) {
+      const Event& event = events_[hit->event];
+      if (!event.at)
+        watches_[hit->event].ticks = std::round(std::abs(hit->sample.time - start_) / event.every);
+      if (event.condition && !(event.condition(hit->sample.point()) > 0.0)) continue;
+      acting = acting || event.acts() || event.stop;
+      kept.push_back(*hit);
+    }
   }
-  at_zero_.clear();
-  if (acting)
-    for (const EventHit& hit : met_)
-      if (std::abs(hit.sample.time - kept.back().sample.time) <= same_instant * std::abs(step))
-        at_zero_.push_back(hit.event);
   met_ = std::move(kept);
+  at_zero_.clear();
+  if (acting) mark_zeros(met_.back().sample);
   return acting;
+}
+
+/// Which functions vanish at the instant of the events that act, and on which side they are then.
+void EventSearch::mark_zeros(const Sample& at) {
+  constexpr double round_off_of_a_zero = 1e-12;
+  for (std::size_t k = 0; k < events_.size(); ++k) {
+    Watch& watch = watches_[k];
+    watch.behind = 0;
+    if (!events_[k].at || !watch.awake || watch.last == 0.0) continue;
+    const double here = events_[k].at(at.point());
+    const double slope = std::abs((here - watch.last) / (at.time - last_time_));
+    watch.zero = round_off_of_a_zero * watch.largest +
+                 4.0 * round_off_of_times * std::abs(at.time) * (std::isfinite(slope) ? slope : 0.0);
+    if (!(std::abs(here) <= watch.zero)) continue;
+    watch.behind = watch.last > 0.0 ? -1 : 1;
+    at_zero_.push_back(k);
+  }
+}
+
+/// Whether an event is due at once: what acted has turned its function back from a zero just crossed.
+bool EventSearch::turned_back(std::size_t event, double rate) {
+  Watch& watch = watches_[event];
+  const int side = rate > 0.0 ? 1 : -1;
+  if (watch.behind == 0 || rate == 0.0 || side == watch.behind) return false;
+  const bool due = changes(event, watch.behind, side);
+  watch.behind = side;
+  return due && only_sets_values(events_[event]);
 }
 
 std::vector<std::size_t> EventSearch::go_on(const Sample& point, const std::vector<Left>& left,
                                             const std::vector<bool>& awake) {
   std::vector<std::size_t> due;
-  const double passed = std::abs(point.time - start_);
   for (std::size_t k = 0; k < events_.size(); ++k) {
     Watch& watch = watches_[k];
     const bool woken = awake[k] && !watch.awake;
     watch.awake = awake[k];
     watch.met_at_last = false;
     if (!events_[k].at) {
-      watch.ticks = std::floor(passed / events_[k].every * (1.0 + 1e-12) + same_instant);
+      if (woken) watch.ticks = ticks_at(point.time, start_, events_[k].every);
       continue;
     }
     if (!watch.awake) continue;
     if (const auto found = std::ranges::find(left, k, &Left::event); found != left.end()) {
+      if (turned_back(k, found->rate)) due.push_back(k);
       watch.left = true;
       watch.last = found->rate;
       continue;
@@ -164,6 +214,8 @@ std::vector<std::size_t> EventSearch::go_on(const Sample& point, const std::vect
     // What switches rows on is near its zero when they have just been switched off.
     if (woken && !events_[k].on.empty()) continue;
     watch.last = here;
+    if (watch.behind != 0 && std::abs(here) <= watch.zero)
+      watch.last = only_sets_values(events_[k]) ? watch.behind * just_crossed : 0.0;
     const Event::Direction direction = events_[k].direction;
     if (woken && ((direction == Event::Direction::rising && here > 0.0) ||
                   (direction == Event::Direction::falling && here < 0.0)))

@@ -24,6 +24,10 @@ struct EventHit {
 /// there, and changes between values below 1e-13 of the largest so far are round-off.  Two changes between
 /// neighbouring points cancel and are not seen, but for a contact that was just left: there g/(t − t_left) is
 /// looked at, which is the rate at t_left, so that a return within the same step is found.
+///
+/// Where events act, every function that vanishes there has crossed its zero, whatever its last digit says:
+/// where what acted turns it back, as a relay at its switching surface, it crosses again.  Events whose times
+/// differ by less than 1e-9 of a step are of one instant, and come in the order of the scene.
 class EventSearch {
  public:
   /// Reads the motion at a time between the last two points.
@@ -63,6 +67,8 @@ class EventSearch {
     bool left = false;         ///< a contact that was left at the last point, at the rate `last`
     double ticks = 0.0;        ///< of a clock so far
     double largest = 0.0;      ///< value so far, without sign: far smaller ones are round-off
+    int behind = 0;            ///< its sign behind the zero at which events act; 0 where it does not vanish
+    double zero = 0.0;         ///< what its value may be there
   };
   /// An event's function between two points, bracketed.
   struct Bracket {
@@ -77,6 +83,8 @@ class EventSearch {
   StepReport tick(std::size_t event, const Sample& point, const Read& read);
   StepReport locate(Bracket bracket, const Sample& point, const Read& read, EventHit& hit) const;
   bool keep_first_that_acts(const Sample& point);
+  void mark_zeros(const Sample& at);
+  bool turned_back(std::size_t event, double rate);
 
   std::vector<Event> events_;
   std::vector<Watch> watches_;

@@ -44,24 +44,29 @@ struct Stepping<Integrator> {
   }
 };
 
-/// Watches one event: whether it comes ever faster.
+/// Watches one event: whether it comes ever faster, or again and again while no time passes.
 class ZenoWatch {
  public:
-  /// The event was met at t; `scale` is the time that has passed.  The time at which it would have been met
-  /// infinitely often where that is about to happen, else NaN.
-  double met(double t, double scale) {
+  /// The event was met at t; `scale` is the time that has passed.
+  void meet(double t, double scale) {
     const double gap = std::abs(t - last_);
+    at_once_ = gap <= round_off * std::max(std::abs(t), scale) ? at_once_ + 1 : 0;
     shrinking_ = std::isfinite(gap) && gap < slowest * gap_ ? shrinking_ + 1 : 0;
     const double ratio = gap / gap_, left = (t - last_) * ratio / (1.0 - ratio);
+    limit_ = shrinking_ >= 3 && gap < part * scale ? t + left : std::nan("");
     last_ = t;
     gap_ = gap;
-    return shrinking_ >= 3 && gap < part * scale ? t + left : std::nan("");
   }
+  /// The time at which it would be met infinitely often where that is about to happen, else NaN.
+  double limit() const { return limit_; }
+  /// Met so often at one time.
+  bool chatters() const { return at_once_ >= most_at_once; }
 
  private:
-  static constexpr double slowest = 0.9999, part = 1e-9;
-  double last_ = std::nan(""), gap_ = std::nan("");
-  int shrinking_ = 0;
+  static constexpr double slowest = 0.9999, part = 1e-9, round_off = 1e-13;
+  static constexpr int most_at_once = 10;
+  double last_ = std::nan(""), gap_ = std::nan(""), limit_ = std::nan("");
+  int shrinking_ = 0, at_once_ = 0;
 };
 
 }  // namespace detail
@@ -184,7 +189,15 @@ class EventSteps {
     return report;
   }
 
-  static constexpr int most_at_once = 100;  // events at one time
+  static std::string slides(const Event& event, double t) {
+    return "event '" + event.name + "' acts again and again at t = " + to_text(t, 10) +
+           ", and no time passes: what is set there turns the motion back to where it is set (sliding mode), "
+           "from both sides; leave a band between the events, make the force steep instead of a jump, as "
+           "tanh(g/width), or hold the motion there by a row that is switched on";
+  }
+
+  static constexpr int most_at_once = 100;         // events at one time
+  static constexpr long most_in_a_step = 100'000;  // that act
 
   Make make_;
   Momentum momentum_;
@@ -233,6 +246,7 @@ StepReport EventSteps<Stepper>::step(double size) {
   if (!begun_)
     if (StepReport report = begin(); !report.ok()) return report;
   const double end = time() + size;
+  const long acts_at_start = acts_;
   for (bool first = true;; first = false) {
     const detail::Node from = node();
     StepReport report;
@@ -246,6 +260,10 @@ StepReport EventSteps<Stepper>::step(double size) {
     if (!report.ok()) return failed(std::string("reading the state: ") + describe(report.solve.status));
     const long before = acts_;
     if (report = look(from, here); !report.ok()) return report;
+    if (acts_ - acts_at_start > most_in_a_step)
+      return failed("more than " + std::to_string(most_in_a_step) + " events act in the step to t = " +
+                    to_text(end, 10) + ", the last at t = " + to_text(time(), 10) +
+                    ": they switch to and fro; leave a wider band between them, or take smaller steps");
     const bool ends_here = stopped_ || acts_ == before || !Stepping::on_a_grid;
     if (ends_here || std::abs(end - time()) <= 1e-9 * std::abs(size)) {
       ++steps_;
@@ -362,9 +380,12 @@ StepReport EventSteps<Stepper>::make_true(EventHit hit, std::vector<EventSearch:
   const Event& event = events()[hit.event];
   const double t = hit.sample.time;
   stepper().restart(t, hit.sample.q, hit.sample.p, hit.sample.v);  // where the motion ends if it cannot act
-  if (const double when = zeno_[hit.event].met(t, std::abs(t - began_at_)); std::isfinite(when))
+  detail::ZenoWatch& zeno = zeno_[hit.event];
+  zeno.meet(t, std::abs(t - began_at_));
+  if (zeno.chatters() && !event.restitution) return failed(slides(event, t));
+  if (std::isfinite(zeno.limit()))
     return failed("event '" + event.name +
-                  "' is met ever faster and infinitely often before t = " + to_text(when, 10) +
+                  "' is met ever faster and infinitely often before t = " + to_text(zeno.limit(), 10) +
                   " (Zeno), which steps cannot pass; let a second event, with a condition on the speed, end "
                   "it: set, or on = [a row that keeps the contact]");
   EventActions::Outcome outcome = actions_.act(event, hit.sample, scene());

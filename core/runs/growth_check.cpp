@@ -9,9 +9,11 @@ namespace diracstep {
 
 namespace {
 
-constexpr long most_steps_followed = 1000;
+constexpr long most_steps_followed = 1000, parts_of_a_long_run = 40, fewest_steps_of_a_part = 40;
 constexpr int most_followed = 12;  // coordinates and rows
+constexpr long points_of_a_part = 8;
 constexpr double growth_of_no_power = 1e4, too_uncertain = 0.02;
+constexpr double steady_growth = 400.0, least_share = 0.5;  // of the mean of the logarithms
 
 }  // namespace
 
@@ -24,47 +26,116 @@ Start beside(const Start& start, double position_size, double velocity_size) {
   return moved;
 }
 
-GrowthCheck::GrowthCheck(const Integrator& integrator, long steps)
-    : steps_(steps),
-      watched_(integrator.work().steps == 0 && steps <= most_steps_followed &&
-               integrator.scene().dimension() + integrator.scene().rows() <= most_followed) {}
+GrowthCheck::GrowthCheck(const Integrator& integrator, long steps) : steps_(steps) {
+  if (integrator.work().steps != 0 || steps < 1) return;
+  const bool small = integrator.scene().dimension() + integrator.scene().rows() <= most_followed;
+  if (small && steps <= most_steps_followed) {
+    parts_.push_back({0, steps});
+  } else {
+    const long least = small ? std::min(most_steps_followed, steps / 4) : 0;
+    const long length = std::max(least, steps / parts_of_a_long_run);
+    if (length < fewest_steps_of_a_part) return;
+    for (const long begin : {0L, steps / 2}) parts_.push_back({begin, length / points_of_a_part});
+  }
+  next_mark_ = 0;
+}
 
 void GrowthCheck::see(const Sample& point) {
-  if (!watched_) return;
-  if (first_.q.size() == 0) first_ = {point.time, point.q, point.v, {}};
-  way_ = std::max(way_, max_norm(point.q - first_.q));
+  if (parts_.empty()) return;
+  if (first_.size() == 0) first_ = point.q;
+  way_ = std::max(way_, max_norm(point.q - first_));
   largest_momentum_ = std::max(largest_momentum_, max_norm(point.p));
   largest_velocity_ = std::max(largest_velocity_, max_norm(point.v));
 }
 
-void GrowthCheck::finish(Integrator& integrator, double local) {
-  if (!watched_ || integrator.work().steps != steps_ || !(way_ > 0.0) || !(largest_momentum_ > 0.0)) return;
-  Sample end, other;
-  if (!integrator.sample(Momentum::projected, end).ok()) return;
-  const Snapshot state = integrator.save();
-  bool followed = true;
+/// Keeps the current point.
+void GrowthCheck::mark(Integrator& integrator) {
+  const auto wanted = static_cast<std::size_t>(parts_.size() == 1 ? 2 : points_of_a_part + 1);
+  auto part = std::ranges::find_if(parts_, [&](const Part& it) { return it.points.size() < wanted; });
+  next_mark_ = -1;
+  part->points.emplace_back();
+  if (!integrator.sample(Momentum::projected, part->points.back()).ok()) return parts_.clear();
+  if (part->points.size() == wanted && ++part == parts_.end()) return;
+  next_mark_ = part->begin + static_cast<long>(part->points.size()) * part->between;
+}
+
+/// How far a run from beside the first point of a part is from its other points, in parts of the motion;
+/// empty where it cannot be followed.
+std::vector<double> GrowthCheck::distances(Integrator& integrator, const Part& part) const {
+  const Sample& first = part.points.front();
   try {
-    integrator.reset(beside(first_, way_, largest_velocity_));
-  } catch (const Misuse&) {  // a start that nothing may be moved at
-    followed = false;
+    integrator.reset(beside({first.time, first.q, first.v, {}}, way_, largest_velocity_));
+  } catch (const Misuse&) {  // a point that nothing may be moved at
+    return {};
   }
-  for (long k = 0; k < steps_ && followed; ++k) followed = integrator.step().ok();
-  followed = followed && integrator.sample(Momentum::projected, other).ok();
+  std::vector<double> all;
+  Sample other;
+  for (std::size_t k = 1; k < part.points.size(); ++k) {
+    for (long step = 0; step < part.between; ++step)
+      if (!integrator.step().ok()) return {};
+    if (!integrator.sample(Momentum::projected, other).ok()) return {};
+    const Sample& here = part.points[k];
+    all.push_back(
+        std::max(max_norm(other.q - here.q) / way_, max_norm(other.p - here.p) / largest_momentum_));
+  }
+  return all;
+}
+
+double GrowthCheck::round_off() const {
+  return std::numeric_limits<double>::epsilon() * std::sqrt(static_cast<double>(steps_));
+}
+
+void GrowthCheck::finish(Integrator& integrator, double local) {
+  if (parts_.empty() || next_mark_ >= 0 || integrator.work().steps != steps_ || !(way_ > 0.0) ||
+      !(largest_momentum_ > 0.0))
+    return;
+  const Snapshot state = integrator.save();
+  std::vector<std::vector<double>> apart;
+  for (const Part& part : parts_) {
+    apart.push_back(distances(integrator, part));
+    if (!apart.back().empty() && text_.empty()) judge(part, apart.back().back(), local);
+  }
   integrator.restore(state);
-  if (!followed) return;
-  const double apart =
-      std::max(max_norm(other.q - end.q) / way_, max_norm(other.p - end.p) / largest_momentum_);
-  const double growth = apart / distance_beside;
-  const double round_off = std::numeric_limits<double>::epsilon() * std::sqrt(static_cast<double>(steps_));
-  const double uncertain = growth * std::max(round_off, std::isfinite(local) ? local : 0.0);
+  if (parts_.size() > 1 && text_.empty()) judge_whole(apart);
+}
+
+void GrowthCheck::judge(const Part& part, double apart, double local) {
+  const double growth = apart / distance_beside, from_round_off = growth * round_off();
+  const double uncertain = std::max(from_round_off, std::isfinite(local) ? growth * local : 0.0);
   if (!(growth > growth_of_no_power) || !(uncertain > too_uncertain)) return;
   std::ostringstream text;
   text.precision(2);
-  text << "the motion amplifies errors by a factor of " << growth << (apart > 0.1 ? " or more" : "")
-       << " until t = " << end.time << ", found by a second run beside this one: "
-       << (growth * round_off > too_uncertain ? "round-off alone" : "the error of a step")
+  text << "the motion amplifies errors by a factor of " << growth << (apart > 0.1 ? " or more" : "");
+  if (part.begin > 0) text << " from t = " << part.points.front().time;
+  text << " until t = " << part.points.back().time << ", found by a second run beside this one: "
+       << (from_round_off > too_uncertain ? "round-off alone" : "the error of a step")
        << " becomes as large as " << std::min(100.0, 100.0 * uncertain)
        << " % of the motion, or more; a shorter run can be trusted";
+  text_ = text.str();
+}
+
+/// By what both parts of a long run show.
+void GrowthCheck::judge_whole(const std::vector<std::vector<double>>& apart) {
+  double rate = HUGE_VAL;
+  const double per_mark = static_cast<double>(steps_) / static_cast<double>(parts_.front().between);
+  for (const std::vector<double>& distances : apart) {
+    if (distances.size() != points_of_a_part) return;
+    double least = HUGE_VAL;
+    for (const std::size_t k : {3U, 5U, 7U})
+      least = std::min(least, std::log(distances[k] / distances[k - 2]));
+    const double whole = std::log(distances[7] / distances[1]);
+    if (!(whole > std::log(steady_growth)) || !(least > least_share * whole / 3.0)) return;
+    rate = std::min(rate, whole / 6.0);
+  }
+  const double growth = rate * per_mark;  // its logarithm
+  if (!(growth + std::log(round_off()) > std::log(too_uncertain))) return;
+  const std::vector<Sample>& points = parts_.front().points;
+  std::ostringstream text;
+  text.precision(2);
+  text << "the motion amplifies errors by a factor of 10 in each "
+       << std::log(10.0) / rate * std::abs(points[1].time - points[0].time)
+       << " of t, found by second runs beside two parts of this one: round-off alone becomes as large as the "
+          "motion before its end; a shorter run can be trusted";
   text_ = text.str();
 }
 

@@ -2,6 +2,7 @@
 
 #include <diracstep/core/integrator/integrator.hpp>
 #include <string>
+#include <vector>
 
 namespace diracstep {
 
@@ -14,8 +15,12 @@ inline constexpr double distance_beside = 1e-13;
 /// times as far apart.  Doubted is a run with G > 1e4 where G times the larger of the round-off, 2.2e-16
 /// √steps, and the difference of a step and its parts (StepComparison) exceeds 0.02 of the motion.
 ///
-/// Only for runs of at most 1000 steps from a start, of at most 12 coordinates and rows together,
-/// so that it takes some milliseconds.
+/// A run of more than 1000 steps, or of more than 12 coordinates and rows together, is followed in two parts
+/// of it, at its start and behind its middle, of 1/40 of it each, where that is less of a quarter of it and
+/// of 1000 steps.  Each part is judged as a run of its own.  Where errors grow steadily in both, by a factor
+/// of 400 or more and in each third of a part by at least the sixth root of its growth, the smaller of the
+/// rates is held to be that of the whole run: G is what it comes to.  So a growth that is slower, or none in
+/// one of the two parts, is not seen.
 class GrowthCheck {
  public:
   /// For the next so many steps.
@@ -23,6 +28,11 @@ class GrowthCheck {
 
   /// Points of the run, the start first.
   void see(const Sample& point);
+  /// Before the first step, and after each.
+  void at_node(Integrator& integrator) {
+    if (node_ == next_mark_) mark(integrator);
+    ++node_;
+  }
   /// At the end of the run, which keeps its bits; `local` is the largest difference so far of a step and its
   /// parts, in parts of the motion.
   void finish(Integrator& integrator, double local);
@@ -31,10 +41,23 @@ class GrowthCheck {
   const std::string& text() const { return text_; }
 
  private:
+  /// A part of the run: its points at equal distances.
+  struct Part {
+    long begin, between;  ///< the first of them, and steps from one to the next
+    std::vector<Sample> points = {};
+  };
+
+  void mark(Integrator& integrator);
+  std::vector<double> distances(Integrator& integrator, const Part& part) const;
+  void judge(const Part& part, double apart, double local);
+  void judge_whole(const std::vector<std::vector<double>>& apart);
+  double round_off() const;
+
   long steps_;
-  bool watched_;
-  Start first_;  ///< where the run starts
+  std::vector<Part> parts_;  ///< none where the run is not watched
+  long node_ = 0, next_mark_ = -1;
   double way_ = 0.0, largest_momentum_ = 0.0, largest_velocity_ = 0.0;
+  Vector first_;  ///< where the run starts
   std::string text_;
 };
 

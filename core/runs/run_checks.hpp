@@ -37,6 +37,7 @@ class RunChecks {
         kinks_(integrator, integrator.time() + static_cast<double>(steps) * integrator.options().step) {}
 
   void before_step(Integrator& integrator) {
+    if (step_number_ == 0) growth_.at_node(integrator);
     if (nodes_.wants(step_number_)) see_node(integrator);
     step_.before(integrator);
   }
@@ -46,6 +47,7 @@ class RunChecks {
     branch_.after(integrator);
     kinks_.after(integrator);
     work_.after(integrator);
+    growth_.at_node(integrator);
   }
   void see(const Sample& point) {
     energy_.see(point);

@@ -130,6 +130,11 @@ TEST_F(Believed, ErrorsThatAMotionAmplifiesAreSeen) {
   const Outcome plain = run("run " + file);
   EXPECT_EQ(plain.status, 3) << plain.err;
   EXPECT_TRUE(says(plain, "amplifies errors by a factor of")) << plain.err;
+  for (const char* step : {"0.01", "0.002"}) {  // in parts of a long run
+    const Outcome longer = run("run " + file + " --step " + step);
+    EXPECT_EQ(longer.status, 3) << step;
+    EXPECT_TRUE(says(longer, "amplifies errors by a factor of 10 in each 2.3 of t")) << longer.err;
+  }
   for (const char* end : {"36", "40"}) {
     const Outcome searched = run("run " + file + " --error 1e-6 --end " + end);
     EXPECT_EQ(searched.status, 1) << searched.err;
@@ -139,6 +144,15 @@ TEST_F(Believed, ErrorsThatAMotionAmplifiesAreSeen) {
   EXPECT_EQ(early.status, 0) << early.err;
   EXPECT_NEAR(at_end(early, "q", "x"), std::exp(-5.0), 1e-6 * std::exp(-5.0));
   EXPECT_EQ(run("run " + file + " --end 5").status, 0);
+}
+
+/// Errors of motions that are no saddles grow by powers of the time, whatever a part of them looks like.
+TEST_F(Believed, LongRegularRunsAreNotDoubted) {
+  for (const char* what : {"kepler_e06 --end 200 --step 0.02", "stiff_spring_pendulum --end 40 --step 0.002",
+                           "pendulum_cartesian --end 100 --step 0.01"}) {
+    const Outcome outcome = run(std::string("run ") + what);
+    EXPECT_FALSE(says(outcome, "amplifies")) << what << outcome.err;
+  }
 }
 
 /// Dropped from 1 onto a spring of stiffness k that only pushes, under a gravity of 10.

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <diracstep/core/adaptive/adaptive_run.hpp>
 #include <diracstep/core/adaptive/error_control.hpp>
 #include <diracstep/core/runs/run_checks.hpp>
 #include <diracstep/scene_format/scene_file.hpp>
@@ -106,28 +107,73 @@ step = 0.1
   EXPECT_NEAR(instants[0].time, 1.0, 1e-14);
 }
 
-/// What a run of 200 steps of 0.1 from x = 1 under this potential and force says.
-std::string doubt_of_potential(const std::string& potential, const std::string& force = "0") {
+/// Where a run of so many steps from x = 1 under this potential and force ends, and what its checks say.
+struct Checked {
+  Vector q, p;
+  std::string doubt;
+};
+Checked checked_run(const std::string& potential, const std::string& force, const std::string& method,
+                    double step, long steps) {
   const CatalogueScene entry =
       scene_from_text("well.toml", "name = \"well\"\nlagrangian = \"v_x^2/2 - (" + potential +
                                        ")\"\n[coordinates]\nx = {}\n[force]\nx = \"" + force +
                                        "\"\n[start]\nx = 1\nv_x = 1\n[span]\nend = 20\nstep = 0.1\n");
-  Integrator integrator(entry.scene, Registry::with_built_ins(), kinsol(), {.step = 0.1});
-  RunChecks checks(integrator, 200);
-  for (int k = 0; k < 200; ++k) {
+  Integrator integrator(entry.scene, Registry::with_built_ins(), kinsol(), {.method = method, .step = step});
+  RunChecks checks(integrator, steps);
+  for (long k = 0; k < steps; ++k) {
     checks.before_step(integrator);
     EXPECT_TRUE(integrator.step().ok());
     checks.after_step(integrator);
   }
-  return checks.text();
+  return {integrator.position(), integrator.momentum(), checks.text()};
 }
 
-/// |x| at t = 20: x = -0.9798, v = 0.201 by the parabolas between the kinks; the run has v = -0.344.
-TEST(KinkCheck, ForcesThatJumpOnTheWayAreToldOf) {
-  EXPECT_NE(doubt_of_potential("abs(x)").find("abs in line 2"), std::string::npos)
-      << doubt_of_potential("abs(x)");
-  EXPECT_EQ(doubt_of_potential("max(0, x)^2 + max(0, -x)^2"), "") << "the force is continuous";
-  EXPECT_EQ(doubt_of_potential("x^2"), "");
+std::string doubt_of_potential(const std::string& potential, const std::string& force = "0") {
+  return checked_run(potential, force, "type1/midpoint", 0.1, 200).doubt;
+}
+
+/// Under |x| the motion is a parabola of height 3/2 between zeros that are 2 sqrt(3) apart.
+TEST(Kinks, StepsAreDividedWhereTheForceJumpsOnTheWay) {
+  const double root = std::sqrt(3.0), s = 20.0 + root - 1.0 - 10.0 * root;  // since the fifth zero
+  ASSERT_GT(s, 0.0);
+  for (const char* method : {"type1/midpoint", "type1/gl:3"}) {
+    const Checked run = checked_run("abs(x)", "0", method, 0.1, 200);
+    EXPECT_NEAR(run.q[0], -(root * s - 0.5 * s * s), 1e-11) << method;
+    EXPECT_NEAR(run.p[0], -(root - s), 1e-11) << method;
+    EXPECT_EQ(run.doubt, "") << method;
+  }
+}
+
+/// x'' = -1 onto a one-sided spring of k = 1e6: parabolas, and half turns of sqrt(k) between them.
+TEST(Kinks, AContactIsFollowedAtTheOrderOfTheMethod) {
+  const double k = 1e6, w = std::sqrt(k), v = -std::sqrt(3.0), t = 1.0 - v;  // at the contact
+  const double in_contact = 2.0 * (std::atan(v * k / w) + M_PI) / w, end = 4.0, s = end - t - in_contact;
+  ASSERT_GT(s, 0.0);
+  for (const auto& [step, error] : {std::pair{1e-4, 1e-11}, {1e-3, 1e-6}}) {
+    const Checked run = checked_run("5e5*min(0, x)^2 + x", "0", "type1/gl:3", step, std::lround(end / step));
+    EXPECT_NEAR(run.q[0], -v * s - 0.5 * s * s, error) << step;
+    EXPECT_NEAR(run.p[0], -v - s, error) << step;
+    EXPECT_EQ(run.doubt, "") << step;
+  }
+}
+
+/// sin(wt) charges through a diode that conducts one way: u' = 1000 max(0, sin 6t - u) - u.
+TEST(Kinks, StepsByTheirLocalErrorKeepItAcrossADiode) {
+  const CatalogueScene entry = scene_from_text(
+      "diode.toml",
+      "name = \"diode\"\nlagrangian = \"v_x^2/2\"\n[coordinates]\nx = {}\n[states]\nu = { rate = "
+      "\"1000*(max(0, sin(6*t) - u)) - u\" }\n[span]\nend = 3\nstep = 0.01\n");
+  const auto charge = [&](double eps) {
+    AdaptiveIntegrator integrator(entry.scene, Registry::with_built_ins(), kinsol(),
+                                  {.method = "damped/radau:3", .step = 0.01}, {.eps = eps, .end = 3.0});
+    double u = 0.0;
+    EXPECT_TRUE(run_until(integrator, 3.0, Momentum::projected, 1, [&](const Sample& at) {
+                  u = at.q[1];
+                  return true;
+                }).ok());
+    return u;
+  };
+  EXPECT_NEAR(charge(1e-6), charge(1e-9), 1e-7);
 }
 
 TEST(KinkCheck, WhatLiesBetweenTwoNodesIsToldOf) {

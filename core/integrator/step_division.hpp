@@ -1,0 +1,64 @@
+#pragma once
+
+#include <diracstep/core/integrator/kink_passed.hpp>
+#include <diracstep/core/integrator/step_sequence.hpp>
+#include <diracstep/core/integrator/time_kinks.hpp>
+#include <string>
+#include <vector>
+
+namespace diracstep {
+
+/// Solves a step in parts that meet where a function of the scene jumps or has a kink, so that a method keeps
+/// its order there: at known times (TimeKinks), and where the motion crosses a kink in q or v (Scene::kinks),
+/// as of contacts, clipped forces, dry friction on the way.
+///
+/// A step at whose end a switching function has another sign than at its start is solved again, shorter,
+/// until it ends a round-off of the time behind the zero, by a bracketed secant method on its size; the rest
+/// follows.  A pair of zeros within a step shows in no sign at its end: it is looked for at three places
+/// along a parabola through the ends, whose curvature is that of the mean velocities of this and the last
+/// step; so pairs that are narrow beside a step, and flat ones, are not seen.  Where the motion crosses one
+/// kink again and again, as at a force that jumps and points back from both sides, the step is solved
+/// undivided, and stuck() says so.
+///
+/// What is done depends on the step and its start alone.
+class StepDivision {
+ public:
+  /// The reader and the sequence outlive the division.
+  StepDivision(std::shared_ptr<const Scene> scene, double usual_step, PointReader& reader,
+               StepSequence& sequence);
+
+  /// Afterwards sequence.end() is where the step ends; no trace of it is left before it is accepted.
+  StepSequence::Outcome solve(Interval step, const State& start, Guess guess, Work& work);
+
+  /// Of the step solved last.
+  const std::vector<Interval>& parts() const { return parts_; }
+  bool divided() const { return divided_; }
+  const std::vector<KinkPassed>& passed() const { return passed_; }
+  /// Empty, or why it is not divided although the motion crosses a kink.
+  const std::string& stuck() const { return stuck_; }
+
+  /// The centres of the pulses and ramps of the time in a step.
+  void add_pulses(Interval step, std::vector<double>& times) { times_.add_pulses(step, times); }
+
+ private:
+  void read(double t, const State& at, bool exactly, Vector& switches);
+  bool crosses(Interval step, const State& start, const State& end);
+  double hidden_place(Interval step, const State& start, const State& end);
+  int first_change() const;
+  bool follow(const State& start, Work& work);
+  bool shorten(int number, Interval& part, const State& from, Work& work);
+  bool give_up(int number, double t);
+
+  std::shared_ptr<const Scene> scene_;
+  PointReader* reader_;
+  StepSequence* sequence_;
+  const Kinks* kinks_;  ///< null where no motion crosses any
+  TimeKinks times_;
+  std::vector<Interval> parts_, undivided_;
+  std::vector<KinkPassed> passed_;
+  std::string stuck_;
+  bool divided_ = false;
+  Vector before_, after_, between_, velocity_, speed_up_, position_;
+};
+
+}  // namespace diracstep
