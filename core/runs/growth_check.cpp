@@ -2,6 +2,7 @@
 #include <cmath>
 #include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/core/runs/growth_check.hpp>
+#include <diracstep/core/spaces/space.hpp>
 #include <limits>
 #include <sstream>
 
@@ -44,7 +45,9 @@ void GrowthCheck::finish(Integrator& integrator, double local) {
   const Snapshot state = integrator.save();
   bool followed = true;
   try {
-    integrator.reset(beside(first_, way_, largest_velocity_));
+    Start other_start = beside(first_, way_, largest_velocity_);
+    if (const auto& space = integrator.scene().space) other_start.q = space->normalised(other_start.q);
+    integrator.reset(other_start);
   } catch (const Misuse&) {  // a start that nothing may be moved at
     followed = false;
   }
