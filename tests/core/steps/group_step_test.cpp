@@ -350,7 +350,9 @@ TEST(GroupStepClosedForms, AgreesWithTheQuaternionAndItsRowToTheErrorsOfBoth) {
     const double of_group = error_at(top, truth, T, steps, gl(3)),
                  of_flat = (end_of_flat(steps) - truth).lpNorm<Eigen::Infinity>();
     EXPECT_LT(of_group, of_flat) << steps;
-    if (steps == 128) EXPECT_LT(of_flat, 1e-9);
+    if (steps == 128) {
+      EXPECT_LT(of_flat, 1e-9);
+    }
   }
 }
 
