@@ -34,7 +34,7 @@ TEST(SpaceAxioms, HoldForEveryFactorWithBothRetractionsAndForProducts) {
 struct RightTrivialised : spaces::SO3 {
   template <class T>
   static Rate<T> dtau(const Rate<T>& x, const Rate<T>& v) {
-    return SO3::dtau(Rate<T>{-x[0], -x[1], -x[2]}, v);
+    return spaces::SO3::dtau(Rate<T>{-x[0], -x[1], -x[2]}, v);
   }
 };
 
@@ -42,7 +42,7 @@ struct RightTrivialised : spaces::SO3 {
 struct NotSymmetric : spaces::SO3 {
   template <class T>
   static Rotation<T> retract(const Rate<T>& x) {
-    return SO3::retract(Rate<T>{x[0], x[1], x[2] + T(0.1) * x[0] * x[0]});
+    return spaces::SO3::retract(Rate<T>{x[0], x[1], x[2] + T(0.1) * x[0] * x[0]});
   }
 };
 
