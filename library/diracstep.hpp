@@ -18,5 +18,6 @@
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/runs/run.hpp>
 #include <diracstep/core/system/consistent_start.hpp>
+#include <diracstep/core/system/on_space.hpp>
 #include <diracstep/core/system/redundant_rows.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>

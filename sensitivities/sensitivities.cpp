@@ -16,11 +16,18 @@ double bytes_of(const SolvedStage& stage) {
   return 8.0 * static_cast<double>(stage.x.size() + 3 * stage.start.q.size()) + sizeof(SolvedStage);
 }
 
+/// Throws Misuse on a configuration space of its own.
+Integrator& in_flat_space(Integrator& integrator) {
+  if (integrator.scene().space)
+    throw Misuse("sensitivities of scene '" + integrator.scene().name + "', which is not in R^n");
+  return integrator;
+}
+
 }  // namespace
 
 struct Sensitivities::Parts {
   Parts(Integrator& of, const Registry& registry, const ParametricScene& parametric)
-      : integrator(of),
+      : integrator(in_flat_space(of)),
         scene(parametric),
         motion(sensitivity::linearised_motion(of, registry, scene)),
         time(of.time()),

@@ -197,6 +197,7 @@ class MasslessMotion {
 /// Why nothing is measured; empty where it is.
 std::string not_surveyed(const Scene& scene) {
   if (!scene.lagrangian) return "the Hamiltonian is degenerate";
+  if (scene.space) return "the scene is not in R^n";
   const PhaseStructure& structure = scene.lagrangian->structure();
   if (structure.phase_space()) return "L is linear in v";
   if (structure.y_hessian_zero) return scene.rows() > 0 ? "" : "nothing has mass";

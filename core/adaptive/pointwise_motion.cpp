@@ -7,6 +7,7 @@ namespace diracstep {
 
 PointwiseMotion::PointwiseMotion(const Scene& scene, const SolverFactory& solvers, int dense_limit)
     : full_(scene.dimension() + scene.rows() <= dense_limit),
+      space_(scene.space),
       reader_(std::make_shared<const Scene>(scene), solvers, full_) {
   if (!has_accelerations(scene))
     throw Misuse("scene '" + scene.name + "': its " +

@@ -2,6 +2,7 @@
 
 #include <diracstep/core/integrator/point_reader.hpp>
 #include <diracstep/core/numerics/nonlinear_solver.hpp>
+#include <diracstep/core/spaces/space.hpp>
 #include <diracstep/core/system/scene.hpp>
 
 namespace diracstep {
@@ -21,10 +22,14 @@ class PointwiseMotion {
   /// The acceleration a of the continuous system at (q, v).  Linear; dense systems are solved directly.
   SolveReport acceleration(double t, ConstVectorRef q, ConstVectorRef v, VectorRef a);
 
+  /// Null in R^n.
+  const Space* space() const { return space_.get(); }
+
   long accelerations() const { return accelerations_; }
 
  private:
   bool full_;
+  std::shared_ptr<const Space> space_;
   PointReader reader_;
   Vector acceleration_, forces_;
   long accelerations_ = 0;

@@ -51,26 +51,38 @@ void require_even(const Monitor& monitor, const Start& start) {
 
 RateMeter::RateMeter(const Scene& scene, const SolverFactory& solvers, Monitor monitor, MonitorScales scales)
     : monitor_(std::move(monitor)), scales_(scales), a_(Columns::Zero(scene.dimension(), 5)) {
-  q_.setZero(scene.dimension());
-  v_ = q_;
+  q_.setZero(scene.storage_size());
+  v_.setZero(scene.dimension());
+  origin_ = v_;
   motion_ = std::make_unique<PointwiseMotion>(scene, solvers);
 }
 
 RateMeter::RateMeter(RateMeter&&) noexcept = default;
 RateMeter::~RateMeter() = default;
 
+/// On a configuration space of its own the Taylor polynomial x begins at zero, and the point is q τ(x).
+const double* RateMeter::base(ConstVectorRef q) const {
+  return motion_->space() != nullptr ? origin_.data() : q.data();
+}
+
+void RateMeter::place_on_space(ConstVectorRef q) {
+  if (motion_->space() != nullptr) q_ = motion_->space()->moved(q, q_);
+}
+
 bool RateMeter::accelerations(double t, ConstVectorRef q, ConstVectorRef v, double delta, int reach) {
   last_ = motion_->acceleration(t, q, v, a_.col(2));
   for (const int place : {1, 3, 0, 4}) {
     if (std::abs(place - 2) > reach || !last_.ok()) continue;
     const double tau = (place - 2) * delta;
-    q_ = q + tau * v + (0.5 * tau * tau) * a_.col(2);
+    const Eigen::Map<const Vector> from(base(q), v.size());
+    q_ = from + tau * v + (0.5 * tau * tau) * a_.col(2);
     v_ = v + tau * a_.col(2);
     if (place == 0 || place == 4) {  // ȧ of the inner three: without it d(ln ω)/dt lacks what a owes to v
       const double factor = tau * tau / (4.0 * delta);
       v_ += factor * (a_.col(3) - a_.col(1));
       q_ += (factor * tau / 3.0) * (a_.col(3) - a_.col(1));
     }
+    place_on_space(q);
     last_ = motion_->acceleration(t + tau, q_, v_, a_.col(place));
   }
   return last_.ok();
@@ -86,12 +98,13 @@ double RateMeter::generic_rate(int place, ConstVectorRef v, double delta) const 
 
 double RateMeter::own_rate(double t, ConstVectorRef q, ConstVectorRef v, double delta, int place) {
   const double tau = (place - 2) * delta;
-  q_ = q + tau * v;
+  q_ = Eigen::Map<const Vector>(base(q), v.size()) + tau * v;
   v_ = v;
   if (monitor_.depends_on_velocity) {
     q_ += (0.5 * tau * tau) * a_.col(2);
     v_ += tau * a_.col(2);
   }
+  place_on_space(q);
   return monitor_.rate(t + tau, q_, v_);
 }
 

@@ -68,6 +68,8 @@ class RateMeter {
   double generic_rate(int place, ConstVectorRef v, double delta) const;
   double own_rate(double t, ConstVectorRef q, ConstVectorRef v, double delta, int place);
   Rate failed() const;
+  const double* base(ConstVectorRef q) const;
+  void place_on_space(ConstVectorRef q);
 
   Monitor monitor_;
   MonitorScales scales_;
@@ -75,6 +77,7 @@ class RateMeter {
   SolveReport last_;
   Columns a_;  ///< accelerations, one column a place
   Vector q_, v_;
+  Vector origin_;  ///< zero
 };
 
 }  // namespace diracstep

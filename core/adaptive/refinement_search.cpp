@@ -264,7 +264,8 @@ std::vector<PathPoint> RefinementSearch::path_of(long refinement) {
 /// search is refused.
 bool RefinementSearch::survey(bool accepted) {
   surveyed_ = true;
-  if (local_) return true;  // such steps are short where the forces change fast
+  if (local_) return true;                // such steps are short where the forces change fast
+  if (motion_.scene->space) return true;  // the paths between points are those of R^n
   // A coarse run shows the way; after a division a fine one, for the place of a kink depends on the motion.
   const long way = divisions_ == 0 ? first_good_ : refinement_;
   const std::vector<PathPoint> path = path_of(way);

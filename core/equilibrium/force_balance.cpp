@@ -122,6 +122,8 @@ void ForceBalance::set_multipliers(const Vector& lambda) {
 
 std::shared_ptr<const Scene> with_start_and_hidden_rows(const Scene& scene, const Start& start) {
   require_full_size(scene);
+  if (scene.space)
+    throw Misuse("scene '" + scene.name + "': equilibria and linear equations are known in R^n only");
   auto copy = std::make_shared<Scene>(scene);
   copy->start = start;
   return with_hidden_rows(with_lagrangian(*copy));

@@ -1,8 +1,24 @@
 #include <diracstep/core/integrator/integrator.hpp>
 #include <diracstep/core/integrator/step_sequence.hpp>
+#include <diracstep/core/spaces/space.hpp>
+#include <diracstep/core/steps/groups/step.hpp>
 #include <diracstep/core/system/first_order_motions.hpp>
 
 namespace diracstep {
+
+namespace {
+
+PlanLine space_line(const Scene& scene) {
+  const std::string sizes = std::to_string(scene.storage_size()) + " numbers for " +
+                            std::to_string(scene.dimension()) + " velocities, left-trivialised";
+  return {"space", scene.space->name(),
+          reduced_on_group(scene) ? sizes +
+                                        "; reduced: L and the rows do not depend on the configuration, which "
+                                        "follows from the velocities"
+                                  : sizes};
+}
+
+}  // namespace
 
 std::vector<PlanLine> Integrator::plan() const {
   const StepSolver& part = sequence_->part();
@@ -13,6 +29,7 @@ std::vector<PlanLine> Integrator::plan() const {
   const MethodInfo& info = method_.info;
   lines.push_back(
       {"step", info.name, info.solved_as.empty() ? info.summary : info.summary + "; " + info.solved_as});
+  if (scene_->space) lines.push_back(space_line(*scene_));
   lines.push_back(
       {"unknowns", problem.traits().unknowns,
        solver != nullptr ? "one nonlinear system in each solve" : "the graph is solved for its end"});

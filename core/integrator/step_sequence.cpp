@@ -64,7 +64,10 @@ StepSequence::Outcome StepSequence::failed(const SolveReport& report, Stage& sta
   }
   if (part.reached() > 0.0 && part.reached() < 1.0)
     message << "; the solution can be followed up to a step of " << part.reached() * step_size;
-  message << describe_singularity(part.problem(), stage.x, *scene_);
+  if (const std::string why = part.problem().failure(); !why.empty())
+    message << "; " << why;
+  else
+    message << describe_singularity(part.problem(), stage.x, *scene_);
   return {report, message.str()};
 }
 

@@ -2,11 +2,14 @@
 #include <diracstep/core/methods/method.hpp>
 #include <diracstep/core/methods/quadrature.hpp>
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/spaces/space.hpp>
 #include <diracstep/core/steps/gauss_lobatto/first_order_step.hpp>
 #include <diracstep/core/steps/gauss_lobatto/hamiltonian_step.hpp>
 #include <diracstep/core/steps/gauss_lobatto/phase_space_step.hpp>
 #include <diracstep/core/steps/gauss_lobatto/step.hpp>
 #include <diracstep/core/steps/gauss_lobatto/tableau.hpp>
+#include <diracstep/core/steps/groups/step.hpp>
+#include <diracstep/core/steps/groups/trapezoidal_step.hpp>
 #include <diracstep/core/steps/radau/step.hpp>
 #include <diracstep/core/steps/radau/tableau.hpp>
 #include <utility>
@@ -24,6 +27,13 @@ std::unique_ptr<StepProblem> step_of_first_order(int s, const Scene& scene, cons
                                                  bool dense) {
   const bool alone = scene.rows() == 0 && !scene.force && scene.lagrangian->structure().phase_space();
   return alone ? phase_space_step(s, scene, dense) : first_order_step(s, scene, motions);
+}
+
+/// Throws Misuse on a configuration space of its own.
+void require_flat(const Scene& scene, const std::string& what) {
+  if (scene.space)
+    throw Misuse("scene '" + scene.name + "' on " + scene.space->name() + ": " + what +
+                 " is known in R^n only; type1/midpoint, type1/trapezoidal and typeN/gl:S step it");
 }
 
 bool asks_for_own_rule(const StepChoices& choices, const StepRule& own) {
@@ -44,6 +54,7 @@ StepFactory gauss_lobatto_factory(const std::string& name, int s) {
       return step_of_first_order(s, scene, motions, choices.dense);
     if (!asks_for_own_rule(choices, StepRule::midpoint))
       throw Misuse("method '" + name + "' has its own nodes for the constraint; no other rule applies");
+    if (scene.space) return group_step(s, scene);
     if (scene.by_hamiltonian()) return hamiltonian_step(s, scene, choices.dense);
     return gauss_lobatto_step(s, scene, choices.dense);
   };
@@ -56,6 +67,7 @@ std::string prefix_of(GeneratingType type) { return "type" + std::to_string(stat
 Method method_of(MethodInfo info, GeneratingFunctionFactory generating_function) {
   const auto make_step = [name = info.name, own = info.constraint_rule, generating_function](
                              const Scene& scene, const StepChoices& choices) {
+    require_flat(scene, "the step of '" + name + "'");
     if (own_motions(scene, choices).exist())
       throw Misuse("scene '" + scene.name + "': its Lagrangian is linear in v or in some of them, where '" +
                    name + "' is unstable or leaves p = ∂L/∂v; use type1/midpoint or typeN/gl:S");
@@ -81,8 +93,10 @@ Method gauss_lobatto_method(GeneratingType type, int s) {
       .rows_inside = true,
       .solved_as = first ? "solved for its stage velocities"
                          : "the same step as type1/gl:" + stages + ", solved for its stage velocities"};
-  return {std::move(info), gauss_lobatto_factory(name, s),
-          [s, type](const Scene& scene) { return gauss_lobatto_function(type, s, lagrangian_of(scene)); }};
+  return {std::move(info), gauss_lobatto_factory(name, s), [s, type](const Scene& scene) {
+            require_flat(scene, "the generating function of a step GL(s)");
+            return gauss_lobatto_function(type, s, lagrangian_of(scene));
+          }};
 }
 
 Method radau_method(int s) {
@@ -101,6 +115,7 @@ Method radau_method(int s) {
   const auto make_step = [name, s](const Scene& scene, const StepChoices& choices) {
     if (choices.rule)
       throw Misuse("method '" + name + "' has its own nodes for the constraint; no other rule applies");
+    require_flat(scene, "the step of '" + name + "'");
     return radau_step(s, scene, choices.dense);
   };
   return {std::move(info), make_step};
@@ -123,6 +138,26 @@ Method midpoint_method() {
                          const Scene& scene, const StepChoices& choices) {
     const bool own_rule = asks_for_own_rule(choices, StepRule::midpoint);
     return own_rule || own_motions(scene, choices).exist() ? as_gl1(scene, choices) : stated(scene, choices);
+  };
+  return method;
+}
+
+Method trapezoidal_method() {
+  MethodInfo info{.name = "type1/trapezoidal",
+                  .type = GeneratingType::one,
+                  .order = 2,
+                  .self_adjoint = true,
+                  .constraint_rule = StepRule::trapezoidal,
+                  .summary = "L_d = h/2 [L(q0, (q1-q0)/h) + L(q1, (q1-q0)/h)]",
+                  .allocation_free = true};
+  Method method = method_of(std::move(info), [](const Scene& scene) {
+    return quadrature_lagrangian(lagrangian_of(scene), StepRule::trapezoidal);
+  });
+  method.make_step = [stated = method.make_step](const Scene& scene, const StepChoices& choices) {
+    if (!scene.space) return stated(scene, choices);
+    if (!asks_for_own_rule(choices, StepRule::trapezoidal))
+      throw Misuse("method 'type1/trapezoidal' on " + scene.space->name() + " has its own rule for the rows");
+    return group_trapezoidal_step(scene);
   };
   return method;
 }

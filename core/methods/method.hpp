@@ -74,6 +74,10 @@ Method radau_method(int s);
 /// unknown is the velocity: the same step, which loses a factor h less to round-off.
 Method midpoint_method();
 
+/// L_d = h/2 [L(q0, (q1−q0)/h) + L(q1, (q1−q0)/h)], type 1; on a configuration space of its own with the
+/// velocity of the chart at q0 (steps/groups/trapezoidal_step.hpp).
+Method trapezoidal_method();
+
 /// "typeN/", with which the name of a method of this type begins.
 std::string prefix_of(GeneratingType type);
 

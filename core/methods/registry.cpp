@@ -19,7 +19,7 @@ constexpr std::size_t longest_name = 1000;
 
 void add_quadrature(Registry& registry, StepRule rule, int order, std::string summary,
                     std::string adjoint = {}) {
-  registry.add({std::string("type1/") + name(rule), GeneratingType::one, order, order == 2, rule,
+  registry.add({std::string("type1/") + name(rule), GeneratingType::one, order, false, rule,
                 std::move(summary), std::move(adjoint), 0, true},
                [rule](const Scene& scene) { return quadrature_lagrangian(lagrangian_of(scene), rule); });
 }
@@ -78,7 +78,7 @@ Registry Registry::with_built_ins() {
   add_quadrature(registry, StepRule::left, 1, "L_d = h L(q0, (q1-q0)/h)", "type1/right");
   add_quadrature(registry, StepRule::right, 1, "L_d = h L(q1, (q1-q0)/h)", "type1/left");
   registry.add(midpoint_method());
-  add_quadrature(registry, StepRule::trapezoidal, 2, "L_d = h/2 [L(q0, (q1-q0)/h) + L(q1, (q1-q0)/h)]");
+  registry.add(trapezoidal_method());
   registry.add({"type2/euler", GeneratingType::two, 1, false, StepRule::left, "H_d+ = p1 q0 + h H(q0, p1)",
                 "type3/euler"},
                [](const Scene& scene) { return euler_type2(hamiltonian_of(scene)); });

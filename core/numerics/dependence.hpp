@@ -25,6 +25,7 @@ class Dependence {
     return x;
   }
 
+  bool depends_on(std::size_t i) const { return on_[i]; }
   bool second_derivative(std::size_t i, std::size_t j) const { return curved_[i][j]; }
   bool second_derivative_varies(std::size_t i, std::size_t j) const { return varies_[i][j]; }
 

@@ -5,6 +5,7 @@
 #include <complex>
 #include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/core/runs/branch_check.hpp>
+#include <diracstep/core/spaces/space.hpp>
 #include <sstream>
 
 namespace diracstep {
@@ -46,7 +47,10 @@ bool BranchCheck::rows_depend_on_the_way(const Integrator& integrator) {
   const double t = integrator.time(), h = integrator.options().step;
   rows_.evaluate(t, integrator.position());
   const Eigen::MatrixXd after = rows_.pattern().full(rows_.coefficients());
-  rows_.evaluate(t - h, integrator.position() - h * integrator.velocity_estimate());
+  const Vector back = -h * integrator.velocity_estimate();
+  const Space* const space = integrator.scene().space.get();
+  rows_.evaluate(t - h, space != nullptr ? space->moved(integrator.position(), back)
+                                         : Vector(integrator.position() + back));
   const Eigen::MatrixXd before = rows_.pattern().full(rows_.coefficients());
   const Eigen::MatrixXd ratio =
       (before * before.transpose()).partialPivLu().solve(before * after.transpose());

@@ -53,7 +53,8 @@ void EnergyCheck::see(const Sample& point) {
 void EnergyCheck::add_at_play(const Sample& point) {
   scene_.force_and_momentum(point.time, point.q, point.v, point.p, force_, momentum_);
   const double kinetic = 0.5 * std::abs(momentum_.dot(point.v)),
-               work = std::abs(force_.dot(point.q - start_position_));
+               work = scene_.space ? max_norm(force_) * max_norm(point.q - start_position_)
+                                   : std::abs(force_.dot(point.q - start_position_));
   double here = 0.0;
   for (const double size : {kinetic, work})
     if (std::isfinite(size)) here = std::max(here, size);

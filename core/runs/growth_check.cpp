@@ -2,6 +2,7 @@
 #include <cmath>
 #include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/core/runs/growth_check.hpp>
+#include <diracstep/core/spaces/space.hpp>
 #include <limits>
 #include <sstream>
 
@@ -64,7 +65,9 @@ void GrowthCheck::mark(Integrator& integrator) {
 std::vector<double> GrowthCheck::distances(Integrator& integrator, const Part& part) const {
   const Sample& first = part.points.front();
   try {
-    integrator.reset(beside({first.time, first.q, first.v, {}}, way_, largest_velocity_));
+    Start other_start = beside({first.time, first.q, first.v, {}}, way_, largest_velocity_);
+    if (const auto& space = integrator.scene().space) other_start.q = space->normalised(other_start.q);
+    integrator.reset(other_start);
   } catch (const Misuse&) {  // a point that nothing may be moved at
     return {};
   }

@@ -72,6 +72,7 @@ void NodeCheck::add_force(const Sample& node, Vector& force, Vector& terms, Vect
   Vector momentum(n);
   force.resize(n);
   scene_.force_and_momentum(node.time, node.q, node.v, node.p, force, momentum);
+  scene_.add_turning(node.v, momentum, force);
   terms = force.cwiseAbs();
   const SparsityPattern& pattern = scene_.stepped_function().pattern();
   const Vector& y = scene_.by_hamiltonian() ? node.p : node.v;
@@ -81,7 +82,8 @@ void NodeCheck::add_force(const Sample& node, Vector& force, Vector& terms, Vect
   qq = qq.cwiseAbs();
   cancelling.setZero(n);
   pattern.multiply_add(qy.data(), y.cwiseAbs().eval().data(), cancelling.data());
-  pattern.multiply_add(qq.data(), node.q.cwiseAbs().eval().data(), cancelling.data());
+  const Vector positions = scene_.space ? Vector(Vector::Constant(n, max_norm(node.q))) : node.q.cwiseAbs();
+  pattern.multiply_add(qq.data(), positions.data(), cancelling.data());
   if (scene_.force) {
     scene_.force->value(node.time, node.q, node.v, momentum);
     force += momentum;

@@ -48,6 +48,9 @@ class StepProblem : public NonlinearProblem {
 
   virtual StepTraits traits() const = 0;
 
+  /// Empty, or why steps from the start last given to begin() have no residual where a solver asked for one.
+  virtual std::string failure() const { return {}; }
+
   /// From now on, sums over the stages in extended precision with coefficients to match, and q1, p1 with what
   /// rounding drops from them carried into the step that starts there (compensated addition).  Plain sums
   /// with rounded coefficients are a step that is not quite self-adjoint, whose energy drifts linearly by

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/numerics/row_scales.hpp>
+#include <diracstep/core/spaces/space.hpp>
 #include <diracstep/core/system/consistent_start.hpp>
 #include <diracstep/core/system/constraint_distribution.hpp>
 #include <diracstep/core/system/hamiltonian_point.hpp>
@@ -180,11 +181,36 @@ void require_few_unknowns(const Scene& scene) {
                  " rows, and at most " + std::to_string(most) + " together are looked through");
 }
 
+/// The same on a configuration space of its own, by Newton's method with the shortest moves in the body.
+Vector nearest_on_space(const Scene& scene, const Start& start, const std::vector<int>& kept) {
+  constexpr int most = 50;
+  constexpr double small = 1e-14;
+  const ConstraintBlocks holonomic = only_holonomic(scene.constraints);
+  ConstraintsAtPoint rows(holonomic, scene.dimension());
+  Vector q = scene.space->normalised(start.q), phi(rows.rows());
+  for (int iteration = 0; rows.rows() > 0 && iteration < most; ++iteration) {
+    int row = 0;
+    for (const auto& block : holonomic) {
+      block->position(start.time, q, phi.segment(row, block->rows()));
+      row += block->rows();
+    }
+    rows.evaluate(start.time, q);
+    Columns a = rows.pattern().full(rows.coefficients());
+    for (const int i : kept) a.col(i).setZero();
+    const Vector change = a.completeOrthogonalDecomposition().solve(-phi);
+    if (!change.allFinite()) break;
+    q = scene.space->moved(q, change);
+    if (change.norm() <= small * (1.0 + q.norm())) break;
+  }
+  return q;
+}
+
 /// The nearest point of the holonomic rows that differs in guesses alone.  Rows that these cannot move, or
 /// only together with others, are not solved for.
 Vector nearest_position(const Scene& scene, const Start& start, const Guesses& guesses,
                         const SolverFactory& solvers) {
   const std::vector<int> kept = held(guesses.q);
+  if (scene.space) return nearest_on_space(scene, start, kept);
   auto all = std::make_shared<Scene>(scene);
   all->constraints = only_holonomic(scene.constraints);
   all->start = start;
@@ -240,7 +266,7 @@ ConsistentStart project_start(const Scene& given, const Start& given_start, cons
   require_size("the start v", start.v.size(), scene.dimension());
   require_few_unknowns(scene);
   ConsistentStart result{start, 0.0, 0.0};
-  const Eigen::Index n = start.q.size();
+  const Eigen::Index n = scene.dimension();
   result.start.q = nearest_position(scene, start, guesses, solvers);
   result.position_moved = (result.start.q - start.q).norm();
   if (scene.rows() == 0) return result;

@@ -78,7 +78,7 @@ bool positive_definite(const Lagrangian& lagrangian, const Start& start) {
 
 FirstOrderMotions first_order_motions(const Scene& scene) {
   const int n = scene.dimension();
-  if (scene.by_hamiltonian()) return {};
+  if (scene.by_hamiltonian() || scene.space) return {};
   const PhaseStructure& structure = scene.lagrangian->structure();
   if (structure.phase_space()) return {Columns::Identity(n, n), Columns(n, 0)};
   const Start& start = scene.start;

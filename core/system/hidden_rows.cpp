@@ -240,7 +240,7 @@ Vector largest_of_rows(const Columns& matrix) {
 }  // namespace
 
 ConstraintBlocks hidden_rows(const Scene& scene) {
-  if (scene.by_hamiltonian() || first_order_motions(scene).exist()) return {};
+  if (scene.by_hamiltonian() || scene.space || first_order_motions(scene).exist()) return {};
   const Start& start = scene.start;
   const bool sized = start.q.size() == scene.storage_size() && start.v.size() == scene.dimension();
   if (!sized || !start.q.allFinite() || !start.v.allFinite()) return {};  // told by require_consistent

@@ -20,6 +20,7 @@ struct PhaseStructure {
   bool quadratic = false;       ///< every second derivative is constant
   bool y_hessian_zero = false;  ///< f is linear in y
   bool autonomous = false;      ///< f does not depend on t
+  bool x_absent = false;        ///< f does not depend on x
 
   /// f = θ(x)·y − H(x) with θ not constant: a phase-space Lagrangian.
   bool phase_space() const { return y_hessian_zero && !separable; }
@@ -29,6 +30,8 @@ struct PhaseStructure {
 ///
 /// Second derivatives come as values on one symmetric n×n pattern shared by the three blocks:
 /// fxx(i,j) = ∂²f/∂x_i∂x_j, fxy(i,j) = ∂²f/∂x_i∂y_j, fyy(i,j) = ∂²f/∂y_i∂y_j.
+/// On a configuration space of its own (on_space.hpp) x has as many numbers as that stores, and ∂/∂x_i is the
+/// derivative along x τ(ε e_i): n of them, and fxx(i,j) = ∂(f_x)_i/∂x_j need not be symmetric.
 /// Objects are immutable and may be used from several threads at once.
 class PhaseFunction {
  public:
@@ -114,6 +117,9 @@ PhaseStructure structure_of(const F& f) {
   try {
     const Scalar s = call_with_time(f, Scalar(), x, y);
     PhaseStructure structure{true, true, true, true, true};
+    structure.x_absent = true;
+    for (std::size_t i = 0; i < N; ++i)
+      if (s.depends_on(i)) structure.x_absent = false;
     for (std::size_t i = 0; i < 2 * N; ++i)
       for (std::size_t j = 0; j < 2 * N; ++j) {
         const bool xy = i < N && j >= N, yy = i >= N && j >= N;

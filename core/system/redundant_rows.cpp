@@ -95,6 +95,7 @@ std::vector<Columns> one_forms_around(const Scene& scene, const Start& start) {
     return full_one_forms(rows);
   };
   std::vector<Columns> all{at(start.q)};
+  if (scene.space) return all;  // poses around it are looked for in R^n
   const ConstraintBlocks holonomic = only_holonomic(scene.constraints);
   for (const double distance : {-0.3, -0.1, 0.1, 0.3}) {
     const auto pose = pose_near(holonomic, start.time, moved(start, distance), {});
@@ -150,6 +151,7 @@ double distance_from(const ConstraintBlocks& holonomic, double t, const Vector& 
 /// names.
 bool broken_by_the_others(const Scene& scene, const Start& start, const std::vector<std::string>& dependent) {
   constexpr double met = 1e-7;
+  if (scene.space) return false;
   const ConstraintBlocks others = only_holonomic(without_rows(scene, dependent)->constraints);
   std::vector<std::string> kept = scene.row_names();
   std::erase_if(

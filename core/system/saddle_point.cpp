@@ -125,6 +125,7 @@ void AccelerationProblem::begin(double t, ConstVectorRef q, ConstVectorRef v) {
   known_force_.resize(n_);
   lagrangian.gradient_rate(t, q, v, known_force_);
   known_force_ = lq_ - known_force_;
+  scene_.add_turning(v, lv_, known_force_);
   if (scene_.force) {
     scene_.force->value(t, q, v, lv_);
     known_force_ += lv_;

@@ -70,8 +70,8 @@ class VelocityProblem final : public SaddlePointProblem {
   bool mass_taken_ = false;  ///< in this solve or known
 };
 
-/// Unknowns (a, Λ), linear:   d/dt(∂L/∂v) − ∂L/∂q − f = A(q)ᵀΛ,   d/dt(A(q) v + b(q)) = 0,   a = dv/dt.
-/// Λ are the forces of the constraint rows: Aᵀ Λ is a generalised force.
+/// Unknowns (a, Λ), linear:   d/dt(∂L/∂v) − ad*_v ∂L/∂v − ∂L/∂q − f = A(q)ᵀΛ,   d/dt(A(q) v + b(q)) = 0,   a
+/// = dv/dt. Λ are the forces of the constraint rows: Aᵀ Λ is a generalised force.
 class AccelerationProblem final : public SaddlePointProblem {
  public:
   using SaddlePointProblem::SaddlePointProblem;

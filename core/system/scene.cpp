@@ -1,5 +1,7 @@
 #include <cmath>
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/numerics/scales.hpp>
+#include <diracstep/core/spaces/space.hpp>
 #include <diracstep/core/system/legendre_transform.hpp>
 #include <diracstep/core/system/rows_along_motions.hpp>
 #include <diracstep/core/system/scene.hpp>
@@ -16,9 +18,10 @@ void require_finite(const Scene& scene, const char* what, const Vector& column) 
   for (int i = 0; i < column.size(); ++i)
     if (!std::isfinite(column[i])) {
       std::ostringstream message;
+      const bool named = column.size() == scene.dimension();
       message << "scene '" << scene.name << "': the start has " << what << "_"
-              << scene.coordinates[static_cast<std::size_t>(i)] << " = " << column[i]
-              << "; a finite number is needed";
+              << (named ? scene.coordinates[static_cast<std::size_t>(i)] : std::to_string(i)) << " = "
+              << column[i] << "; a finite number is needed";
       throw Misuse(message.str());
     }
 }
@@ -31,6 +34,17 @@ void require_finite(const Scene& scene, const char* what, const Vector& column) 
   throw InconsistentStart(message.str());
 }
 
+/// A start on the space, to within what a text with a few digits less than a double has.
+void require_on_space(const Scene& scene, const Vector& q) {
+  if (!scene.space) return;
+  const double off = max_norm(scene.space->normalised(q) - q);
+  if (off <= start_tolerance) return;
+  std::ostringstream message;
+  message << "scene '" << scene.name << "': the start q is not on " << scene.space->name() << ", by " << off
+          << ": quaternions and (cos, sin) have length 1; Space::normalised() makes them so";
+  throw Misuse(message.str());
+}
+
 }  // namespace
 
 std::vector<std::string> Scene::row_names() const {
@@ -38,6 +52,20 @@ std::vector<std::string> Scene::row_names() const {
   for (const auto& block : constraints)
     names.insert(names.end(), block->names().begin(), block->names().end());
   return names;
+}
+
+int Scene::storage_size() const { return space ? space->storage_size() : dimension(); }
+
+void Scene::add_turning(ConstVectorRef v, ConstVectorRef momentum, VectorRef rate) const {
+  if (!space) return;
+  const int d = space->group_dimension();
+  Vector velocity(d), covector(d), turned(dimension());
+  Columns coadjoint(d, d);
+  space->embed(v, velocity);
+  space->embed(momentum, covector);
+  space->coadjoint(covector, coadjoint);
+  space->restrict(coadjoint * velocity, turned);
+  rate += turned;
 }
 
 const PhaseFunction& Scene::stepped_function() const {
@@ -68,6 +96,14 @@ void require_well_formed(const Scene& scene) {
   if (scene.dimension() == 0) throw Misuse(prefix + "it has no coordinates");
   if (!scene.lagrangian && !scene.hamiltonian)
     throw Misuse(prefix + "it has neither a Lagrangian nor a Hamiltonian");
+  if (scene.space) {
+    require_size(prefix + "the coordinates on " + scene.space->name(), scene.dimension(),
+                 scene.space->dimension());
+    if (scene.hamiltonian || !scene.lagrangian)
+      throw Misuse(prefix + "on " + scene.space->name() +
+                   " a scene is given by a Lagrangian, and by that alone");
+    if (scene.kinks) throw Misuse(prefix + "kinks are known in R^n only");
+  }
   if (scene.lagrangian)
     require_size(prefix + "the Lagrangian", scene.lagrangian->dimension(), scene.dimension());
   if (scene.hamiltonian)
@@ -118,13 +154,13 @@ Start completed_start(const Scene& scene, Start start) {
   }
   if (start.p.size() == 0) return start;
   const std::string prefix = "scene '" + scene.name + "': ";
-  require_size(prefix + "the start q", start.q.size(), scene.dimension());
+  require_size(prefix + "the start q", start.q.size(), scene.storage_size());
   require_size(prefix + "the start p", start.p.size(), scene.dimension());
   start.v.setZero(scene.dimension());  // where the Lagrangian is tested for a Hamiltonian
   const auto hamiltonian = scene.hamiltonian
                                ? scene.hamiltonian
                                : hamiltonian_from(scene.lagrangian, start.time, start.q, start.v);
-  Vector hq(start.q.size());
+  Vector hq(scene.dimension());
   hamiltonian->gradient(start.time, start.q, start.p, hq, start.v);
   return start;
 }
@@ -185,6 +221,7 @@ void require_consistent(const Scene& scene, const Start& given) {
   require_finite(scene, "q", start.q);
   require_finite(scene, "v", start.v);
   if (!std::isfinite(start.time)) throw Misuse(prefix + "the start time is not finite");
+  require_on_space(scene, start.q);
   int first = 0;
   for (const auto& block : scene.constraints) {
     const int m = block->rows();
@@ -193,8 +230,9 @@ void require_consistent(const Scene& scene, const Start& given) {
     if (block->holonomic()) {
       block->position(start.time, start.q, phi);
       terms.setOnes();
-      block->pattern().multiply_add(a.cwiseAbs().eval().data(), start.q.cwiseAbs().eval().data(),
-                                    terms.data());
+      const Vector sizes = scene.space ? Vector(Vector::Constant(scene.dimension(), max_norm(start.q)))
+                                       : Vector(start.q.cwiseAbs());
+      block->pattern().multiply_add(a.cwiseAbs().eval().data(), sizes.data(), terms.data());
       for (int r = 0; r < m; ++r)
         if (!(std::abs(phi[r]) <= start_tolerance * terms[r]))
           throw_off_row(scene, first + r, "φ(q)", phi[r], terms[r]);

@@ -12,6 +12,8 @@
 
 namespace diracstep {
 
+class Space;
+
 /// Where a motion starts: a configuration, and a velocity in the distribution or a momentum whose velocity
 /// ∂H/∂p lies in it, with the scene's Hamiltonian or that of a regular Lagrangian.
 struct Start {
@@ -51,15 +53,24 @@ struct Scene {
   /// The scene with all its rows, where some were left out as redundant (with_rows_left_out()); null where
   /// none were.  An Integrator holds every step to them.
   std::shared_ptr<const Scene> whole = {};
+  /// Null in R^n.  Else velocities, momenta, one-forms and forces are left-trivialised: increments multiply
+  /// from the right, velocities and momenta are in the body (spaces/space.hpp); L, rows and force are made by
+  /// on_space(), `coordinates` name the components of a velocity, and there is no Hamiltonian.
+  ///
+  ///   q̇ = q v,   p = ∂L/∂v,   ṗ − ad*_v p − ∂L/∂q − f ∈ Δ°_Q(q)
+  std::shared_ptr<const Space> space = {};
 
   /// Of the tangent spaces: how many numbers a velocity, a momentum, a row and the second derivatives of L
   /// have.
   int dimension() const { return static_cast<int>(coordinates.size()); }
-  /// How many numbers a configuration is stored in.  In R^n, the one kind of space so far, the same n; a
-  /// rotation would take four for three.
-  int storage_size() const { return dimension(); }
+  /// How many numbers a configuration is stored in.  In R^n the same n; a rotation takes four for three.
+  int storage_size() const;
   int rows() const { return row_count(constraints); }
   std::vector<std::string> row_names() const;
+
+  /// rate += ad*_v p, by which a momentum in the body turns with it: ⟨ad*_v p, w⟩ = ⟨p, [v, w]⟩.  Nothing in
+  /// R^n.
+  void add_turning(ConstVectorRef v, ConstVectorRef momentum, VectorRef rate) const;
 
   /// Given by a Hamiltonian alone: steps are taken and points are read by H, and momenta are data.
   bool by_hamiltonian() const { return hamiltonian && (!lagrangian || lagrangian_derived); }

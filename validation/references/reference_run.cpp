@@ -29,6 +29,7 @@ void require_reference(const char* integrator, const Scene& scene, double t_end,
     message << integrator << ": " << option << " = " << value << "; " << which;
     throw Misuse(message.str());
   };
+  if (scene.space) throw Misuse(std::string(integrator) + ": scene '" + scene.name + "' is not in R^n");
   require_consistent(scene, scene.start);
   require(t_end > scene.start.time && std::isfinite(t_end), "t_end", t_end,
           "a finite time after the start is needed");

@@ -1,0 +1,184 @@
+#include <array>
+#include <cmath>
+#include <diracstep/core/numerics/scales.hpp>
+#include <diracstep/core/spaces/space.hpp>
+#include <diracstep/core/steps/groups/point.hpp>
+#include <diracstep/core/steps/groups/trapezoidal_step.hpp>
+#include <span>
+#include <string>
+
+namespace diracstep {
+
+namespace {
+
+class GroupTrapezoidalStep final : public StepProblem {
+ public:
+  explicit GroupTrapezoidalStep(const Scene& scene)
+      : space_(*scene.space),
+        n_(scene.dimension()),
+        m_(scene.rows()),
+        first_(scene),
+        last_(scene),
+        first_rows_(scene),
+        last_rows_(scene),
+        pattern_(SparsityPattern::dense(n_ + m_, n_ + m_)),
+        blocks_{{{"momentum", n_}, {"constraint", m_}}} {}
+
+  int size() const override { return n_ + m_; }
+  const SparsityPattern& pattern() const override { return pattern_; }
+  std::span<const ResidualBlock> blocks() const override { return std::span(blocks_).first(m_ > 0 ? 2 : 1); }
+  std::string failure() const override { return failure_; }
+
+  StepTraits traits() const override {
+    StepTraits traits{"velocity (" + std::to_string(n_) + ")", n_, 2, 0};
+    if (m_ > 0) traits.unknowns += ", multipliers (" + std::to_string(m_) + ")";
+    traits.unknowns += " on " + space_.name();
+    return traits;
+  }
+
+  void begin(Interval step, const State& start, const StepMemory& memory) override {
+    if (step.start != step_.start) failure_.clear();
+    step_ = step;
+    q0_ = start.q;
+    p0_.resize(space_.group_dimension());
+    space_.embed(start.p, p0_);
+    force_size_ = memory.known ? memory.scales[0] : 0.0;
+    impulse_size_ = memory.known ? memory.scales[1] : 0.0;
+    if (m_ > 0) first_rows_.evaluate(step.start, q0_);
+    evaluated_ = false;
+    set_scales();
+  }
+
+  void guess(ConstVectorRef v0, VectorRef x) override {
+    x.head(n_) = v0;
+    x.tail(m_).setZero();
+  }
+
+  void residual(ConstVectorRef x, VectorRef f) override {
+    if (!evaluate(x)) {
+      f.setConstant(std::nan(""));
+      return;
+    }
+    space_.restrict(0.5 * (first_.momentum() + last_.momentum()) - back_.transpose() * carried_, f.head(n_));
+    if (m_ == 0) return;
+    Vector positions(m_);
+    last_rows_.positions(step_.end(), q1_, positions);
+    const Vector rates = 0.5 * (first_rows_.forms() * v_ + first_rows_.offsets() + last_rows_.forms() * v_ +
+                                last_rows_.offsets());
+    for (int r = 0; r < m_; ++r) f[n_ + r] = holonomic(r) ? positions[r] / step_.size : rates[r];
+  }
+
+  void jacobian(ConstVectorRef x, VectorRef values) override {
+    auto matrix = values.reshaped(size(), size());
+    if (!evaluate(x)) {
+      matrix.setConstant(std::nan(""));
+      return;
+    }
+    const double h = step_.size;
+    const Eigen::Index d = space_.group_dimension();
+    GroupPoint::Derivatives at_first, at_last;
+    first_.derivatives(at_first);
+    last_.derivatives(at_last);
+    Columns along(d, d);
+    space_.dtau_transposed_along(-h * v_, carried_, along);
+    const Columns moved = h * dtau_;
+    const Columns momentum = 0.5 * (at_first.momentum_xi + at_last.momentum_xi + at_last.momentum_g * moved) +
+                             h * along - 0.5 * h * back_.transpose() * at_first.force_xi;
+    matrix.topLeftCorner(n_, n_) = momentum(space_.tangent(), space_.tangent());
+    if (m_ == 0) return;
+    const Columns impulse = back_.transpose() * first_rows_.forms().transpose();
+    matrix.topRightCorner(n_, m_) = -impulse(space_.tangent(), Eigen::all);
+    matrix.bottomRightCorner(m_, m_).setZero();
+    Columns turned(m_, d);
+    last_rows_.derivative(step_.end(), q1_, v_, turned);
+    const Columns rates = 0.5 * (first_rows_.forms() + last_rows_.forms() + turned * moved),
+                  positions = last_rows_.forms() * dtau_;
+    for (int r = 0; r < m_; ++r)
+      matrix.block(n_ + r, 0, 1, n_) = (holonomic(r) ? positions : rates).row(r)(space_.tangent());
+  }
+
+  void finish(ConstVectorRef x, StepEnd& end) override {
+    if (!evaluate(x)) {
+      end.at.q.setConstant(space_.storage_size(), std::nan(""));
+      end.at.p.setConstant(n_, std::nan(""));
+      end.at.v.setConstant(n_, std::nan(""));
+      return;
+    }
+    const double h = step_.size;
+    end.at.q = q1_;
+    end.at.p.resize(n_);
+    space_.restrict(adjoint_.transpose() * carried_ + 0.5 * h * last_.force(), end.at.p);
+    end.at.v = x.head(n_);
+    end.impulse = x.tail(m_);
+    end.memory.known = true;
+    end.memory.scales.resize(2);
+    end.memory.scales << force_size_, impulse_size_;
+    end.memory.multipliers.resize(0);
+  }
+
+ private:
+  bool holonomic(int r) const { return first_rows_.holonomic()[static_cast<std::size_t>(r)]; }
+
+  /// False where the step leaves what the retraction is injective on.
+  bool evaluate(ConstVectorRef x) {
+    if (evaluated_ && last_x_ == x) return inside_;
+    evaluated_ = true;
+    last_x_ = x;
+    const double h = step_.size;
+    const Eigen::Index d = space_.group_dimension();
+    v_.resize(d);
+    space_.embed(x.head(n_), v_);
+    const double part = space_.part_of_chart(h * v_);
+    inside_ = part < 1.0;
+    q1_ = space_.moved(q0_, h * v_);
+    if (!inside_) {
+      failure_ = "a step turned by more than its retraction is injective on, by " + std::to_string(part) +
+                 " of that; take a smaller one";
+      return false;
+    }
+    for (Columns* matrix : {&adjoint_, &dtau_, &back_}) matrix->resize(d, d);
+    Columns unused(d, d);
+    space_.maps(-h * v_, unused, back_);
+    space_.maps(h * v_, adjoint_, dtau_);
+    first_.evaluate(step_.start, q0_, v_);
+    last_.evaluate(step_.end(), q1_, v_);
+    carried_ = p0_ + 0.5 * h * first_.force();
+    if (m_ > 0) {
+      last_rows_.evaluate(step_.end(), q1_);
+      const Vector impulse = first_rows_.impulse(x.tail(m_));
+      carried_ += impulse;
+      impulse_size_ = std::max(impulse_size_, max_norm(impulse));
+    }
+    force_size_ = std::max({force_size_, max_norm(first_.force()), max_norm(last_.force())});
+    set_scales();
+    return true;
+  }
+
+  /// A velocity of size |q|/h loses ε|q|/h to round-off, and so does its momentum.
+  void set_scales() {
+    const double h = std::abs(step_.size), q = max_norm(q0_);
+    blocks_[0].scale = scale_of(max_norm(p0_) + h * force_size_ + impulse_size_);
+    if (m_ > 0) blocks_[1].scale = scale_of(max_norm(first_rows_.forms()) * (max_norm(v_) + q / h));
+  }
+
+  const Space& space_;
+  int n_, m_;
+  GroupPoint first_, last_;
+  GroupRows first_rows_, last_rows_;
+  SparsityPattern pattern_;
+  std::array<ResidualBlock, 2> blocks_;
+  Interval step_{};
+  Vector q0_, p0_, q1_, v_, last_x_, carried_;
+  Columns adjoint_, dtau_, back_;
+  double force_size_ = 0.0, impulse_size_ = 0.0;
+  std::string failure_;
+  bool evaluated_ = false, inside_ = true;
+};
+
+}  // namespace
+
+std::unique_ptr<StepProblem> group_trapezoidal_step(const Scene& scene) {
+  return std::make_unique<GroupTrapezoidalStep>(scene);
+}
+
+}  // namespace diracstep
