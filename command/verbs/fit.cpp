@@ -3,27 +3,22 @@
 #include <CLI/App.hpp>
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <diracstep/command/arguments.hpp>
+#include <diracstep/command/files/data_table.hpp>
 #include <diracstep/command/verbs.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/numerics/near_names.hpp>
-#include <diracstep/files/input_file.hpp>
 #include <diracstep/files/output_file.hpp>
 #include <diracstep/reports/json.hpp>
 #include <diracstep/reports/report.hpp>
 #include <diracstep/scene_format/parametric_scene_file.hpp>
 #include <diracstep/sensitivities/fit.hpp>
-#include <limits>
 #include <memory>
-#include <string_view>
 
 namespace diracstep::command {
 
 namespace {
-
-constexpr std::size_t most_data_bytes = 100'000'000;
 
 struct FitArguments {
   std::string scene, data, parameters, residuals;
@@ -35,60 +30,6 @@ struct FitArguments {
   bool json = false;
 };
 
-std::vector<std::string_view> fields_of(std::string_view line) {
-  std::vector<std::string_view> parts;
-  for (std::size_t begin = 0; begin <= line.size();) {
-    const std::size_t end = std::min(line.find(',', begin), line.size());
-    std::string_view part = line.substr(begin, end - begin);
-    while (!part.empty() && (part.front() == ' ' || part.front() == '"')) part.remove_prefix(1);
-    while (!part.empty() && (part.back() == ' ' || part.back() == '"' || part.back() == '\r'))
-      part.remove_suffix(1);
-    parts.push_back(part);
-    begin = end + 1;
-  }
-  return parts;
-}
-
-/// A table with its columns named in the first line; an empty field is NaN.
-struct Table {
-  std::vector<std::string> names;
-  std::vector<std::vector<double>> rows;
-};
-
-double number(std::string_view cell, const std::string& path, std::size_t line) {
-  if (cell.empty()) return std::numeric_limits<double>::quiet_NaN();
-  double value = 0.0;
-  const auto [end, error] = std::from_chars(cell.data(), cell.data() + cell.size(), value);
-  if (error != std::errc() || end != cell.data() + cell.size())
-    throw Misuse(fmt::format("'{}', line {}: '{}' is not a number", path, line, cell));
-  return value;
-}
-
-Table read_table(const std::string& path) {
-  const std::string text = read_file(path, "the data", most_data_bytes);
-  Table table;
-  std::size_t number_of_line = 0;
-  for (std::size_t begin = 0; begin < text.size();) {
-    const std::size_t end = std::min(text.find('\n', begin), text.size());
-    const std::string_view line(text.data() + begin, end - begin);
-    begin = end + 1;
-    ++number_of_line;
-    if (line.empty() || line == "\r" || line.front() == '#') continue;
-    const auto parts = fields_of(line);
-    if (table.names.empty()) {
-      table.names.assign(parts.begin(), parts.end());
-      continue;
-    }
-    if (parts.size() != table.names.size())
-      throw Misuse(fmt::format("'{}', line {}: {} fields; the first line names {}", path, number_of_line,
-                               parts.size(), table.names.size()));
-    auto& row = table.rows.emplace_back();
-    for (const std::string_view part : parts) row.push_back(number(part, path, number_of_line));
-  }
-  if (table.rows.empty()) throw Misuse(fmt::format("'{}' has no lines of data", path));
-  return table;
-}
-
 /// Columns of a trajectory that nothing is fitted to.
 bool is_left_alone(const std::string& name) {
   return name == "energy" || std::ranges::any_of(std::array{"p_", "lambda_", "invariant_", "d("},
@@ -96,7 +37,8 @@ bool is_left_alone(const std::string& name) {
 }
 
 /// The columns that are coordinates or velocities v_NAME; any other name is a mistake.
-FitData data_of(const Table& table, const std::string& path, const Scene& scene, const Parameters& sigma) {
+FitData data_of(const DataTable& table, const std::string& path, const Scene& scene,
+                const Parameters& sigma) {
   if (table.names.front() != "t")
     throw Misuse(fmt::format("'{}': the first column is '{}'; expected t", path, table.names.front()));
   std::vector<std::string> known;
@@ -234,7 +176,7 @@ void run_fit(FitArguments arguments, Session& session) {
                                parameters_fitted[k]));
     begin[static_cast<Eigen::Index>(k)] = found->second;
   }
-  const Table table = read_table(arguments.data);
+  const DataTable table = read_table(arguments.data);
   const FitData data = data_of(table, arguments.data, *entry.scene, parameters(arguments.sigma, "--sigma"));
   take_recommendation(entry, arguments.method, arguments.step);
   IntegratorOptions steps = integrator_options(session, arguments.method);
