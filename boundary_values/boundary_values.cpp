@@ -3,6 +3,7 @@
 #include <diracstep/boundary_values/boundary_values.hpp>
 #include <diracstep/boundary_values/detail/newton.hpp>
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/runs/energy_check.hpp>
 
 namespace diracstep {
 
@@ -134,6 +135,7 @@ void add_points(const Solved& of, BoundaryReport& report) {
   report.times.resize(count);
   for (Columns* columns : {&report.q, &report.v, &report.p})
     *columns = Columns::Constant(n, count, std::nan(""));
+  EnergyCheck energy(of.equations.scene(), of.integrator.method().damped);
   Sample sample;
   for (Eigen::Index k = 0; k < count; ++k) {
     const auto& node = nodes[static_cast<std::size_t>(k)];
@@ -145,7 +147,9 @@ void add_points(const Solved& of, BoundaryReport& report) {
     if (!of.integrator.sample(Momentum::projected, sample).ok()) continue;
     report.v.col(k) = sample.v;
     report.p.col(k) = sample.p;
+    energy.see(sample);
   }
+  report.doubt = energy.text();
 }
 
 }  // namespace

@@ -10,8 +10,6 @@ namespace diracstep::boundary {
 
 namespace {
 
-enum Kind { position_kind, momentum_kind, velocity_kind, unknown_kind, multiplier_kind };
-
 Sparse sparse(const Columns& matrix) { return matrix.sparseView(); }
 
 Sparse transposed(const Sparse& matrix) { return matrix.transpose(); }

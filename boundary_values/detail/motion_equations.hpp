@@ -10,6 +10,9 @@ namespace diracstep::boundary {
 
 using sensitivity::Sparse;
 
+/// What an unknown is: at an end of a step, or one of the step's own, or μ.
+enum Kind { position_kind, momentum_kind, velocity_kind, unknown_kind, multiplier_kind, kinds };
+
 /// All steps of a motion as one system.  Unknowns u, in the order of time:
 ///
 ///   v0, (q0, p0), x_0, (q1, p1), x_1, …, (qN, pN), vN, μ
@@ -45,9 +48,8 @@ class MotionEquations {
   /// of qN for the last n, by multipliers of the holonomic rows.  Lines as the equations of the ends.
   Columns slack(const Vector& u);
 
-  /// For each unknown the kind it is of, 0 … kinds − 1.
-  static constexpr int kinds = 5;
-  const std::vector<int>& kind() const { return kind_; }
+  double duration() const { return end_time_ - start_time_; }
+  const std::vector<Kind>& kind() const { return kind_; }
 
   /// Where q0 (n) and v0 stand among the unknowns, in this order; and qN, vN.
   std::vector<int> start_unknowns() const;
@@ -93,7 +95,7 @@ class MotionEquations {
   std::vector<Stage> stages_;
   std::vector<std::pair<double, int>> step_ends_;  ///< time, and where its node stands
   int end_ = 0, unknowns_ = 0;
-  std::vector<int> kind_;
+  std::vector<Kind> kind_;
 };
 
 }  // namespace diracstep::boundary

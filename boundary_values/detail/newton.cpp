@@ -10,17 +10,19 @@ namespace diracstep::boundary {
 
 namespace {
 
-/// In parts of the sizes of each kind, the root of the mean square; infinite where it is no number.  The
-/// multipliers at the end, which are in the unit of their rows and may be zero to round-off, do not count.
+/// In parts of the sizes of each kind, the root of the mean square; infinite where a correction is no number.
+/// Momenta and the multipliers at the end do not count: they follow from the rest, and may be zero to
+/// round-off beside it.
 double norm_of(const MotionEquations& equations, const Vector& correction, const Vector& sizes) {
+  if (!correction.allFinite()) return std::numeric_limits<double>::infinity();
   double sum = 0.0;
   for (Eigen::Index i = 0; i < correction.size(); ++i) {
     const int kind = equations.kind()[static_cast<std::size_t>(i)];
-    const double part = kind == MotionEquations::kinds - 1 ? 0.0 : correction[i] / sizes[kind];
-    sum += std::isfinite(correction[i]) ? part * part : std::numeric_limits<double>::infinity();
+    if (kind == momentum_kind || kind == multiplier_kind) continue;
+    const double part = correction[i] / sizes[kind];
+    sum += part * part;
   }
-  const double norm = std::sqrt(sum / static_cast<double>(correction.size()));
-  return std::isfinite(norm) ? norm : std::numeric_limits<double>::infinity();
+  return std::sqrt(sum / static_cast<double>(correction.size()));
 }
 
 /// With one step of refinement: sparse pivots are not the largest.
@@ -40,11 +42,14 @@ constexpr double rank_tolerance = 1e-7;
 }  // namespace
 
 Vector sizes_by_kind(const MotionEquations& equations, const Vector& u) {
-  Vector sizes = Vector::Zero(MotionEquations::kinds);
+  Vector sizes = Vector::Zero(kinds);
   for (Eigen::Index i = 0; i < u.size(); ++i) {
     double& size = sizes[equations.kind()[static_cast<std::size_t>(i)]];
     size = std::max(size, std::abs(u[i]));
   }
+  // Where all is at rest, what a motion over its places would have.
+  const double rate = sizes[position_kind] / std::abs(equations.duration());
+  for (const Kind kind : {velocity_kind, unknown_kind}) sizes[kind] = std::max(sizes[kind], rate);
   return (sizes.array() > 0.0).select(sizes, 1.0);
 }
 

@@ -77,7 +77,7 @@ struct NewtonReport {
 NewtonReport newton(MotionEquations& equations, Vector& u, int max_iterations,
                     const std::function<std::unique_ptr<LinearisedEnds>(const Vector& u)>& factor);
 
-/// The largest number of each kind of unknown, 1 where all are zero.
+/// The largest number of each Kind of unknown, 1 where all are zero.
 Vector sizes_by_kind(const MotionEquations& equations, const Vector& u);
 
 }  // namespace diracstep::boundary

@@ -213,6 +213,7 @@ std::string boundary_json(const BoundaryReport& report, const BoundaryProblem& p
   Json json{{"scene", problem.scene->name},
             {"converged", report.converged},
             {"ending", report.ending},
+            {"doubt", report.doubt.empty() ? Json(nullptr) : Json(report.doubt)},
             {"method", method},
             {"steps", problem.steps},
             {"step", problem.options.step},
@@ -291,6 +292,10 @@ void run_boundary(BoundaryArguments arguments, Session& session) {
   const std::string method =
       Integrator(entry.scene, session.registry, session.solvers, problem.options).method().name;
   print(arguments.json ? boundary_json(report, problem, method) : boundary_text(report, problem, method));
+  if (report.converged && !report.doubt.empty()) {
+    say("doubted: " + report.doubt);
+    session.exit_status = doubted;
+  }
   if (report.converged) return;
   say(report.ending);
   session.exit_status = failed;

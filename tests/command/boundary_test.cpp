@@ -72,12 +72,28 @@ TEST_F(Boundary, RefusesWithTheReason) {
   expect_misuse("boundary kepler_e06 --to x=1 y=0 --guess '" + path("guess.csv") + "'", {"no column 'y'"});
 }
 
-TEST_F(Boundary, ASearchThatDoesNotConvergeFails) {
-  const Outcome outcome =
-      run("boundary kepler_e06 --from x=1 y=0 --to x=-1 y=0 --end 2 --out '" + path("through.csv") + "'");
+TEST_F(Boundary, ASearchThatFindsNothingFails) {
+  const std::string file = scene("falling", R"toml(
+lagrangian = "v_x^2/2 + x"
+[coordinates]
+x = {}
+[start]
+x = 1
+[span]
+end = 1
+step = 0.1
+)toml");
+  const Outcome outcome = run("boundary '" + file + "' --periodic --out '" + path("none.csv") + "'");
   EXPECT_EQ(outcome.status, 1) << outcome.out;
-  EXPECT_NE(outcome.err.find("a guess nearer to a solution"), std::string::npos) << outcome.err;
-  EXPECT_GT(lines(contents(path("through.csv"))).size(), 10u);
+  EXPECT_FALSE(outcome.err.empty());
+  EXPECT_EQ(lines(contents(path("none.csv"))).size(), 12u);  // the last iterate
+}
+
+/// From one side of the centre straight to the other: the steps leap over it.
+TEST_F(Boundary, AMotionThatDoesNotKeepItsEnergyIsDoubted) {
+  const Outcome outcome = run("boundary kepler_e06 --from x=1 y=0 --to x=-1 y=0 --end 2");
+  EXPECT_EQ(outcome.status, 3) << outcome.out;
+  EXPECT_NE(outcome.err.find("energy"), std::string::npos) << outcome.err;
 }
 
 }  // namespace
