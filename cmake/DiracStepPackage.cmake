@@ -44,7 +44,7 @@ if(DIRACSTEP_WITH_KLU)
   list(APPEND solver_libraries klu)
 endif()
 pkg_config_file(diracstep "${PROJECT_DESCRIPTION}" REQUIRES eigen3
-  LIBS diracstep_sensitivities diracstep_solvers diracstep_constraints diracstep_core PRIVATE_LIBS ${solver_libraries} pthread)
+  LIBS diracstep_boundary_values diracstep_sensitivities diracstep_solvers diracstep_constraints diracstep_core PRIVATE_LIBS ${solver_libraries} pthread)
 if(DIRACSTEP_BUILD_PLUGINS)
   pkg_config_file(diracstep-plugins "DiracStep: plugins, written and loaded" REQUIRES diracstep
     LIBS diracstep_plugins PRIVATE_LIBS ${CMAKE_DL_LIBS})

@@ -158,6 +158,7 @@ int with_all_verbs(int count, char** arguments, bool run_verbs, const Processes&
   Session session;
   session.processes = processes;
   add_help(app);
+  add_boundary(app, session);
   add_check(app, session);
   add_equilibrium(app, session);
   add_expand(app, session);

@@ -7,6 +7,7 @@ namespace diracstep::command {
 
 /// Each adds one verb with its options; the verb runs while the command line is parsed and leaves its exit
 /// status in the session, which must outlive the parser.
+void add_boundary(CLI::App& app, Session& session);
 void add_check(CLI::App& app, Session& session);
 void add_equilibrium(CLI::App& app, Session& session);
 void add_expand(CLI::App& app, Session& session);

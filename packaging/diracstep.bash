@@ -13,14 +13,14 @@ _diracstep() {
     --momentum) words="plus minus projected" ;;
     --jacobian) words="automatic fresh per-step kept" ;;
     --solver) words="newton fixed-point automatic direct" ;;
-    --out | --residuals | --plugin | --checkpoint | --resume | --compare) compopt -o default 2>/dev/null && return ;;
+    --out | --guess | --residuals | --plugin | --checkpoint | --resume | --compare) compopt -o default 2>/dev/null && return ;;
     *)
       case "$cur,$verb" in
         -*,*) words="$(diracstep ${verb:+"$verb"} --help 2>/dev/null | grep -o -e '--[a-z][a-z-]*' | sort -u)" ;;
         *,) words="$(diracstep --help 2>/dev/null | sed -n '/^Subcommands:/,/^$/s/^  \([a-z]\{1,\}\) .*/\1/p')" ;;
         *,list) words="scenes methods plugins" ;;
         *,sweep) compopt -o default 2>/dev/null && return ;;
-        *,check | *,equilibrium | *,expand | *,fit | *,plan | *,run | *,start | *,study)
+        *,boundary | *,check | *,equilibrium | *,expand | *,fit | *,plan | *,run | *,start | *,study)
           compopt -o default 2>/dev/null # and scene files
           words="$(diracstep list scenes 2>/dev/null | awk '/^$/ { exit } NR > 1 && /^[^ ]/ { print $1 }')"
           ;;

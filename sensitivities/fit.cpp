@@ -1,3 +1,4 @@
+#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <diracstep/core/numerics/errors.hpp>
@@ -29,9 +30,10 @@ class MotionAt {
  public:
   MotionAt(const FitProblem& problem, const FitData& data) : problem_(problem), data_(data) {}
 
-  Motion operator()(const Vector& parameters) const {
+  Motion operator()(const Vector& parameters) {
     Motion motion;
     try {
+      outputs_ = outputs_at(parameters);
       compute(problem_.scene(parameters), motion);
     } catch (const Error& error) {
       motion.failure = error.what();
@@ -40,7 +42,7 @@ class MotionAt {
   }
 
  private:
-  void compute(const ParametricScene& scene, Motion& motion) const {
+  void compute(const ParametricScene& scene, Motion& motion) {
     Integrator integrator(scene.scene, problem_.registry, problem_.solvers, problem_.steps);
     Sensitivities sensitivities(integrator, problem_.registry, scene);
     Directions z = sensitivities.by_parameters();
@@ -70,16 +72,69 @@ class MotionAt {
     const ReadDirections moved = sensitivities.read(z);
     Columns& derivatives = motion.derivatives.emplace_back(data_.values.cols(), z.cols());
     for (std::size_t c = 0; c < data_.columns.size(); ++c) {
-      const auto& [coordinate, velocity, sigma] = data_.columns[c];
+      const auto& [coordinate, velocity, sigma, output] = data_.columns[c];
       const auto column = static_cast<Eigen::Index>(c);
+      if (output >= 0) {
+        motion.values(k, column) = outputs_.at_parameters[number(output)](sample.point());
+        derivatives.row(column) = output_derivatives(number(output), sample, moved);
+        continue;
+      }
       motion.values(k, column) = (velocity ? sample.v : sample.q)[coordinate];
       derivatives.row(column) = (velocity ? moved.v : moved.q).row(coordinate);
     }
     return true;
   }
 
+  static std::size_t number(int output) { return static_cast<std::size_t>(output); }
+
+  /// The outputs with the parameters, and with each a little more and less.
+  struct Outputs {
+    std::vector<PointFunction> at_parameters;
+    std::vector<std::vector<PointFunction>> more, less;
+    Vector change;
+  };
+
+  Outputs outputs_at(const Vector& parameters) const {
+    Outputs outputs;
+    if (std::ranges::none_of(data_.columns, [](const auto& column) { return column.output >= 0; }))
+      return outputs;
+    outputs.at_parameters = problem_.outputs(parameters);
+    outputs.change = 1e-5 * (parameters.array() != 0.0).select(parameters.cwiseAbs(), 1.0);
+    for (Eigen::Index i = 0; i < parameters.size(); ++i) {
+      const Vector step = outputs.change[i] * Vector::Unit(parameters.size(), i);
+      outputs.more.push_back(problem_.outputs(parameters + step));
+      outputs.less.push_back(problem_.outputs(parameters - step));
+    }
+    return outputs;
+  }
+
+  /// Of an output along the motions of parameters a little off.
+  Eigen::RowVectorXd output_derivatives(std::size_t output, const Sample& at,
+                                        const ReadDirections& moved) const {
+    Sample elsewhere = at;
+    elsewhere.lambda.array() += 1.0;
+    if (outputs_.at_parameters[output](at.point()) != outputs_.at_parameters[output](elsewhere.point()))
+      throw Misuse("fit: an output that reads the forces of rows, which are not differentiated");
+    Eigen::RowVectorXd derivatives(outputs_.change.size());
+    const auto moved_by = [&](const std::vector<PointFunction>& functions, Eigen::Index i, double change) {
+      Sample off = at;
+      off.q += change * moved.q.col(i);
+      off.p += change * moved.p.col(i);
+      if (moved.v.rows() > 0) off.v += change * moved.v.col(i);
+      return functions[output](off.point());
+    };
+    for (Eigen::Index i = 0; i < derivatives.size(); ++i) {
+      const auto k = static_cast<std::size_t>(i);
+      const double change = outputs_.change[i];
+      derivatives[i] =
+          (moved_by(outputs_.more[k], i, change) - moved_by(outputs_.less[k], i, -change)) / (2.0 * change);
+    }
+    return derivatives;
+  }
+
   const FitProblem& problem_;
   const FitData& data_;
+  Outputs outputs_;
 };
 
 /// What lmder asks for.
@@ -178,25 +233,35 @@ std::string words(Eigen::LevenbergMarquardtSpace::Status status) {
 
 void measure_uncertainty(const FitProblem& problem, Residuals& residuals, FitReport& report) {
   const auto count = report.parameters.size();
-  const auto freedom = static_cast<double>(report.measured - count);
   Vector f(residuals.values());
   residuals(report.parameters, f);
   Columns jacobian;
   report.covariance = Columns::Constant(count, count, infinity);
   report.interval = Vector::Constant(count, infinity);
-  report.residual = freedom > 0.0 ? std::sqrt(f.squaredNorm() / freedom) : nan;
-  if (residuals.df(report.parameters, jacobian) < 0 || freedom <= 0.0) return;
+  report.residual = nan;
+  if (residuals.df(report.parameters, jacobian) < 0) return;
   // In units of the columns, so that it does not matter what the parameters are measured in.
-  const Vector units = jacobian.colwise().norm().transpose();
-  if (!(units.minCoeff() > 0.0)) return;
+  const Vector norms = jacobian.colwise().norm().transpose();
+  const Vector units = (norms.array() > 0.0).select(norms, 1.0);
   const Columns scaled = jacobian * units.cwiseInverse().asDiagonal();
-  Eigen::ColPivHouseholderQR<Columns> qr(scaled);
-  qr.setThreshold(1e-10);
-  if (qr.rank() < count) return;
-  const Columns inverse = (scaled.transpose() * scaled).ldlt().solve(Columns::Identity(count, count));
-  report.covariance = report.residual * report.residual * units.cwiseInverse().asDiagonal() * inverse *
-                      units.cwiseInverse().asDiagonal();
-  report.interval = student_quantile(problem.confidence, freedom) * report.covariance.diagonal().cwiseSqrt();
+  const Eigen::JacobiSVD<Columns> svd(scaled, Eigen::ComputeThinU | Eigen::ComputeFullV);
+  const Vector& sizes = svd.singularValues();
+  const Eigen::Index rank = (sizes.array() > 1e-10 * sizes[0]).count();
+  const auto freedom = static_cast<double>(report.measured - rank);
+  if (freedom <= 0.0) return;
+  report.residual = std::sqrt(f.squaredNorm() / freedom);
+  const Columns directions = svd.matrixV().leftCols(rank) * sizes.head(rank).cwiseInverse().asDiagonal();
+  const Columns covariance = report.residual * report.residual * units.cwiseInverse().asDiagonal() *
+                             (directions * directions.transpose()) * units.cwiseInverse().asDiagonal();
+  // A parameter is determined where no direction that leaves the data as they are moves it.
+  const Vector open = svd.matrixV().rightCols(count - rank).rowwise().norm();
+  const double quantile = student_quantile(problem.confidence, freedom);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    if (open[i] > 1e-6) continue;
+    report.interval[i] = quantile * std::sqrt(covariance(i, i));
+    for (Eigen::Index j = 0; j < count; ++j)
+      if (open[j] <= 1e-6) report.covariance(i, j) = covariance(i, j);
+  }
 }
 
 }  // namespace
@@ -223,6 +288,9 @@ double student_quantile(double probability, double degrees) {
 
 FitReport fit(const FitProblem& problem, const FitData& data, const Vector& parameters) {
   require_data(data);
+  if (!problem.outputs &&
+      std::ranges::any_of(data.columns, [](const auto& column) { return column.output >= 0; }))
+    throw Misuse("fit: a column of an output, and no outputs");
   Residuals residuals(problem, data);
   if (parameters.size() == 0) throw Misuse("fit: no parameters");
   if (residuals.values() < parameters.size())

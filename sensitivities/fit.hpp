@@ -3,6 +3,7 @@
 #include <diracstep/core/integrator/integrator_options.hpp>
 #include <diracstep/core/methods/registry.hpp>
 #include <diracstep/core/numerics/nonlinear_solver.hpp>
+#include <diracstep/core/system/motion_point.hpp>
 #include <diracstep/sensitivities/parametric_scene.hpp>
 #include <functional>
 #include <string>
@@ -17,6 +18,7 @@ struct FitData {
     int coordinate;
     bool velocity = false;
     double sigma = 1.0;  ///< its standard deviation, or that in relation to the others
+    int output = -1;     ///< not a coordinate but FitProblem::outputs of this number, where 0 or more
   };
   std::vector<Column> columns;
   Vector times;
@@ -33,6 +35,9 @@ struct FitProblem {
   IntegratorOptions steps;
   int max_evaluations = 200;
   double confidence = 0.95;
+  /// Functions of a point of the motion that columns may name, with these parameters; they do not read the
+  /// forces of rows.  Their derivatives are taken by central differences along those of the motion.
+  std::function<std::vector<PointFunction>(const Vector& parameters)> outputs = {};
 };
 
 /// Parameters by least squares, Σ ((measured − motion)/σ)², with the exact derivatives of the discrete
@@ -42,9 +47,10 @@ struct [[nodiscard]] FitReport {
   std::string ending;   ///< how the search ended, in words
   int evaluations = 0;  ///< motions
   Vector parameters;
-  /// s² (JᵀJ)⁻¹ with s² = Σ r²/(N − P) and J at the end; and what the interval of each parameter is to both
-  /// sides, by the quantile of Student's t with N − P degrees of freedom.  For errors that are normal,
-  /// independent and as large as the σ say up to a common factor; linear about the end.
+  /// s² (JᵀJ)⁻¹ with s² = Σ r²/(N − rank of J) and J at the end; and what the interval of each parameter is
+  /// to both sides, by the quantile of Student's t with as many degrees of freedom.  For errors that are
+  /// normal, independent and as large as the σ say up to a common factor; linear about the end.  Infinite for
+  /// a parameter that the data do not determine, alone or beside others.
   Columns covariance;
   Vector interval;
   double residual = 0.0;  ///< s
@@ -54,7 +60,7 @@ struct [[nodiscard]] FitReport {
 
 /// Levenberg's and Marquardt's method (MINPACK's lmder, Eigen) from `parameters` on.  Throws Misuse for data
 /// that are no data: fewer numbers than parameters, times out of order; and where the motion at the start of
-/// the search fails.  A parameter that the data do not determine has an infinite interval.
+/// the search fails, and for columns of outputs that read the forces of rows.
 FitReport fit(const FitProblem& problem, const FitData& data, const Vector& parameters);
 
 /// The number that |t| of Student's distribution stays below with this probability.

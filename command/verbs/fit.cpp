@@ -3,30 +3,26 @@
 #include <CLI/App.hpp>
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <diracstep/command/arguments.hpp>
+#include <diracstep/command/files/data_table.hpp>
 #include <diracstep/command/verbs.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/numerics/near_names.hpp>
-#include <diracstep/files/input_file.hpp>
 #include <diracstep/files/output_file.hpp>
 #include <diracstep/reports/json.hpp>
+#include <diracstep/reports/plot.hpp>
 #include <diracstep/reports/report.hpp>
 #include <diracstep/scene_format/parametric_scene_file.hpp>
 #include <diracstep/sensitivities/fit.hpp>
-#include <limits>
 #include <memory>
-#include <string_view>
 
 namespace diracstep::command {
 
 namespace {
 
-constexpr std::size_t most_data_bytes = 100'000'000;
-
 struct FitArguments {
-  std::string scene, data, parameters, residuals;
+  std::string scene, data, parameters, residuals, picture;
   MethodChoice method;
   std::optional<double> step;
   std::vector<std::string> set, from, sigma;
@@ -35,73 +31,22 @@ struct FitArguments {
   bool json = false;
 };
 
-std::vector<std::string_view> fields_of(std::string_view line) {
-  std::vector<std::string_view> parts;
-  for (std::size_t begin = 0; begin <= line.size();) {
-    const std::size_t end = std::min(line.find(',', begin), line.size());
-    std::string_view part = line.substr(begin, end - begin);
-    while (!part.empty() && (part.front() == ' ' || part.front() == '"')) part.remove_prefix(1);
-    while (!part.empty() && (part.back() == ' ' || part.back() == '"' || part.back() == '\r'))
-      part.remove_suffix(1);
-    parts.push_back(part);
-    begin = end + 1;
-  }
-  return parts;
-}
-
-/// A table with its columns named in the first line; an empty field is NaN.
-struct Table {
-  std::vector<std::string> names;
-  std::vector<std::vector<double>> rows;
-};
-
-double number(std::string_view cell, const std::string& path, std::size_t line) {
-  if (cell.empty()) return std::numeric_limits<double>::quiet_NaN();
-  double value = 0.0;
-  const auto [end, error] = std::from_chars(cell.data(), cell.data() + cell.size(), value);
-  if (error != std::errc() || end != cell.data() + cell.size())
-    throw Misuse(fmt::format("'{}', line {}: '{}' is not a number", path, line, cell));
-  return value;
-}
-
-Table read_table(const std::string& path) {
-  const std::string text = read_file(path, "the data", most_data_bytes);
-  Table table;
-  std::size_t number_of_line = 0;
-  for (std::size_t begin = 0; begin < text.size();) {
-    const std::size_t end = std::min(text.find('\n', begin), text.size());
-    const std::string_view line(text.data() + begin, end - begin);
-    begin = end + 1;
-    ++number_of_line;
-    if (line.empty() || line == "\r" || line.front() == '#') continue;
-    const auto parts = fields_of(line);
-    if (table.names.empty()) {
-      table.names.assign(parts.begin(), parts.end());
-      continue;
-    }
-    if (parts.size() != table.names.size())
-      throw Misuse(fmt::format("'{}', line {}: {} fields; the first line names {}", path, number_of_line,
-                               parts.size(), table.names.size()));
-    auto& row = table.rows.emplace_back();
-    for (const std::string_view part : parts) row.push_back(number(part, path, number_of_line));
-  }
-  if (table.rows.empty()) throw Misuse(fmt::format("'{}' has no lines of data", path));
-  return table;
-}
-
 /// Columns of a trajectory that nothing is fitted to.
 bool is_left_alone(const std::string& name) {
   return name == "energy" || std::ranges::any_of(std::array{"p_", "lambda_", "invariant_", "d("},
                                                  [&](const char* start) { return name.starts_with(start); });
 }
 
-/// The columns that are coordinates or velocities v_NAME; any other name is a mistake.
-FitData data_of(const Table& table, const std::string& path, const Scene& scene, const Parameters& sigma) {
+/// The columns that are coordinates, velocities v_NAME or outputs; any other name is a mistake.
+FitData data_of(const DataTable& table, const std::string& path, const CatalogueScene& entry,
+                const Parameters& sigma) {
+  const Scene& scene = *entry.scene;
   if (table.names.front() != "t")
     throw Misuse(fmt::format("'{}': the first column is '{}'; expected t", path, table.names.front()));
   std::vector<std::string> known;
   for (const char* prefix : {"", "v_"})
     for (const std::string& name : scene.coordinates) known.push_back(prefix + name);
+  for (const Output& output : entry.outputs) known.push_back(output.name);
   FitData data;
   std::vector<std::size_t> used;
   Parameters left = sigma;
@@ -110,19 +55,23 @@ FitData data_of(const Table& table, const std::string& path, const Scene& scene,
     const auto found = std::ranges::find(known, name);
     if (found == known.end()) {
       if (is_left_alone(name)) continue;
-      throw Misuse(fmt::format("'{}': the column '{}' is no coordinate or velocity of scene '{}'{}", path,
-                               name, scene.name, did_you_mean(name, known)));
+      throw Misuse(fmt::format("'{}': the column '{}' is no coordinate, velocity or output of scene '{}'{}",
+                               path, name, scene.name, did_you_mean(name, known)));
     }
     const auto number = static_cast<int>(found - known.begin());
     const int n = scene.dimension();
     const auto given = left.find(name);
-    data.columns.push_back({number % n, number >= n, given != left.end() ? given->second : 1.0});
+    const double deviation = given != left.end() ? given->second : 1.0;
+    if (number < 2 * n)
+      data.columns.push_back({number % n, number >= n, deviation});
+    else
+      data.columns.push_back({0, false, deviation, number - 2 * n});
     if (given != left.end()) left.erase(given);
     used.push_back(c);
   }
   if (used.empty())
-    throw Misuse(
-        fmt::format("'{}' has no column of a coordinate or velocity of scene '{}'", path, scene.name));
+    throw Misuse(fmt::format("'{}' has no column of a coordinate, velocity or output of scene '{}'", path,
+                             scene.name));
   if (!left.empty())
     throw Misuse(fmt::format("--sigma: '{}' is no column of '{}'", left.begin()->first, path));
   const auto rows = static_cast<Eigen::Index>(table.rows.size());
@@ -162,8 +111,11 @@ std::string fit_text(const FitReport& report, const std::vector<std::string>& na
     }
     text += '\n' + aligned(table);
   }
-  if (!report.interval.allFinite())
-    text += "the data do not determine these parameters: intervals are infinite\n";
+  std::string open;
+  for (std::size_t k = 0; k < names.size(); ++k)
+    if (!std::isfinite(report.interval[static_cast<Eigen::Index>(k)]))
+      open += (open.empty() ? "" : ", ") + names[k];
+  if (!open.empty()) text += fmt::format("the data do not determine {}: intervals are infinite\n", open);
   return text +
          fmt::format("\nstandard deviation of what is left: {:.6g} (units of sigma)\n", report.residual);
 }
@@ -190,12 +142,39 @@ std::string fit_json(const FitReport& report, const std::vector<std::string>& na
   return to_text(json, 2) + '\n';
 }
 
+std::string column_name(const FitData::Column& column, const CatalogueScene& entry) {
+  if (column.output >= 0) return entry.outputs[static_cast<std::size_t>(column.output)].name;
+  return (column.velocity ? "v_" : "") +
+         entry.scene->coordinates[static_cast<std::size_t>(column.coordinate)];
+}
+
+/// What is left of each column in units of its standard deviation, over the time.
+void draw_residuals(const std::string& stem, const FitData& data, const FitReport& report,
+                    const CatalogueScene& entry) {
+  std::string script = "set xlabel 't'\nset ylabel '(measured - motion)/sigma'\nset grid\nset key outside\n";
+  std::string curves;
+  for (std::size_t c = 0; c < data.columns.size(); ++c) {
+    script += fmt::format("$data{} << EOD\n", c);
+    for (Eigen::Index k = 0; k < data.times.size(); ++k)
+      if (const double left = report.residuals(k, static_cast<Eigen::Index>(c)); std::isfinite(left))
+        script += fmt::format("{:.17g} {:.17g}\n", data.times[k], left);
+    script += "EOD\n";
+    curves += fmt::format(", $data{} using 1:2 with points title {}", c,
+                          gnuplot_text(column_name(data.columns[c], entry)));
+  }
+  const double band = student_quantile(0.95, 1e6) * report.residual;  // of 95 in 100
+  script += fmt::format(
+      "band = {:.17g}\nplot band with lines dashtype 2 linecolor 'grey' title '95 %', "
+      "-band with lines dashtype 2 linecolor 'grey' notitle{}\n",
+      band, curves);
+  if (const std::string failure = render(script, stem, 800, 400); !failure.empty())
+    throw Error("--picture: " + failure);
+}
+
 void write_residuals(const std::string& path, const FitData& data, const FitReport& report,
-                     const Scene& scene) {
+                     const CatalogueScene& entry) {
   std::string text = "t";
-  for (const FitData::Column& column : data.columns)
-    text += "," + csv_field((column.velocity ? "v_" : "") +
-                            scene.coordinates[static_cast<std::size_t>(column.coordinate)]);
+  for (const FitData::Column& column : data.columns) text += "," + csv_field(column_name(column, entry));
   text += '\n';
   for (Eigen::Index k = 0; k < data.times.size(); ++k) {
     text += fmt::format("{:.17g}", data.times[k]);
@@ -234,32 +213,43 @@ void run_fit(FitArguments arguments, Session& session) {
                                parameters_fitted[k]));
     begin[static_cast<Eigen::Index>(k)] = found->second;
   }
-  const Table table = read_table(arguments.data);
-  const FitData data = data_of(table, arguments.data, *entry.scene, parameters(arguments.sigma, "--sigma"));
+  const DataTable table = read_table(arguments.data);
+  const FitData data = data_of(table, arguments.data, entry, parameters(arguments.sigma, "--sigma"));
   take_recommendation(entry, arguments.method, arguments.step);
   IntegratorOptions steps = integrator_options(session, arguments.method);
   const double last = data.times[data.times.size() - 1];
   steps.step = arguments.step.value_or(entry.natural_step);
   if (!arguments.step) steps.step = std::copysign(steps.step, last - entry.scene->start.time);
-  const FitProblem problem{[&](const Vector& values) {
-                             Parameters all = changes;
-                             for (std::size_t k = 0; k < parameters_fitted.size(); ++k)
-                               all[parameters_fitted[k]] = values[static_cast<Eigen::Index>(k)];
-                             return parametric_scene(arguments.scene,
-                                                     diracstep::make_scene(arguments.scene, all),
-                                                     parameters_fitted, all);
-                           },
-                           session.registry,
-                           session.solvers,
-                           steps,
-                           arguments.max_evaluations,
-                           arguments.confidence};
+  const auto all_of = [&](const Vector& values) {
+    Parameters all = changes;
+    for (std::size_t k = 0; k < parameters_fitted.size(); ++k)
+      all[parameters_fitted[k]] = values[static_cast<Eigen::Index>(k)];
+    return all;
+  };
+  const FitProblem problem{
+      [&](const Vector& values) {
+        const Parameters all = all_of(values);
+        return parametric_scene(arguments.scene, diracstep::make_scene(arguments.scene, all),
+                                parameters_fitted, all);
+      },
+      session.registry,
+      session.solvers,
+      steps,
+      arguments.max_evaluations,
+      arguments.confidence,
+      [&](const Vector& values) {
+        std::vector<PointFunction> functions;
+        for (Output& output : diracstep::make_scene(arguments.scene, all_of(values)).outputs)
+          functions.push_back(std::move(output.at));
+        return functions;
+      }};
   if (const std::string doubt = problem.scene(begin).doubt; !doubt.empty()) {
     say(doubt);
     session.exit_status = doubted;
   }
   const FitReport report = fit(problem, data, begin);
-  if (!arguments.residuals.empty()) write_residuals(arguments.residuals, data, report, *entry.scene);
+  if (!arguments.residuals.empty()) write_residuals(arguments.residuals, data, report, entry);
+  if (!arguments.picture.empty()) draw_residuals(arguments.picture, data, report, entry);
   print(arguments.json ? fit_json(report, parameters_fitted, arguments, entry.scene->name)
                        : fit_text(report, parameters_fitted, arguments, entry.scene->name));
   constexpr double suspicious = 3.0;  // of the standard deviations given
@@ -284,7 +274,7 @@ void add_fit(CLI::App& app, Session& session) {
   add_solver_options(*verb, session);
   verb->add_option("SCENE", arguments->scene, "A scene; see diracstep list scenes")->required();
   verb->add_option("DATA", arguments->data,
-                   "CSV: t, then coordinates and velocities v_NAME; fields may be empty")
+                   "CSV: t, then coordinates, velocities v_NAME and outputs; fields may be empty")
       ->required();
   verb->add_option("--parameters", arguments->parameters, "Parameters of the scene to be fitted")
       ->type_name("P1,P2,…")
@@ -299,6 +289,8 @@ void add_fit(CLI::App& app, Session& session) {
       ->capture_default_str();
   verb->add_option("--residuals", arguments->residuals, "CSV file for what is left of the data")
       ->type_name("FILE");
+  verb->add_option("--picture", arguments->picture, "STEM.svg and STEM.png of the same over the time")
+      ->type_name("STEM");
   add_method_options(*verb, arguments->method);
   verb->add_option(
       "--step", arguments->step,

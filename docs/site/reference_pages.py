@@ -12,6 +12,7 @@ FOLDERS = {
     "constraints": "Rows from formulas, circuits, and systems joined by rows.",
     "solvers": "SUNDIALS KINSOL behind the interface of a nonlinear solver.",
     "sensitivities": "Derivatives of a motion by its start and by parameters, and fits.",
+    "boundary_values": "Motions between two ends, and periodic orbits.",
     "plugins": "The interface of plugins in C and C++, and what loads them.",
     "c_interface": "DiracStep for other languages.",
     "scene_format": "Scenes from text files, and the catalogue.",

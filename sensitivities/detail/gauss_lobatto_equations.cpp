@@ -16,7 +16,7 @@ template <class Matrix>
 class GaussLobattoEquations final : public StageEquations<Matrix> {
  public:
   GaussLobattoEquations(StageParts parts, int s)
-      : problem_(std::move(parts.problem)),
+      : StageEquations<Matrix>(std::move(parts.problem)),
         scene_(std::move(parts.scene)),
         s_(s),
         n_(scene_->n()),
@@ -26,8 +26,8 @@ class GaussLobattoEquations final : public StageEquations<Matrix> {
         nodes_(static_cast<std::size_t>(s)) {}
 
   void take(const SolvedStage& at, StageJacobians<Matrix>& out) override {
-    begin(*problem_, at);
-    out.by_unknowns = jacobian_of<Matrix>(*problem_, at.x);
+    begin(this->problem(), at);
+    out.by_unknowns = jacobian_of<Matrix>(this->problem(), at.x);
     const Eigen::Index unknowns = at.x.size();
     BlockSum<Matrix> start(unknowns, size_ + n_), end_x(2 * n_, unknowns), end(2 * n_, size_ + n_);
     end.add_identity(0, 0, n_);
@@ -41,6 +41,20 @@ class GaussLobattoEquations final : public StageEquations<Matrix> {
     out.by_start = start.result();
     out.end_by_unknowns = end_x.result();
     out.end_by_start = end.result();
+  }
+
+  /// h Σ b_i L(Q_i, V_i).
+  std::optional<double> action(const SolvedStage& at) override {
+    const double h = at.step.size;
+    const auto v = velocities(at);
+    double sum = 0.0;
+    for (int i = 0; i < s_; ++i) {
+      const Vector q = at.start.q + h * v * table_.a.row(i).transpose();
+      sum += h * table_.b[i] *
+             scene_->scene().lagrangian->value(at.step.start + table_.c[i] * h, scene_->point(q),
+                                               scene_->velocity(v.col(i)));
+    }
+    return sum;
   }
 
  private:
@@ -97,7 +111,6 @@ class GaussLobattoEquations final : public StageEquations<Matrix> {
 
   ExtendedScene::LagrangianAt<Matrix>& node(int i) { return nodes_[static_cast<std::size_t>(i)]; }
 
-  std::unique_ptr<StepProblem> problem_;
   std::shared_ptr<ExtendedScene> scene_;
   int s_, n_, size_, m_;
   GaussLobattoTableau table_;
@@ -110,7 +123,7 @@ template <class Matrix>
 class PhaseSpaceEquations final : public StageEquations<Matrix> {
  public:
   PhaseSpaceEquations(StageParts parts, int s)
-      : problem_(std::move(parts.problem)),
+      : StageEquations<Matrix>(std::move(parts.problem)),
         scene_(std::move(parts.scene)),
         s_(s),
         n_(scene_->n()),
@@ -118,8 +131,8 @@ class PhaseSpaceEquations final : public StageEquations<Matrix> {
         table_(gauss_lobatto_tableau(s)) {}
 
   void take(const SolvedStage& at, StageJacobians<Matrix>& out) override {
-    begin(*problem_, at);
-    out.by_unknowns = jacobian_of<Matrix>(*problem_, at.x);
+    begin(this->problem(), at);
+    out.by_unknowns = jacobian_of<Matrix>(this->problem(), at.x);
     const int size = scene_->size();
     const double h = at.step.size;
     const auto v = at.x.head(n_ * s_).reshaped(n_, s_);
@@ -164,7 +177,6 @@ class PhaseSpaceEquations final : public StageEquations<Matrix> {
     return at_nu.q_by_point - at_rest.q_by_point;
   }
 
-  std::unique_ptr<StepProblem> problem_;
   std::shared_ptr<ExtendedScene> scene_;
   int s_, n_;
   double sign_;

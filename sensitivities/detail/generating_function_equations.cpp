@@ -14,7 +14,7 @@ class GeneratingFunctionEquations final : public StageEquations<Matrix> {
  public:
   GeneratingFunctionEquations(StageParts parts, std::unique_ptr<GeneratingFunction> extended,
                               const StepRule& rule)
-      : problem_(std::move(parts.problem)),
+      : StageEquations<Matrix>(std::move(parts.problem)),
         scene_(std::move(parts.scene)),
         s_(std::move(extended)),
         rule_(rule),
@@ -27,6 +27,21 @@ class GeneratingFunctionEquations final : public StageEquations<Matrix> {
         unknowns_(n_ + m_ + n_ * inner_),
         y_(Columns::Zero(size_, s_->columns())),
         hessian_(Columns::Zero(s_->pattern().nonzeros(), s_->pairs())) {}
+
+  int unknowns() const override { return unknowns_; }
+
+  /// L_d by the Legendre transforms of the table in generating_function.hpp: p1 q1 where S lives on p1, less
+  /// p0 q0 where it lives on p0, and S with the sign that makes dL_d = p1 dq1 − p0 dq0.
+  std::optional<double> action(const SolvedStage& at) override {
+    move_to(at);
+    const double s = s_->value(at.step, y_);
+    StepEnd end;
+    this->problem().finish(at.x, end);
+    double action = s_->type() == GeneratingType::two || s_->type() == GeneratingType::three ? -s : s;
+    if (!graph_.starts_from_position) action -= y_.col(0).head(n_).dot(at.start.q);
+    if (!graph_.ends_at_position) action += y_.col(1).head(n_).dot(end.at.q);
+    return action;
+  }
 
   void take(const SolvedStage& at, StageJacobians<Matrix>& out) override {
     move_to(at);
@@ -94,12 +109,12 @@ class GeneratingFunctionEquations final : public StageEquations<Matrix> {
 
   /// The columns of S, the start, the end and λ of the step.
   void move_to(const SolvedStage& at) {
-    begin(*problem_, at);
+    begin(this->problem(), at);
     StepEnd end;
-    problem_->finish(at.x, end);
+    this->problem().finish(at.x, end);
     const double h = at.step.size;
     q1_ = end.at.q;
-    const bool increment_known = by_increment_ && problem_->size() == unknowns_;
+    const bool increment_known = by_increment_ && this->problem().size() == unknowns_;
     increment_ = increment_known ? Vector(at.x.head(n_)) : Vector(q1_ - at.start.q);
     lambda_ = end.impulse;
     Vector p1 = end.at.p, p0 = at.start.p;
@@ -258,7 +273,6 @@ class GeneratingFunctionEquations final : public StageEquations<Matrix> {
     return sum;
   }
 
-  std::unique_ptr<StepProblem> problem_;
   std::shared_ptr<ExtendedScene> scene_;
   std::unique_ptr<GeneratingFunction> s_;
   StepRule rule_;

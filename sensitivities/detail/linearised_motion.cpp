@@ -80,9 +80,7 @@ class LinearisedMotionIn final : public LinearisedMotion {
         size_(scene_->size()),
         m_(scene_->rows()),
         phase_space_(integrator.scene().lagrangian->structure().phase_space()) {
-    std::size_t number = 0;
-    for (const Method& method : methods_of(integrator, registry))
-      parts_.push_back(equations_of<Matrix>(integrator, method, number++, full, scene_));
+    parts_ = stage_equations<Matrix>(integrator, registry, scene_, full);
   }
 
   void push(std::span<const SolvedStage> step, Directions& z) override {
@@ -204,11 +202,29 @@ class LinearisedMotionIn final : public LinearisedMotion {
 
 }  // namespace
 
-std::unique_ptr<LinearisedMotion> linearised_motion(const Integrator& integrator, const Registry& registry,
-                                                    const ParametricScene& scene) {
+template <class Matrix>
+std::vector<std::unique_ptr<StageEquations<Matrix>>> stage_equations(
+    const Integrator& integrator, const Registry& registry, const std::shared_ptr<ExtendedScene>& extended,
+    bool full) {
+  std::vector<std::unique_ptr<StageEquations<Matrix>>> parts;
+  for (const Method& method : methods_of(integrator, registry))
+    parts.push_back(equations_of<Matrix>(integrator, method, parts.size(), full, extended));
+  return parts;
+}
+template std::vector<std::unique_ptr<StageEquations<Columns>>> stage_equations(
+    const Integrator&, const Registry&, const std::shared_ptr<ExtendedScene>&, bool);
+template std::vector<std::unique_ptr<StageEquations<Sparse>>> stage_equations(
+    const Integrator&, const Registry&, const std::shared_ptr<ExtendedScene>&, bool);
+
+void require_lagrangian(const Integrator& integrator) {
   if (!integrator.scene().lagrangian)
     throw Misuse("scene '" + integrator.scene().name +
                  "' has a degenerate Hamiltonian and no Lagrangian: its motion is not differentiated");
+}
+
+std::unique_ptr<LinearisedMotion> linearised_motion(const Integrator& integrator, const Registry& registry,
+                                                    const ParametricScene& scene) {
+  require_lagrangian(integrator);
   const std::shared_ptr<const Scene> prepared(std::shared_ptr<const Scene>{}, &integrator.scene());
   auto extended = std::make_shared<ExtendedScene>(scene.extended ? prepared_like(*prepared, scene) : prepared,
                                                   prepared->dimension(), scene.parameters);

@@ -2,10 +2,12 @@
 
 #include <diracstep/core/integrator/integrator.hpp>
 #include <diracstep/core/methods/registry.hpp>
+#include <diracstep/sensitivities/detail/stage_equations.hpp>
 #include <diracstep/sensitivities/parametric_scene.hpp>
 #include <diracstep/sensitivities/sensitivities.hpp>
 #include <memory>
 #include <span>
+#include <vector>
 
 namespace diracstep::sensitivity {
 
@@ -36,6 +38,16 @@ class LinearisedMotion {
   };
   virtual StartCotangents pull_start(const Point& at, const Directions& z) = 0;
 };
+
+/// The equations of each part of a step, in the order of StepDesign::parts; `extended` is the scene as the
+/// integrator has prepared it, with parameters or without.
+template <class Matrix>
+std::vector<std::unique_ptr<StageEquations<Matrix>>> stage_equations(
+    const Integrator& integrator, const Registry& registry, const std::shared_ptr<ExtendedScene>& extended,
+    bool full);
+
+/// Throws Misuse where the scene of the integrator has no Lagrangian to differentiate.
+void require_lagrangian(const Integrator& integrator);
 
 /// Of the scene as the integrator has prepared it.
 std::unique_ptr<LinearisedMotion> linearised_motion(const Integrator& integrator, const Registry& registry,

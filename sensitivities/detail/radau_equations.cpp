@@ -11,7 +11,7 @@ template <class Matrix>
 class RadauEquations final : public StageEquations<Matrix> {
  public:
   RadauEquations(StageParts parts, int s)
-      : problem_(std::move(parts.problem)),
+      : StageEquations<Matrix>(std::move(parts.problem)),
         scene_(std::move(parts.scene)),
         s_(s),
         n_(scene_->n()),
@@ -23,8 +23,8 @@ class RadauEquations final : public StageEquations<Matrix> {
   }
 
   void take(const SolvedStage& at, StageJacobians<Matrix>& out) override {
-    begin(*problem_, at);
-    out.by_unknowns = jacobian_of<Matrix>(*problem_, at.x);
+    begin(this->problem(), at);
+    out.by_unknowns = jacobian_of<Matrix>(this->problem(), at.x);
     const double h = at.step.size;
     const Eigen::Index unknowns = at.x.size();
     BlockSum<Matrix> start(unknowns, size_ + n_), end_x(2 * n_, unknowns), end(2 * n_, size_ + n_);
@@ -116,7 +116,6 @@ class RadauEquations final : public StageEquations<Matrix> {
     end_x.add(n_, projection_column(s_ - 1), Matrix(by_position * along), h);
   }
 
-  std::unique_ptr<StepProblem> problem_;
   std::shared_ptr<ExtendedScene> scene_;
   int s_, n_, size_, m_, m_h_ = 0;
   RadauTableau table_;

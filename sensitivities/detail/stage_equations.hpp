@@ -4,6 +4,8 @@
 #include <diracstep/core/methods/method.hpp>
 #include <diracstep/sensitivities/detail/extended_scene.hpp>
 #include <memory>
+#include <optional>
+#include <utility>
 
 namespace diracstep::sensitivity {
 
@@ -21,11 +23,25 @@ struct StageJacobians {
 template <class Matrix>
 class StageEquations {
  public:
-  StageEquations() = default;
+  explicit StageEquations(std::unique_ptr<StepProblem> problem) : problem_(std::move(problem)) {}
   StageEquations(const StageEquations&) = delete;
   StageEquations& operator=(const StageEquations&) = delete;
   virtual ~StageEquations() = default;
+
+  /// At any unknowns x, solved or not.
   virtual void take(const SolvedStage& at, StageJacobians<Matrix>& out) = 0;
+
+  /// How many unknowns F_x has.  Where the step has fewer, its own are the last ones and its rows the last
+  /// rows, and those before them are solved whatever x is.
+  virtual int unknowns() const { return problem_->size(); }
+
+  /// The action of the step, its discrete Lagrangian L_d(q0, q1), where one is stated.
+  virtual std::optional<double> action(const SolvedStage& /*at*/) { return std::nullopt; }
+
+  StepProblem& problem() { return *problem_; }
+
+ private:
+  std::unique_ptr<StepProblem> problem_;
 };
 
 /// What the equations of a step are made from: the step itself, of the scene that is stepped, for F_x and for

@@ -1,3 +1,4 @@
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "run_command.hpp"
@@ -83,6 +84,43 @@ TEST_F(SensitivitiesOfRuns, AFitThatLeavesMoreThanStatedIsDoubted) {
       run("fit chaplygin_sleigh '" + path("data.csv") + "' --parameters a --sigma x=0.001");
   EXPECT_EQ(outcome.status, 3) << outcome.err << outcome.out;
   EXPECT_NE(outcome.err.find("--sigma"), std::string::npos) << outcome.err;
+}
+
+/// Of two falling bodies the square of the first one's way is measured: x = g t²/2, output 2 x² = g² t⁴/2.
+TEST_F(SensitivitiesOfRuns, AFitToOutputsNamesWhatTheDataDoNotDetermine) {
+  const std::string file = scene("falling", R"toml(
+lagrangian = "v_x^2/2 + v_y^2/2 + g*x + b*y"
+[coordinates]
+x = {}
+y = {}
+[parameters]
+g = 1
+b = 1
+k = 2
+[outputs]
+square = "k*x^2"
+[start]
+x = 0
+[span]
+end = 2
+step = 0.1
+)toml");
+  std::ofstream(path("data.csv")) << "t,square\n0.5,0.28125\n1,4.5\n1.5,22.78125\n2,72\n";
+  const std::string fit = "fit '" + file + "' '" + path("data.csv") + "' --parameters g,b";
+  const Json json = run_of(fit);
+  EXPECT_NEAR(json["parameters"]["g"]["value"].get<double>(), 3.0, 1e-8);
+  EXPECT_LT(json["parameters"]["g"]["interval"].get<double>(), 1e-6);
+  EXPECT_FALSE(json["parameters"]["b"]["interval"].is_number() &&
+               std::isfinite(json["parameters"]["b"]["interval"].get<double>()));
+  const Outcome text = run(fit + " --residuals '" + path("left.csv") + "'");
+  EXPECT_NE(text.out.find("the data do not determine b: intervals"), std::string::npos) << text.out;
+  EXPECT_EQ(lines(contents(path("left.csv"))).front(), "t,square");
+  expect_misuse(fit + " --sigma x=1", {"'x' is no column"});
+  const Outcome picture = run(fit + " --picture '" + path("left") + "'");
+  if (picture.status == 1 && picture.err.find("gnuplot") != std::string::npos)
+    GTEST_SKIP() << "pictures of residuals: no gnuplot";
+  EXPECT_EQ(picture.status, 0) << picture.err;
+  EXPECT_NE(contents(path("left.svg")).find("square"), std::string::npos);
 }
 
 TEST_F(SensitivitiesOfRuns, StandInTheFilePointByPoint) {

@@ -3,6 +3,7 @@
 #include <random>
 
 #include "derivatives.hpp"
+#include "misuse.hpp"
 
 namespace diracstep {
 namespace {
@@ -109,6 +110,81 @@ TEST(Fit, TellsWhatTheDataDoNotDetermine) {
   const FitReport report = fit(problem, measured(1), Vector{{1.0, 0.1}});  // only J/m shows in the motion
   EXPECT_FALSE(report.interval.allFinite());
   EXPECT_NEAR(report.parameters[1] / report.parameters[0], 0.1, 0.02);
+}
+
+/// A parameter without effect, and a pair of which only a quotient shows, leave the others their intervals.
+TEST(Fit, OnlyWhatTheDataDoNotDetermineHasAnInfiniteInterval) {
+  const Registry registry = Registry::with_built_ins();
+  const FitProblem three{[](const Vector& values) {
+                           const Parameters changes{{"m", values[0]}, {"J", values[1]}, {"a", values[2]}};
+                           return parametric_scene("chaplygin_sleigh",
+                                                   make_scene("chaplygin_sleigh", changes), {"m", "J", "a"},
+                                                   changes);
+                         },
+                         registry,
+                         kinsol(),
+                         {.method = "type1/gl:2", .step = 0.1}};
+  const FitReport report = fit(three, measured(2), Vector{{1.0, 0.12, 0.25}});
+  EXPECT_TRUE(std::isinf(report.interval[0]) && std::isinf(report.interval[1]));
+  EXPECT_LT(report.interval[2], 0.02);
+  const FitReport without = fit(sleigh_problem(registry), measured(2), Vector{{0.25, 0.12}});
+  EXPECT_NEAR(report.interval[2], without.interval[0], 1e-6);  // the same degrees of freedom are left
+  EXPECT_NEAR(report.covariance(2, 2), without.covariance(0, 0), 1e-9);
+  EXPECT_NEAR(report.residual, without.residual, 1e-9);
+
+  // y is not measured, and with it no effect of b.
+  FitProblem idle = three;
+  idle.scene = [](const Vector& values) {
+    Scene scene, extended;
+    scene.name = extended.name = "two particles";
+    scene.coordinates = {"x", "y"};
+    extended.coordinates = {"x", "y", "b", "g"};
+    scene.lagrangian = lagrangian<2>([b = values[0], g = values[1]](const auto& q, const auto& v) {
+      return 0.5 * (v[0] * v[0] + v[1] * v[1]) + g * q[0] + b * q[1];
+    });
+    extended.lagrangian = lagrangian<4>([](const auto& q, const auto& v) {
+      return 0.5 * (v[0] * v[0] + v[1] * v[1] + v[2] * v[2] + v[3] * v[3]) + q[3] * q[0] + q[2] * q[1];
+    });
+    scene.start = {0.0, Vector::Zero(2), Vector::Zero(2)};
+    extended.start = {0.0, Vector{{0.0, 0.0, values[0], values[1]}}, Vector::Zero(4)};
+    return ParametricScene{std::make_shared<const Scene>(scene), std::make_shared<const Scene>(extended),
+                           values};
+  };
+  const FitData falls{{{0}}, Vector{{1.0, 2.0, 3.0}}, Columns{{1.01}, {3.99}, {9.0}}};  // x = g t²/2
+  const FitReport one = fit(idle, falls, Vector{{1.0, 1.0}});
+  EXPECT_TRUE(one.converged) << one.ending;
+  EXPECT_TRUE(std::isinf(one.interval[0]));
+  EXPECT_NEAR(one.parameters[1], 2.0, 0.01);
+  EXPECT_LT(one.interval[1], 0.02);
+}
+
+TEST(Fit, ColumnsOfOutputs) {
+  const Registry registry = Registry::with_built_ins();
+  FitProblem problem = sleigh_problem(registry);
+  // One that reads both parameters, a velocity and a momentum.
+  problem.outputs = [](const Vector& values) {
+    return std::vector<PointFunction>{
+        [](const MotionPoint& at) { return at.q[0]; },
+        [a = values[0], j = values[1]](const MotionPoint& at) { return j * at.v[2] + a * a * at.p[0]; }};
+  };
+  const std::vector<Sample> motion = samples_of(make_scene("chaplygin_sleigh").scene, problem.steps, 40);
+  FitData data{{{0, false, 1.0, 1}}, Vector(20), Columns(20, 1)};
+  for (int k = 0; k < 20; ++k) {
+    const Sample& at = motion[static_cast<std::size_t>(2 * k + 2)];
+    data.times[k] = at.time;
+    data.values(k, 0) = 0.1 * at.v[2] + 0.04 * at.p[0];
+  }
+  const FitReport report = fit(problem, data, Vector{{0.25, 0.12}});
+  EXPECT_TRUE(report.converged) << report.ending;
+  EXPECT_NEAR(report.parameters[0], 0.2, 1e-8);
+  EXPECT_NEAR(report.parameters[1], 0.1, 1e-8);
+  problem.outputs = [](const Vector&) {
+    return std::vector<PointFunction>{[](const MotionPoint& at) { return at.lambda[0]; },
+                                      [](const MotionPoint& at) { return at.lambda[0]; }};
+  };
+  expect_misuse([&] { (void)fit(problem, data, Vector{{0.25, 0.12}}); }, {"forces of rows"});
+  problem.outputs = {};
+  expect_misuse([&] { (void)fit(problem, data, Vector{{0.25, 0.12}}); }, {"no outputs"});
 }
 
 TEST(Fit, RefusesDataThatAreNone) {

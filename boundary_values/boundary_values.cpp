@@ -1,0 +1,226 @@
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <diracstep/boundary_values/boundary_values.hpp>
+#include <diracstep/boundary_values/detail/newton.hpp>
+#include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/runs/energy_check.hpp>
+
+namespace diracstep {
+
+namespace {
+
+using boundary::MotionEquations;
+
+void require_conditions(const BoundaryConditions& conditions, int n) {
+  const auto rows = conditions.value.size();
+  for (const Columns* side : {&conditions.at_start, &conditions.at_end}) {
+    require_size("conditions: rows", side->rows(), rows);
+    require_size("conditions: columns, of q, v and p,", side->cols(), 3L * n);
+  }
+  if (!conditions.value.allFinite() || !conditions.at_start.allFinite() || !conditions.at_end.allFinite())
+    throw Misuse("conditions: a number is not finite");
+}
+
+/// A place that is held must be on the rows; a velocity cannot be asked for where none is a datum.
+void require_on_rows(const Scene& scene, double t, const Vector& q, const char* which) {
+  int row = 0;
+  for (const auto& block : only_holonomic(scene.constraints)) {
+    Vector phi(block->rows());
+    block->position(t, q, phi);
+    for (int i = 0; i < block->rows(); ++i, ++row)
+      if (const double tolerance = 1e-9 * std::max(1.0, q.lpNorm<Eigen::Infinity>());
+          !(std::abs(phi[i]) <= tolerance))
+        throw Misuse(std::string("the place at the ") + which + " is off " +
+                     row_label(only_holonomic(scene.constraints), row) + ": " + to_text(phi[i]));
+  }
+}
+
+/// As many conditions as the motion needs.
+void require_count(const Scene& scene, const BoundaryConditions& conditions, bool phase_space) {
+  if (conditions.families) return;
+  const int n = scene.dimension(), m = scene.rows();
+  const int holonomic = row_count(only_holonomic(scene.constraints));
+  const int needed = phase_space ? n : 2 * n - m - holonomic;
+  const int given = static_cast<int>(conditions.value.size()) -
+                    holonomic * (int{conditions.start_held} + int{conditions.end_held});
+  if (given == needed) return;
+  std::string why;
+  if (phase_space)
+    why = ": its Lagrangian is linear in v, so that a place alone determines a motion";
+  else if (m > holonomic && given > needed)
+    why = ": under " + std::to_string(m - holonomic) +
+          " nonholonomic rows the motions from one place end on a set of " + std::to_string(n - m) +
+          " dimensions, so that no more than that can be asked of the other end";
+  throw Misuse("scene '" + scene.name + "': a motion is determined by " + std::to_string(needed) +
+               " conditions on its ends, and " + std::to_string(given) + " are given" + why);
+}
+
+/// What may help, by how the search failed.
+std::string advice(const BoundaryConditions& conditions) {
+  return conditions.families
+             ? "; a guess nearer to a solution, more steps or another end time may help"
+             : "; a guess nearer to a solution or more steps may help, and where the ends are conjugate "
+               "points, or conditions depend on each other, no motion is determined by them";
+}
+
+/// Why the action of a motion does not generate it; empty where it does.
+std::string why_no_action(const Scene& scene) {
+  if (scene.force) return "a force acts: the motion makes no action stationary";
+  if (!only_nonholonomic(scene.constraints).empty())
+    return "nonholonomic rows act: d'Alembert's principle makes no action stationary";
+  if (scene.lagrangian->structure().phase_space())
+    return "the Lagrangian is linear in v: both places cannot be chosen";
+  return {};
+}
+
+Columns hessian_of(MotionEquations& equations, const Vector& u) {
+  const int n = equations.n();
+  const boundary::DeterminedEnds factor(equations, u);
+  const Columns by_places = factor.by_conditions(2 * n);
+  Columns hessian(2 * n, 2 * n);
+  const auto momenta_at_start = n + n;  // after v0 and q0
+  hessian.topRows(n) = -by_places.middleRows(momenta_at_start, n);
+  hessian.bottomRows(n) = by_places.middleRows(equations.unknowns() - 2 * n, n);
+  return hessian;
+}
+
+/// Where the motion is computed, and its ends are read.
+struct Solved {
+  MotionEquations& equations;
+  Integrator& integrator;
+  const BoundaryProblem& problem;
+  const Vector& u;
+};
+
+void add_action(const Solved& of, BoundaryReport& report) {
+  MotionEquations& equations = of.equations;
+  report.no_action = why_no_action(equations.scene());
+  if (!report.no_action.empty()) return;
+  const std::optional<double> value = equations.action(of.u);
+  if (!value) {
+    report.no_action = "the method has no generating function";
+    return;
+  }
+  const int n = equations.n();
+  DiscreteAction action{*value, Vector(2 * n), {}};
+  action.gradient << -equations.start_momentum(of.u), equations.end_momentum(of.u);
+  if (equations.scene().rows() == 0) {
+    try {
+      MotionEquations places(of.integrator, of.problem.registry, of.problem.steps,
+                             between(Vector::Zero(n), Vector::Zero(n)));
+      action.hessian = hessian_of(places, of.u);
+    } catch (const Misuse&) {
+      throw;
+    } catch (const Error&) {  // conjugate points
+    }
+  }
+  report.action = std::move(action);
+}
+
+void add_family(const Solved& of, BoundaryReport& report) {
+  const boundary::FamilyOfEnds factor(of.equations, of.u, boundary::sizes_by_kind(of.equations, of.u));
+  report.free_directions = factor.free_directions();
+  const Eigen::VectorXcd values = factor.transition().eigenvalues();
+  report.multipliers.assign(values.begin(), values.end());
+  std::ranges::sort(report.multipliers, [](const auto& a, const auto& b) {
+    return std::abs(a) != std::abs(b) ? std::abs(a) > std::abs(b) : a.imag() > b.imag();
+  });
+}
+
+/// Positions, velocities and projected momenta at the ends of the steps.
+void add_points(const Solved& of, BoundaryReport& report) {
+  const std::vector<MotionEquations::Node> nodes = of.equations.nodes(of.u);
+  const auto count = static_cast<Eigen::Index>(nodes.size());
+  const int n = of.equations.n();
+  report.times.resize(count);
+  for (Columns* columns : {&report.q, &report.v, &report.p})
+    *columns = Columns::Constant(n, count, std::nan(""));
+  EnergyCheck energy(of.equations.scene(), of.integrator.method().damped);
+  Sample sample;
+  for (Eigen::Index k = 0; k < count; ++k) {
+    const auto& node = nodes[static_cast<std::size_t>(k)];
+    const auto& other = nodes[static_cast<std::size_t>(k + 1 < count ? k + 1 : k - 1)];
+    report.times[k] = node.t;
+    report.q.col(k) = node.q;
+    if (!node.q.allFinite() || !node.p.allFinite() || !other.q.allFinite()) continue;
+    of.integrator.restart(node.t, node.q, node.p, (other.q - node.q) / (other.t - node.t));
+    if (!of.integrator.sample(Momentum::projected, sample).ok()) continue;
+    report.v.col(k) = sample.v;
+    report.p.col(k) = sample.p;
+    energy.see(sample);
+  }
+  report.doubt = energy.text();
+}
+
+}  // namespace
+
+BoundaryConditions between(ConstVectorRef q0, ConstVectorRef qN) {
+  const Eigen::Index n = q0.size();
+  require_size("places: numbers at the end", qN.size(), n);
+  BoundaryConditions conditions{
+      Columns::Zero(2 * n, 3 * n), Columns::Zero(2 * n, 3 * n), Vector(2 * n), true, true, false};
+  conditions.at_start.topLeftCorner(n, n).setIdentity();
+  conditions.at_end.bottomLeftCorner(n, n).setIdentity();
+  conditions.value << q0, qN;
+  return conditions;
+}
+
+BoundaryConditions periodic(int n) {
+  BoundaryConditions conditions{
+      Columns::Zero(2 * n, 3 * n), Columns::Zero(2 * n, 3 * n), Vector::Zero(2 * n), false, false, true};
+  conditions.at_start.leftCols(2 * n).setIdentity();
+  conditions.at_end = -conditions.at_start;
+  return conditions;
+}
+
+GuessedMotion straight_line(double t0, ConstVectorRef q0, double tN, ConstVectorRef qN) {
+  const Vector from = q0, velocity = (qN - q0) / (tN - t0);
+  return [=](double t) { return GuessedPoint{from + (t - t0) * velocity, velocity}; };
+}
+
+BoundaryReport solve_boundary_values(const BoundaryProblem& problem) {
+  if (problem.steps < 1)
+    throw Misuse("boundary values: " + std::to_string(problem.steps) + " steps; 1 or more are needed");
+  if (!problem.guess) throw Misuse("boundary values: no guess");
+  Integrator integrator(problem.scene, problem.registry, problem.solvers, problem.options);
+  const Scene& scene = integrator.scene();
+  BoundaryConditions conditions = problem.conditions;
+  const int n = scene.dimension();
+  require_conditions(conditions, n);
+  MotionEquations equations(integrator, problem.registry, problem.steps, conditions);
+  const bool phase_space = scene.lagrangian->structure().phase_space();
+  if (phase_space && !conditions.families &&
+      !(conditions.at_start.middleCols(n, n).isZero(0.0) && conditions.at_end.middleCols(n, n).isZero(0.0)))
+    throw Misuse("scene '" + scene.name + "': its Lagrangian is linear in v, of which nothing can be asked");
+  require_count(scene, conditions, phase_space);
+  Vector u = equations.guess(problem.guess);
+  const double end_time = equations.nodes(u).back().t;
+  if (conditions.start_held) require_on_rows(scene, scene.start.time, conditions.value.head(n), "start");
+  if (conditions.end_held) require_on_rows(scene, end_time, conditions.value.tail(n), "end");
+  const auto factor = [&](const Vector& at) -> std::unique_ptr<boundary::LinearisedEnds> {
+    if (!conditions.families) return std::make_unique<boundary::DeterminedEnds>(equations, at);
+    return std::make_unique<boundary::FamilyOfEnds>(equations, at, boundary::sizes_by_kind(equations, at));
+  };
+  const boundary::NewtonReport search = boundary::newton(equations, u, problem.max_iterations, factor);
+  BoundaryReport report;
+  report.iterations = search.iterations;
+  report.correction = search.correction;
+  report.residual = equations.residual(u).ends.lpNorm<Eigen::Infinity>();
+  const double size = std::max(1.0, boundary::sizes_by_kind(equations, u).head(3).maxCoeff());
+  report.converged = search.converged && report.residual <= 1e-8 * size;
+  if (report.converged)
+    report.ending = "the corrections are round-off";
+  else if (search.converged)
+    report.ending =
+        "no motion fulfils the conditions near the guess: they contradict each other, or the rows";
+  else
+    report.ending = "Newton's method has not converged: " + search.failure + advice(conditions);
+  const Solved solved{equations, integrator, problem, u};
+  add_points(solved, report);
+  if (!report.converged) return report;
+  add_action(solved, report);
+  if (conditions.families) add_family(solved, report);
+  return report;
+}
+
+}  // namespace diracstep
