@@ -215,11 +215,11 @@ double local_error_for(double radians) {
 std::string reason_of(const DampingSurvey& survey) {
   const std::string dies_out = "what is fastest dies out at a rate of " + to_text(survey.rate, 2) +
                                ", which times a step of " + to_text(survey.step, 2) + " is " +
-                               to_text(survey.product, 2) + " at most, above ";
-  if (survey.strong()) return "strong damping: " + dies_out + to_text(DampingSurvey::strong_from, 2);
-  return "damping that switches: " + dies_out + to_text(DampingSurvey::switching_from, 2) +
-         ", and a local error of " + to_text(surveying_error, 2) + " asks for steps " +
-         to_text(survey.finer, 2) + " times smaller";
+                               to_text(survey.product, 2) + " at most";
+  if (survey.strong())
+    return "strong damping: " + dies_out + ", above " + to_text(DampingSurvey::strong_from, 2);
+  return "damping that switches: " + dies_out + ", and local errors of " + to_text(surveying_error, 2) +
+         " ask for steps " + to_text(survey.finer, 2) + " times smaller";
 }
 
 }  // namespace

@@ -23,11 +23,14 @@ struct DampingSurvey {
   /// Above it GL(s) leaves a third and more of what should have died out, with a sign that alternates from
   /// step to step.
   static constexpr double strong_from = 20.0;
-  /// Below it, but above this, what is fastest dies out within a fixed step that is too long for the motion,
-  /// as where a diode begins to conduct: GL(s) then loses Newton's method.
-  static constexpr double switching_from = 3.0, finer_from = 5.0;
   bool strong() const { return failure.empty() && product > strong_from; }
-  bool switching() const { return failure.empty() && product > switching_from && finer > finer_from; }
+  /// What is fastest dies out within a fixed step, and that is too long for the motion, or so much too long
+  /// that the survey ends within it, as where a diode begins to conduct: GL(s) loses Newton's method there.
+  static constexpr double switching_from = 3.0, finer_from = 3.0, far_finer_from = 100.0;
+  bool switching() const {
+    return failure.empty() && ((product > switching_from && finer > finer_from) ||
+                               (product > 0.0 && finer > far_finer_from && covered < step));
+  }
 };
 
 /// Measures the damping along the motion to `end`: at the nodes of a coarse run of damped/radau:3, at most

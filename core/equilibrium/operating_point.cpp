@@ -43,6 +43,10 @@ class BalancedMatrix {
   }
   /// In the units of the columns.
   double norm(const Vector& x) const { return x.cwiseQuotient(columns_).norm(); }
+  /// How large the largest of x is in each row.
+  Vector sizes_in_rows(const Vector& x) const {
+    return max_norm(x.cwiseQuotient(columns_)) * rows_.cwiseInverse();
+  }
 
  private:
   Vector rows_, columns_;
@@ -132,8 +136,11 @@ class OperatingPointEquations {
   }
 
   /// The equation that is met worst beside its terms; empty where all are met.
-  std::string contradiction(const Vector& x, const Vector& residual, const Columns& jacobian) const {
-    const Vector terms = jacobian.cwiseAbs() * x.cwiseAbs() + residual.cwiseAbs();
+  std::string contradiction(const Vector& x, const Vector& residual, const Columns& jacobian,
+                            const BalancedMatrix& matrix) const {
+    constexpr double beside_the_largest = 1e-6;  // round-off of what is zero
+    const Vector terms = jacobian.cwiseAbs() * x.cwiseAbs() + residual.cwiseAbs() +
+                         beside_the_largest * matrix.sizes_in_rows(x);
     Eigen::Index worst = -1;
     double largest = contradicted_from;
     for (Eigen::Index i = 0; i < residual.size(); ++i)
@@ -220,7 +227,7 @@ Vector solve_for_operating_point(OperatingPointEquations& equations, const Scene
     if (!next && length > near_round_off * size)
       refuse_operating_point(scene, "Newton's method ends after " + std::to_string(k) + " iterations");
     if (!next || *next == x) {
-      if (const std::string left = equations.contradiction(x, residual, jacobian); !left.empty())
+      if (const std::string left = equations.contradiction(x, residual, jacobian, matrix); !left.empty())
         refuse_operating_point(scene, left);
       return x;
     }

@@ -159,12 +159,23 @@ struct Directions {
   Columns resisted, free;
 };
 
-Directions split(const Columns& w, const Columns& fv) {
-  const Columns resistance = w.transpose() * fv * w;
+Vector largest_of_rows(const Columns& matrix) {
+  Vector largest(matrix.rows());
+  for (Eigen::Index r = 0; r < matrix.rows(); ++r)
+    largest[r] = size_or_one(max_norm(matrix.row(r).transpose()));
+  return largest;
+}
+
+/// `each_in_its_units`: the conductance of a diode, 1e-12 A/V, counts beside a resistance of 1e3 V/A.
+Directions split(const Columns& w, const Columns& fv, bool each_in_its_units) {
+  Columns resistance = w.transpose() * fv * w;
+  const Vector units = each_in_its_units ? largest_of_rows(resistance) : Vector(Vector::Ones(w.cols()));
+  resistance = units.cwiseInverse().asDiagonal() * resistance;
   Eigen::FullPivLU<Columns> lu;
   lu.setThreshold(rank_tolerance(resistance));
   lu.compute(resistance);
-  Directions result{Columns(w.rows(), lu.rank()), w * kernel(resistance.transpose())};
+  Directions result{Columns(w.rows(), lu.rank()),
+                    w * (units.cwiseInverse().asDiagonal() * kernel(resistance.transpose()))};
   const auto& order = lu.permutationP().indices();
   for (Eigen::Index r = 0; r < w.cols(); ++r)
     if (order[r] < lu.rank()) result.resisted.col(order[r]) = w.col(r);
@@ -226,13 +237,6 @@ Columns hidden_matrix(const Directions& w, const FullDerivatives& d) {
   return matrix;
 }
 
-Vector largest_of_rows(const Columns& matrix) {
-  Vector largest(matrix.rows());
-  for (Eigen::Index r = 0; r < matrix.rows(); ++r)
-    largest[r] = size_or_one(max_norm(matrix.row(r).transpose()));
-  return largest;
-}
-
 }  // namespace
 
 ConstraintBlocks hidden_rows(const Scene& scene) {
@@ -250,7 +254,7 @@ ConstraintBlocks hidden_rows(const Scene& scene) {
   const Columns w = directions(scene, first, at_first, other, at_other);
   if (w.cols() == 0) return {};
   const FullDerivatives& resisting = first_order.by_force ? at_other : at_first;
-  const Directions parts = split(w, resisting.fv);
+  const Directions parts = split(w, resisting.fv, first_order.by_force);
   require_described(scene, w, parts, other, at_other);
   const Columns matrix = hidden_matrix(parts, resisting);
   const Vector units = largest_of_rows(matrix);
