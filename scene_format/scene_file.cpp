@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <diracstep/core/equilibrium/operating_point.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/system/consistent_start.hpp>
 #include <diracstep/core/system/row_subset.hpp>
 #include <diracstep/files/input_file.hpp>
+#include <diracstep/scene_format/compiler/circuit_reader.hpp>
 #include <diracstep/scene_format/compiler/size_limits.hpp>
 #include <diracstep/scene_format/drawn_bodies.hpp>
 #include <diracstep/scene_format/loader/defined_start.hpp>
@@ -284,6 +286,29 @@ Guesses guesses_of(const LoadedScene& loaded) {
   return guesses;
 }
 
+/// Which coordinates rest at an operating point: all but the charges through elements other than capacitors,
+/// and fluxes.
+std::vector<bool> resting_coordinates(const LoadedScene& loaded) {
+  const SceneProgram& program = *loaded.program;
+  std::vector<bool> rests(static_cast<std::size_t>(loaded.layout.dimension()), true);
+  for (const auto& branch : program.document.branches)
+    for (const std::string& name : {"q" + branch.name, "f" + branch.name}) {
+      const int family = program.symbols.family(name);
+      if (family < 0 || (branch.kind == "capacitor" && name[0] == 'q')) continue;
+      for (long i = 0; i < loaded.layout.count(family); ++i)
+        rests[static_cast<std::size_t>(loaded.layout.position(family, loaded.layout.element(family, i)))] =
+            false;
+    }
+  return rests;
+}
+
+/// Where the file asks for it, of the rows that act there.
+void start_at_operating_point(const LoadedScene& loaded, Scene& scene, StatedStart& stated) {
+  if (!loaded.program->document.operating_point) return;
+  scene.start = operating_point(scene, scene.start, resting_coordinates(loaded));
+  stated.start = scene.start;
+}
+
 /// Moves the start onto the rows where the file asks for it, and notes by how much.
 void project(const LoadedScene& loaded, CatalogueScene& entry, StatedStart& stated) {
   const Scene& scene = *entry.scene;
@@ -406,8 +431,10 @@ CatalogueScene load(const std::shared_ptr<const CompiledScene>& compiled, const 
   set_rates_of_states(loaded, stated);
   Scene scene = scene_of(loaded, stated.start);
   CatalogueScene entry;
+  entry.changes = document.notes;
   entry.all_rows = take_off_rows(document, scene);
   require_defined_start(*loaded, scene);
+  start_at_operating_point(*loaded, scene, stated);
   entry.scene = std::make_shared<const Scene>(std::move(scene));
   project(*loaded, entry, stated);
   entry.stated_start = std::move(stated);
@@ -526,6 +553,12 @@ ParametricScene load_parametric(const std::string& file, const std::string& text
   result.extended = std::move(extended);
   result.doubt = doubt_of_switches(*loaded->program);
   differentiate_start(*loaded, entry.scene->start, result);
+  if (loaded->program->document.operating_point) {
+    std::vector<bool> rests = resting_coordinates(*loaded);
+    rests.resize(static_cast<std::size_t>(entry.scene->dimension()));  // without the parameters
+    operating_point_derivatives(*result.extended, result.parameters, entry.stated_start->start, rests,
+                                result.start_q, result.start_v);
+  }
   move_start(*loaded, entry, result);
   return result;
 }

@@ -213,6 +213,16 @@ double local_error_for(double radians) {
   return radians > 0.0 ? std::clamp(std::pow(2e-3 / radians, 1.2), smallest, usual) : usual;
 }
 
+std::string reason_of(const DampingSurvey& survey) {
+  const std::string dies_out = "what is fastest dies out at a rate of " + to_text(survey.rate, 2) +
+                               ", which times a step of " + to_text(survey.step, 2) + " is " +
+                               to_text(survey.product, 2) + " at most";
+  if (survey.strong())
+    return "strong damping: " + dies_out + ", above " + to_text(DampingSurvey::strong_from, 2);
+  return "damping that switches: " + dies_out + ", and local errors of " + to_text(surveying_error, 2) +
+         " ask for steps " + to_text(survey.finer, 2) + " times smaller";
+}
+
 }  // namespace
 
 DampingSurvey survey_damping(const std::shared_ptr<const Scene>& scene, const Registry& registry,
@@ -255,10 +265,15 @@ DampingSurvey survey_damping(const std::shared_ptr<const Scene>& scene, const Re
       survey.product = rate * h;
       survey.step = h;
     }
+    const long refused = integrator.control().refused;
     const StepReport report = integrator.step();
-    if (report.ok()) continue;
-    survey.failure = report.failure;
-    break;
+    if (!report.ok()) {
+      if (survey.product == 0.0) survey.failure = report.failure;
+      break;
+    }
+    const double taken = std::abs(integrator.time() - node.time);
+    if (step > 0.0 && integrator.control().refused > refused)
+      survey.finer = std::max(survey.finer, step / taken);
   }
   if (!std::isfinite(survey.undamped)) survey.undamped = 0.0;
   return survey;
@@ -271,12 +286,8 @@ DefaultMethod default_method_of_motion(const std::shared_ptr<const Scene>& given
   const bool free = request.order == 0 && !request.rule && !options.compensated_sums;
   if (free && !(request.error > 0.0 && request.error < smallest_error)) {
     const DampingSurvey survey = survey_damping(scene, registry, solvers, end, step, options);
-    if (survey.strong()) {
-      DefaultMethod choice{surveying_method, 0,
-                           "strong damping: what is fastest dies out at a rate of " +
-                               to_text(survey.rate, 2) + ", which times a step of " +
-                               to_text(survey.step, 2) + " is " + to_text(survey.product, 2) +
-                               " at most, above " + to_text(DampingSurvey::strong_from, 2)};
+    if (survey.strong() || survey.switching()) {
+      DefaultMethod choice{surveying_method, 0, reason_of(survey)};
       const double radians = survey.undamped * std::abs(end - scene->start.time);
       choice.local_error = local_error_for(radians);
       if (choice.local_error < AdaptiveOptions::usual_local_error)

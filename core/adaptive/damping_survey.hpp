@@ -15,12 +15,22 @@ struct DampingSurvey {
   double step = 0.0;      ///< h, the step where d h is largest
   double product = 0.0;   ///< the largest d h
   double covered = 0.0;   ///< time surveyed
+  /// How many of the steps by their local error that a larger one was refused for fit into one of the fixed
+  /// steps it is compared with; 1 where none was, or no fixed step is given.
+  double finer = 1.0;
   std::string failure = {};  ///< empty, or why nothing is known
 
   /// Above it GL(s) leaves a third and more of what should have died out, with a sign that alternates from
   /// step to step.
   static constexpr double strong_from = 20.0;
   bool strong() const { return failure.empty() && product > strong_from; }
+  /// What is fastest dies out within a fixed step, and that is too long for the motion, or so much too long
+  /// that the survey ends within it, as where a diode begins to conduct: GL(s) loses Newton's method there.
+  static constexpr double switching_from = 3.0, finer_from = 3.0, far_finer_from = 100.0;
+  bool switching() const {
+    return failure.empty() && ((product > switching_from && finer > finer_from) ||
+                               (product > 0.0 && finer > far_finer_from && covered < step));
+  }
 };
 
 /// Measures the damping along the motion to `end`: at the nodes of a coarse run of damped/radau:3, at most
@@ -43,7 +53,8 @@ DampingSurvey survey_damping(const std::shared_ptr<const Scene>& scene, const Re
                              const IntegratorOptions& options = {});
 
 /// The method for a motion to `end` where none is named: damped/radau:3 where no order, no rule and no error
-/// below 1e-9 is asked for and survey_damping() finds strong damping; else that of default_method().
+/// below 1e-9 is asked for and survey_damping() finds strong damping, or damping where fixed steps are too
+/// long for the motion; else that of default_method().
 ///
 /// Radau IIA also takes energy from what nothing damps.  Where the survey finds such a motion, of ω T radians
 /// in all, DefaultMethod::local_error is eps = (2e-3/(ω T))^(6/5), from 1e-8 to 1e-6: on an oscillator the

@@ -48,7 +48,8 @@ std::vector<PlanLine> Integrator::plan() const {
     lines.push_back({"projection", "left out", "every momentum is that of a velocity"});
   } else {
     const ConstraintRule rule = options_.constraint_rule.value_or(method_.info.constraint_rule);
-    const bool first_order = first_order_motions(*scene_).exist() && !method_.info.damped;
+    const FirstOrderMotions motions = first_order_motions(*scene_);
+    const bool first_order = motions.exist() && !motions.by_force && !method_.info.damped;
     lines.push_back({"multipliers", std::to_string(m) + (method_.info.rows_inside ? " a node" : ""),
                      first_order           ? "all rows at the Gauss nodes: motions of first order"
                      : method_.info.damped ? "all rows, and the rates of holonomic rows, at the Radau nodes"

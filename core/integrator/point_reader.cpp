@@ -1,6 +1,7 @@
 #include <diracstep/core/integrator/point_reader.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/numerics/lu.hpp>
+#include <diracstep/core/system/multiplier_rows.hpp>
 #include <utility>
 
 namespace diracstep {
@@ -201,6 +202,7 @@ SolveReport PointReader::read(double t, const State& at, Momentum momentum, Samp
   if (!report.ok()) return report;
   sample.time = t;
   sample.q = at.q;
+  if (scene_->rows() > 0) show_multipliers(*scene_, sample.lambda, sample.q);
   sample.p = at.p;
   sample.impulse.resize(0);
   if (hamiltonian_velocity_) {

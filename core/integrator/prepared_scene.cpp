@@ -96,7 +96,7 @@ PreparedScene prepared(std::shared_ptr<const Scene> given, const IntegratorOptio
     auto copy = std::make_shared<Scene>(*scene);
     PointReader(scene, solvers, true).determine(copy->start);
     scene = copy;
-    result.lines.push_back({"velocities", "of motions of first order",
+    result.lines.push_back({"velocities", motions.by_force ? "by forces" : "of motions of first order",
                             std::to_string(motions.w.cols()) + " of " + std::to_string(scene->dimension()) +
                                 " are no data of a motion: positions and rows determine them"});
   }

@@ -20,7 +20,8 @@ namespace {
 
 /// The motions of first order that ask for a step of their own.
 FirstOrderMotions own_motions(const Scene& scene, const StepChoices& choices) {
-  return choices.force_degenerate ? FirstOrderMotions{} : first_order_motions(scene);
+  FirstOrderMotions motions = choices.force_degenerate ? FirstOrderMotions{} : first_order_motions(scene);
+  return motions.by_force ? FirstOrderMotions{} : motions;
 }
 
 std::unique_ptr<StepProblem> step_of_first_order(int s, const Scene& scene, const FirstOrderMotions& motions,

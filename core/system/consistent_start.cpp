@@ -3,6 +3,7 @@
 #include <cmath>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/numerics/row_scales.hpp>
+#include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/core/spaces/space.hpp>
 #include <diracstep/core/system/consistent_start.hpp>
 #include <diracstep/core/system/constraint_distribution.hpp>
@@ -316,9 +317,11 @@ std::string describe_moves(const Scene& scene, const Start& from, const Start& t
     double from, to;
   };
   std::vector<Move> moves;
+  constexpr double by_round_off = 1e-13;  // of the largest component
   const auto collect = [&](const char* prefix, const Vector& before, const Vector& after) {
+    const double least = by_round_off * std::max(max_norm(before), max_norm(after));
     for (Eigen::Index i = 0; i < std::min(before.size(), after.size()); ++i)
-      if (before[i] != after[i])
+      if (std::abs(before[i] - after[i]) > least)
         moves.push_back({prefix + scene.coordinates[static_cast<std::size_t>(i)], before[i], after[i]});
   };
   collect("", from.q, to.q);

@@ -58,6 +58,27 @@ struct AtTwoPoints {
   Columns mass, by_q, one_forms;
 };
 
+/// Whether the force along the columns of `free` is anything but linear in v, near the start.
+bool non_linear_in_velocity(const Scene& scene, const Columns& free) {
+  const Start& start = scene.start;
+  Vector v = start.v, once(v.size()), twice = once, none = once;
+  for (Eigen::Index i = 0; i < v.size(); ++i)
+    v[i] += 0.3 * size_or_one(max_norm(start.v)) * std::cos(0.3 + 2.3 * static_cast<double>(i));
+  scene.force->value(start.time, start.q, v, once);
+  scene.force->value(start.time, start.q, 2.0 * v, twice);
+  scene.force->value(start.time, start.q, Vector::Zero(v.size()), none);
+  const Vector off = twice - 2.0 * once + none;
+  const double size = std::max(max_norm(twice), max_norm(none));
+  const double along = max_norm(free.transpose() * off);
+  return !(along <= 1e-12 * size_or_one(size));
+}
+
+/// Whether a scene may have motions by_force: the test without matrices that most scenes end with.
+bool may_be_by_force(const Scene& scene) {
+  return scene.force &&
+         non_linear_in_velocity(scene, Columns::Identity(scene.dimension(), scene.dimension()));
+}
+
 }  // namespace
 
 bool positive_definite(const Lagrangian& lagrangian, const Start& start) {
@@ -80,21 +101,24 @@ FirstOrderMotions first_order_motions(const Scene& scene) {
   const int n = scene.dimension();
   if (scene.by_hamiltonian() || scene.space) return {};
   const PhaseStructure& structure = scene.lagrangian->structure();
-  if (structure.phase_space()) return {Columns::Identity(n, n), Columns(n, 0)};
+  if (structure.phase_space()) return {Columns::Identity(n, n), Columns(n, 0), false};
   const Start& start = scene.start;
   const bool sized = start.q.size() == scene.storage_size() && start.v.size() == n;
-  if (structure.separable || n > most_coordinates_of_first_order || !sized || !start.q.allFinite() ||
-      !start.v.allFinite() || positive_definite(*scene.lagrangian, start))
+  if (n > most_coordinates_of_first_order || !sized || !start.q.allFinite() || !start.v.allFinite() ||
+      positive_definite(*scene.lagrangian, start))
     return {};
+  const bool by_force = may_be_by_force(scene);
+  if (structure.separable && !by_force) return {};
   const AtTwoPoints at(scene);
   if (!at.finite()) return {};
   const Columns w = kernel_of(at.mass), free = kernel_of(stack(at.mass, at.one_forms));
   if (free.cols() == 0) return {};
   const Columns reached = at.by_q.topRows(n).transpose() * free;  // momenta along `free` by positions
-  if (max_norm(reached) <= 1e-12 * size_or_one(max_norm(at.by_q))) return {};
+  const bool constant = max_norm(reached) <= 1e-12 * size_or_one(max_norm(at.by_q));
+  if (constant && !(by_force && non_linear_in_velocity(scene, free))) return {};
   const Eigen::HouseholderQR<Columns> qr(w);
   const Columns q = qr.householderQ() * Columns::Identity(n, n);
-  return {w, q.rightCols(n - w.cols())};
+  return {w, q.rightCols(n - w.cols()), constant};
 }
 
 FirstOrderPoint::FirstOrderPoint(const Scene& scene, FirstOrderMotions motions)
@@ -181,7 +205,7 @@ void FirstOrderVelocityProblem::begin(double t, ConstVectorRef q, ConstVectorRef
 
 void FirstOrderVelocityProblem::residual(ConstVectorRef x, VectorRef f) {
   point_.evaluate(t_, q_, x.head(n_), x.tail(m_));
-  const auto& [w, u] = point_.motions();
+  const Columns &w = point_.motions().w, &u = point_.motions().u;
   f.head(u.cols()) = u.transpose() * (point_.momentum() - p_);
   f.segment(u.cols(), w.cols()) = w.transpose() * (point_.momentum_rate() - point_.force());
   f.tail(m_) = point_.row_residual();
@@ -198,7 +222,7 @@ void FirstOrderVelocityProblem::residual(ConstVectorRef x, VectorRef f) {
 void FirstOrderVelocityProblem::jacobian(ConstVectorRef x, VectorRef values) {
   point_.evaluate(t_, q_, x.head(n_), x.tail(m_));
   point_.differentiate();
-  const auto& [w, u] = point_.motions();
+  const Columns &w = point_.motions().w, &u = point_.motions().u;
   const Eigen::Index inert = u.cols();
   auto j = values.reshaped(n_ + m_, n_ + m_);
   j.setZero();

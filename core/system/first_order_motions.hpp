@@ -18,8 +18,13 @@ namespace diracstep {
 /// hold velocities and no accelerations.  W = 1 for phase-space Lagrangians θ(t,q)·v − H(t,q), where they
 /// read (Dθ − Dθᵀ) v = −∇H − ∂θ/∂t + f + AᵀΛ; L = v_x²/2 + z v_y − V has y and z of first and x of second
 /// order. The columns of U span what is orthogonal to W: motions with inertia.
+///
+/// `by_force`: momenta along W are constant, but a force on motions along W that the rows allow is not linear
+/// in v, such as the voltage of a diode in a loop without inductors.  The equations then determine velocities
+/// by ∂f/∂v, at each instant: a differential-algebraic system of index 1, which ordinary steps solve.
 struct FirstOrderMotions {
   Columns w, u;
+  bool by_force = false;
 
   bool exist() const { return w.cols() > 0; }
 };
@@ -29,7 +34,7 @@ struct FirstOrderMotions {
 bool positive_definite(const Lagrangian& lagrangian, const Start& start);
 
 /// Those of a completed scene; none where all motions have inertia, and where momenta along W are constant,
-/// as in circuits, which hidden_rows.hpp deals with.
+/// as in circuits, and no force along them is non-linear in v: these hidden_rows.hpp deals with.
 FirstOrderMotions first_order_motions(const Scene& scene);
 
 /// A scene with motions of first order at one point: the derivatives of L, f and the rows there, as full

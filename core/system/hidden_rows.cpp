@@ -7,6 +7,7 @@
 #include <diracstep/core/system/first_order_motions.hpp>
 #include <diracstep/core/system/hidden_rows.hpp>
 #include <diracstep/core/system/lagrangian_derivatives.hpp>
+#include <diracstep/core/system/multiplier_rows.hpp>
 #include <diracstep/core/system/rows_along_motions.hpp>
 #include <limits>
 
@@ -158,12 +159,23 @@ struct Directions {
   Columns resisted, free;
 };
 
-Directions split(const Columns& w, const Columns& fv) {
-  const Columns resistance = w.transpose() * fv * w;
+Vector largest_of_rows(const Columns& matrix) {
+  Vector largest(matrix.rows());
+  for (Eigen::Index r = 0; r < matrix.rows(); ++r)
+    largest[r] = size_or_one(max_norm(matrix.row(r).transpose()));
+  return largest;
+}
+
+/// `each_in_its_units`: the conductance of a diode, 1e-12 A/V, counts beside a resistance of 1e3 V/A.
+Directions split(const Columns& w, const Columns& fv, bool each_in_its_units) {
+  Columns resistance = w.transpose() * fv * w;
+  const Vector units = each_in_its_units ? largest_of_rows(resistance) : Vector(Vector::Ones(w.cols()));
+  resistance = units.cwiseInverse().asDiagonal() * resistance;
   Eigen::FullPivLU<Columns> lu;
   lu.setThreshold(rank_tolerance(resistance));
   lu.compute(resistance);
-  Directions result{Columns(w.rows(), lu.rank()), w * kernel(resistance.transpose())};
+  Directions result{Columns(w.rows(), lu.rank()),
+                    w * (units.cwiseInverse().asDiagonal() * kernel(resistance.transpose()))};
   const auto& order = lu.permutationP().indices();
   for (Eigen::Index r = 0; r < w.cols(); ++r)
     if (order[r] < lu.rank()) result.resisted.col(order[r]) = w.col(r);
@@ -197,14 +209,9 @@ void require_described(const Scene& scene, const Columns& w, const Directions& s
   if (!vanishes(w.transpose() * d.lqv, d.lqv) || !free)
     refuse(scene, w, "the force along it depends on other velocities, which is not supported");
   if (!scene.force) return;
-  const Vector rest = Vector::Zero(scene.dimension());
   const Vector f = force_of(scene, at), later = force_of(scene, {at.t + 0.61, at.q, at.v});
   if (!vanishes(split.free.transpose() * (later - f), f))
     refuse(scene, w, "the force f along it depends on the time; put it into the Lagrangian as a potential");
-  const Vector affine =
-      force_of(scene, {at.t, at.q, 2.0 * at.v}) - 2.0 * f + force_of(scene, {at.t, at.q, rest});
-  if (!vanishes(split.resisted.transpose() * affine, f))
-    refuse(scene, w, "the force along it is not linear in v, which is not supported; add a small inertia");
 }
 
 /// W, without a column where ∂²L/∂v² is regular along the rows at the start or near it: what is singular at
@@ -230,17 +237,12 @@ Columns hidden_matrix(const Directions& w, const FullDerivatives& d) {
   return matrix;
 }
 
-Vector largest_of_rows(const Columns& matrix) {
-  Vector largest(matrix.rows());
-  for (Eigen::Index r = 0; r < matrix.rows(); ++r)
-    largest[r] = size_or_one(max_norm(matrix.row(r).transpose()));
-  return largest;
-}
-
 }  // namespace
 
 ConstraintBlocks hidden_rows(const Scene& scene) {
-  if (scene.by_hamiltonian() || scene.space || first_order_motions(scene).exist()) return {};
+  if (scene.by_hamiltonian() || scene.space) return {};
+  const FirstOrderMotions first_order = first_order_motions(scene);
+  if (first_order.exist() && !first_order.by_force) return {};
   const Start& start = scene.start;
   const bool sized = start.q.size() == scene.storage_size() && start.v.size() == scene.dimension();
   if (!sized || !start.q.allFinite() || !start.v.allFinite()) return {};  // told by require_consistent
@@ -251,17 +253,24 @@ ConstraintBlocks hidden_rows(const Scene& scene) {
   if (!at_first.lvv.allFinite()) return {};  // told where the momentum is taken
   const Columns w = directions(scene, first, at_first, other, at_other);
   if (w.cols() == 0) return {};
-  const Directions parts = split(w, at_first.fv);
+  const FullDerivatives& resisting = first_order.by_force ? at_other : at_first;
+  const Directions parts = split(w, resisting.fv, first_order.by_force);
   require_described(scene, w, parts, other, at_other);
-  const Columns matrix = hidden_matrix(parts, at_first);
+  const Columns matrix = hidden_matrix(parts, resisting);
   const Vector units = largest_of_rows(matrix);
   const Columns undetermined = kernel(units.cwiseInverse().asDiagonal() * matrix * w);
-  if (undetermined.cols() > 0)
+  const bool multipliers = undetermined.cols() > 0 && undetermined.cols() == parts.free.cols() &&
+                           are_multipliers(scene, parts.free);
+  if (undetermined.cols() > 0 && !multipliers)
     refuse(scene, w * undetermined, "neither a potential nor a force determines it; is a term missing in L?");
   ConstraintBlocks blocks;
   const Eigen::Index r = parts.resisted.cols(), c = parts.free.cols();
-  if (r > 0) blocks.push_back(rows_along_motions(scene, false, parts.resisted, units.head(r)));
-  if (c > 0) blocks.push_back(rows_along_motions(scene, true, parts.free, units.tail(c)));
+  if (r > 0 && !first_order.by_force)
+    blocks.push_back(rows_along_motions(scene, false, parts.resisted, units.head(r)));
+  if (multipliers)
+    blocks.push_back(std::make_shared<MultiplierRows>(scene, parts.free, units.tail(c)));
+  else if (c > 0)
+    blocks.push_back(rows_along_motions(scene, true, parts.free, units.tail(c)));
   return blocks;
 }
 

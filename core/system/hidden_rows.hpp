@@ -15,9 +15,13 @@ namespace diracstep {
 /// (Kirchhoff's voltage law around the loops) holds along every motion.  Of these rows those in which f
 /// resists a motion along W (R v) are rows on velocities,  W_rᵀ(∂f/∂v v + ∂L/∂q + f(t,q,0)) = 0;  the others
 /// are rows on positions, φ(t,q) = W_cᵀ(∂L/∂q + f) = 0, in which f must not depend on the velocities that the
-/// scene's rows allow.  Beside these rows they make the saddle-point matrix of saddle_point.hpp regular: they
-/// fix the velocities that momenta leave open, and their own multipliers are zero along the motion, since
-/// A_hidden W is regular and Wᵀ(∂L/∂q + f) = 0.
+/// scene's rows allow.  Where f resists by more than R v, no rows on velocities are added: the equations
+/// along W determine them as they are (FirstOrderMotions::by_force).  Beside these rows they make the
+/// saddle-point matrix of saddle_point.hpp regular: they fix the velocities that momenta leave open, and
+/// their own multipliers are zero along the motion, since A_hidden W is regular and Wᵀ(∂L/∂q + f) = 0.
+///
+/// Where a position along W enters as a factor only, as a multiplier does, the row on positions is one of the
+/// scene with a force, which is that coordinate: multiplier_rows.hpp.
 ///
 /// Second derivatives of the position rows hold third derivatives of L and are left out: they are zero for
 /// linear capacitors, and elsewhere change nothing but the acceleration along W.

@@ -1,5 +1,7 @@
 #include <cmath>
+#include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/system/lagrangian_derivatives.hpp>
+#include <diracstep/core/system/multiplier_rows.hpp>
 #include <diracstep/core/system/rows_along_motions.hpp>
 #include <sstream>
 #include <string_view>
@@ -177,6 +179,11 @@ std::string motion_along(const Scene& scene, const Vector& w) {
 
 std::shared_ptr<const ConstraintRows> rows_along_motions_in(const ConstraintRows& rows,
                                                             const Scene& extended) {
+  if (dynamic_cast<const MultiplierRows*>(&rows) != nullptr)
+    throw Misuse(
+        "scene '" + extended.name +
+        "': derivatives of motions with multipliers among the coordinates are not supported; write what "
+        "they multiply as rows");
   const auto* const hidden = dynamic_cast<const RowsAlongMotions*>(&rows);
   if (hidden == nullptr) return nullptr;
   Columns motions = Columns::Zero(extended.dimension(), hidden->rows());

@@ -13,7 +13,7 @@ std::shared_ptr<const ConstraintRows> rows_along_motions(const Scene& scene, boo
                                                          const Columns& directions, const Vector& units);
 
 /// The same rows in a scene that has further coordinates after those of this one, its parameters; null where
-/// `rows` are no such rows.
+/// `rows` are no such rows.  Throws Misuse for those of multipliers (multiplier_rows.hpp).
 std::shared_ptr<const ConstraintRows> rows_along_motions_in(const ConstraintRows& rows,
                                                             const Scene& extended);
 

@@ -4,6 +4,7 @@
 #include <deque>
 #include <diracstep/constraints/kirchhoff.hpp>
 #include <diracstep/scene_format/compiler/circuit_formulas.hpp>
+#include <diracstep/scene_format/compiler/circuit_reader.hpp>
 #include <string>
 #include <unordered_map>
 #include <vector>
@@ -123,10 +124,12 @@ Node CircuitFormulas::capacitor_energy(const Branch& branch, Node index) {
   return graph_.multiply(graph_.divide(graph_.number(0.5), size), graph_.power(q, 2));
 }
 
-/// The current as a function of the voltage u of the capacitance beside it; none where there is none.
+/// The current as a function of the voltage u, that of the capacitance beside it or the rate of its flux;
+/// none where it is none.
 Node CircuitFormulas::conducted(const Branch& branch, Node index) {
-  if (family("q" + branch.name + "_c") == none) return none;
-  const Node u = graph_.divide(stored_charge(branch, index), capacitance(branch, index));
+  if (!conducts_by_voltage(branch)) return none;
+  const Node u = has_flux(branch) ? graph_.coordinate(family("f" + branch.name), index, Role::second)
+                                  : graph_.divide(stored_charge(branch, index), capacitance(branch, index));
   if (branch.kind == "resistor") {
     Context where = context(branch, index, "current", true);
     where.locals.emplace("u", u);
@@ -196,7 +199,7 @@ Node CircuitFormulas::lagrangian() {
     } else if (branch.kind == "source_voltage") {
       const Node driving = at_rest(source_value(branch, index));
       sum = graph_.add(sum, summed(branch, graph_.multiply(driving, charge(branch, index))));
-    } else if (has_flux(branch)) {
+    } else if (has_flux(branch) && !conducts_by_voltage(branch)) {
       const bool source = branch.kind == "source_current";
       const Node given = at_rest(source ? source_value(branch, index)
                                         : voltage(place_of(branch, branch.minus, index),
@@ -252,6 +255,9 @@ std::vector<CircuitFormulas::ForceOn> CircuitFormulas::forces() {
       Context where = context(branch, index, "voltage", true);
       where.locals.emplace("i", current(branch, index));
       add(branch, q, graph_.negative(parser_.formula(branch.values.find("voltage")->second, where)));
+    } else if (has_flux(branch) && conducts_by_voltage(branch)) {
+      add(branch, q, graph_.negative(graph_.coordinate(family(f), index, Role::second)));
+      add(branch, f, graph_.subtract(current(branch, index), conducted(branch, index)));
     } else if (has_flux(branch)) {
       add(branch, q, graph_.negative(graph_.coordinate(family(f), index, Role::second)));
       const bool source = branch.kind == "source_current";
@@ -277,8 +283,9 @@ std::vector<CircuitFormulas::Row> CircuitFormulas::rows() {
   add_current_laws(rows);
   for (const auto& branch : document_.branches) {
     const Node index = own_index(branch);
+    if (has_flux(branch)) continue;
     Node given = conducted(branch, index);
-    if (branch.kind == "source_current" && !has_flux(branch)) given = source_value(branch, index);
+    if (branch.kind == "source_current") given = source_value(branch, index);
     if (given == none) continue;
     if (holds(given, true))
       fail(branch.place, fmt::format("the current of {} {} depends on other currents, which is not supported "

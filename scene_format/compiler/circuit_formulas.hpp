@@ -15,9 +15,10 @@ namespace diracstep::scene_compiler {
 ///   u = d/dt ∂L/∂v − ∂L/∂q − f,
 ///
 /// and Kirchhoff's current law makes the rows.  What gives a current as a function of a voltage has that
-/// voltage as a position, on a capacitor beside it, and its current as a row of its own.  Sources whose
-/// current depends on other currents, and op-amps, have a coordinate "fNAME" without mass, ∫u dt in V s, with
-/// forces −v_f on the charge and v_q − I on f: rows would act back on what controls them.
+/// voltage as a position, on a capacitor beside it, and its current as a row of its own.  Without a
+/// capacitor, and for sources whose current depends on other currents, and op-amps, there is a coordinate
+/// "fNAME" without mass, ∫u dt in V s, with forces −v_f on the charge and v_q − I on f: rows would act back
+/// on what controls them.
 class CircuitFormulas {
  public:
   CircuitFormulas(SceneDocument& document, FormulaGraph& graph, Symbols& symbols, FormulaParser& parser);

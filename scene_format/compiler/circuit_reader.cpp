@@ -43,16 +43,29 @@ std::string laws_text(const ElementKeys& element) {
 
 }  // namespace
 
+bool conducts_by_voltage(const SceneDocument::Branch& branch) {
+  return branch.kind == "diode" || branch.has("current");
+}
+
+bool has_no_capacitance(const SceneDocument::Branch& branch) {
+  const auto stated = branch.values.find("capacitance");
+  return stated != branch.values.end() && stated->second.text.find_first_not_of("0. ") == std::string::npos;
+}
+
 std::vector<SceneDocument::Coordinate> coordinates_of(const SceneDocument::Branch& branch) {
   std::vector<SceneDocument::Coordinate> all;
   const std::string what = branch.kind + ' ' + branch.name;
   all.push_back({"q" + branch.name, "C", "charge through " + what, branch.loops, false, branch.place});
-  if (branch.kind == "diode" || branch.has("current"))
+  const bool by_voltage = conducts_by_voltage(branch), at_once = by_voltage && has_no_capacitance(branch);
+  if (by_voltage && !at_once)
     all.push_back({"q" + branch.name + "_c", "C", "charge on the capacitance of " + what, branch.loops, false,
                    branch.place});
-  if (branch.kind == "opamp")
-    all.push_back({"f" + branch.name, "V s", "integral of the voltage across the output of " + what,
-                   branch.loops, false, branch.place});
+  if (at_once || branch.kind == "opamp")
+    all.push_back(
+        {"f" + branch.name, "V s",
+         (at_once ? "integral of the voltage across " : "integral of the voltage across the output of ") +
+             what,
+         branch.loops, false, branch.place});
   return all;
 }
 
@@ -70,10 +83,12 @@ SceneDocument::NodeName node_name(const std::string& file, const FormulaText& te
 }
 
 void guess_currents(SceneDocument& document) {
-  const bool given = std::ranges::any_of(document.branches, [](const auto& branch) {
+  const bool by_elements = std::ranges::any_of(document.branches, [](const auto& branch) {
     return branch.kind == "source_current" || coordinates_of(branch).size() > 1;
   });
-  if (!given || document.project) return;
+  const bool stated_currents = std::ranges::any_of(
+      document.start, [](const auto& entry) { return entry.key.text.starts_with("v_q"); });
+  if (document.project || !(by_elements || stated_currents || document.operating_point)) return;
   const auto stated = [&](const std::string& name) {
     return std::ranges::any_of(document.start, [&](const auto& entry) { return entry.key.text == name; }) ||
            std::ranges::any_of(document.guesses, [&](const auto& guess) { return guess.text == name; });

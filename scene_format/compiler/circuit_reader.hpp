@@ -10,14 +10,21 @@ namespace diracstep::scene_compiler {
 
 /// The coordinates of a circuit's branches, in their order: "qNAME", the charge that has passed from the
 /// first node to the second; "qNAME_c", the charge of the capacitor beside a diode or a resistor given by its
-/// current; "fNAME", ∫ of the voltage across an op-amp's output.
+/// current; "fNAME", ∫ of the voltage across one without a capacitor and across an op-amp's output.
 std::vector<SceneDocument::Coordinate> coordinates_of(const SceneDocument::Branch& branch);
+
+/// Whether an element's current is a function of the voltage across it: of diodes, and of resistors given so.
+bool conducts_by_voltage(const SceneDocument::Branch& branch);
+
+/// Of such an element: whether its 'capacitance' is written as 0.
+bool has_no_capacitance(const SceneDocument::Branch& branch);
 
 /// "n" or "n[k-1]", at a place of the file.  Throws SceneError.
 SceneDocument::NodeName node_name(const std::string& file, const FormulaText& text);
 
-/// Where currents are given by elements, the start of those that nothing stores is to be found: they become
-/// guesses, but for those of inductors and those that the start gives.
+/// Where currents are given by elements, or some by the start, or the motion starts at the operating point,
+/// the start of those that nothing stores is to be found: they become guesses, but for those of inductors and
+/// those that the start gives.
 void guess_currents(SceneDocument& document);
 
 /// Reads the elements of a circuit from the tables of a scene file.

@@ -81,7 +81,9 @@ class NetlistReader {
     for (const Words& line : lines_)
       if (line[0].text[0] != '.') read_element(line);
     for (const Words& line : controlled_by_current_) read_controlled_by_current(line);
+    note_title();
     require_whole();
+    document_.operating_point = !given_start_;
     for (const auto& branch : document_.branches)
       for (SceneDocument::Coordinate& coordinate : coordinates_of(branch))
         document_.coordinates.push_back(std::move(coordinate));
@@ -112,7 +114,7 @@ class NetlistReader {
       begin = end + 1;
       ++number;
       if (number == 1) {
-        document_.description = line;  // the title
+        title_ = line;
         continue;
       }
       const std::size_t first = line.find_first_not_of(" \t\r");
@@ -128,6 +130,26 @@ class NetlistReader {
       ended = lower(words[0].text) == ".end";
       if (!ended) lines_.push_back(std::move(words));
     }
+  }
+
+  /// A first line that could be read as an element is one more often than not.
+  void note_title() {
+    document_.description = title_;
+    NetlistReader trial(*this);
+    try {
+      const Words line = words_of(title_, 0, 1);
+      if (line.empty() || line[0].text.empty()) return;
+      if (line[0].text[0] == '.')
+        trial.read_directive(line);
+      else
+        trial.read_element(line);
+      for (std::size_t k = controlled_by_current_.size(); k < trial.controlled_by_current_.size(); ++k)
+        trial.read_controlled_by_current(line);
+    } catch (const SceneError&) {
+      return;
+    }
+    document_.notes.push_back(fmt::format(
+        "the first line of a netlist is its title: nothing is read from '{}'; put a title above it", title_));
   }
 
   /// Blanks, commas and parentheses part words; '=' is one of its own.
@@ -368,7 +390,8 @@ class NetlistReader {
   void start_at(const std::string& key, const FormulaText& value) {
     document_.start.push_back({{key, value.start}, {value}, false});
     if (!given_start_)
-      fail(value.start, "IC= is read with 'uic' in .tran; the operating point is not computed");
+      fail(value.start,
+           "IC= is read with 'uic' in .tran; without it the motion starts at the operating point");
   }
 
   void read_element(const Words& line) {
@@ -430,15 +453,13 @@ class NetlistReader {
     const bool named = form == "pulse" || form == "sin" || form == "pwl";
     if (!named) {
       require_end(line, k + 1);
-      const FormulaText constant = value(first);
-      require_zero_start(first, constant.text);
-      return constant;
+      return value(first);
     }
     std::vector<Word> words(line.begin() + static_cast<std::ptrdiff_t>(k) + 1, line.end());
     if (form == "pwl") return piecewise(line, words);
     std::vector<std::string> values;
     for (const Word& one : words) values.push_back("(" + value(one).text + ")");
-    return {form == "pulse" ? pulse(line, words, values) : sine(line, words, values), first.place};
+    return {form == "pulse" ? pulse(line, words, values) : sine(line, values), first.place};
   }
 
   void require_count(const Words& line, std::size_t count, std::size_t least, std::size_t most,
@@ -449,7 +470,6 @@ class NetlistReader {
 
   std::string pulse(const Words& line, const std::vector<Word>& words, const std::vector<std::string>& v) {
     require_count(line, v.size(), 2, 7, "PULSE(V1 V2 [TD TR TF PW PER])");
-    require_zero_start(words[0], v[0]);
     const auto given = [&](std::size_t k, double absent) {
       const bool zero_edge =
           (k == 3 || k == 4) && k < words.size() && !words[k].expression && number(words[k]) == 0.0;
@@ -464,13 +484,11 @@ class NetlistReader {
         v[1], delay, since, rise, width, fall);
   }
 
-  std::string sine(const Words& line, const std::vector<Word>& words, const std::vector<std::string>& v) {
+  std::string sine(const Words& line, const std::vector<std::string>& v) {
     require_count(line, v.size(), 2, 6, "SIN(VO VA [FREQ TD THETA PHASE])");
-    require_zero_start(words[0], v[0]);
     const std::string frequency = v.size() > 2 ? v[2] : fmt::format("(1/{:.17g})", end()),
                       delay = v.size() > 3 ? v[3] : "0", damping = v.size() > 4 ? v[4] : "0",
                       phase = v.size() > 5 ? v[5] : "0";
-    if (v.size() > 5) require_zero_start(words[5], v[5]);
     const std::string since = v.size() > 3 ? fmt::format("max(0, t - {})", delay) : "t";
     const std::string factor = v.size() > 4 ? fmt::format("*exp(-{}*{})", since, damping) : "";
     const std::string shift = v.size() > 5 ? fmt::format(" + pi*{}/180", phase) : "";
@@ -488,24 +506,12 @@ class NetlistReader {
       if (k > 0 && !(input.times.back() > input.times[k / 2 - 1]))
         fail(words[k].place, "the times of PWL are to ascend");
     }
-    require_zero_start(words[1], value(words[1]).text);
     document_.inputs.push_back(input);
     return {input.name, line[0].place};
   }
 
   double step() const { return document_.step; }
   double end() const { return document_.t_end; }
-
-  /// Without 'uic' a motion starts at the operating point: at rest, where all sources begin with zero.
-  void require_zero_start(const Word& word, const std::string& text) const {
-    if (given_start_) return;
-    const bool zero = text.find_first_not_of("0.()+-") == std::string::npos;
-    if (!zero)
-      fail(word.place, fmt::format("the source does not start from 0 but from {}: without 'uic' in .tran the "
-                                   "motion starts at the operating point, which is computed only where all "
-                                   "sources start from 0; write uic, and IC= where needed",
-                                   word.text));
-  }
 
   void read_diode(const Words& line) {
     SceneDocument::Branch& branch = add_branch(line, "diode");
@@ -566,6 +572,7 @@ class NetlistReader {
   const std::string& file_;
   const std::string& text_;
   SceneDocument document_;
+  std::string title_;
   std::vector<Words> lines_, controlled_by_current_;
   std::map<std::string, Model> models_;
   std::set<std::string> names_, elements_;

@@ -349,6 +349,8 @@ class DocumentReader : TableReader {
       require_no_state(item);
       if (item.key == "project")
         document_.project = flag(*root["start"].as_table(), "project");
+      else if (item.key == "operating_point")
+        read_operating_point(item, *root["start"].as_table());
       else if (item.key == "guess")
         read_guesses(item);
       else if (item.key == "t")
@@ -356,6 +358,12 @@ class DocumentReader : TableReader {
       else
         document_.start.push_back(entry(item));
     }
+  }
+
+  void read_operating_point(const Item& item, const toml::table& start) {
+    document_.operating_point = flag(start, "operating_point");
+    if (document_.operating_point && document_.branches.empty())
+      fail(item.place, "'operating_point' is that of a circuit, and there are no elements of one");
   }
 
   void read_guesses(const Item& item) {

@@ -159,6 +159,8 @@ struct SceneDocument {
   std::vector<Entry> force, start;
   std::optional<FormulaText> start_time;
   bool project = false;
+  bool operating_point = false;      ///< of a circuit, where the motion starts
+  std::vector<std::string> notes;    ///< of what is read otherwise than it may be meant
   std::vector<FormulaText> guesses;  ///< components of the start that projection may move: "b", "v_x[2]"
   bool drop_redundant_rows = false;
   double t_end = 0.0, step = 0.0, study_end = 0.0;

@@ -85,6 +85,7 @@ std::vector<std::pair<std::string, std::string>> scene_definition(const SceneDoc
   all.add("start time", document.start_time);
   for (const auto& entry : document.start) all.add("start of", entry);
   all.add("start projected", document.project ? "yes" : "no");
+  if (document.operating_point) all.add("start at the operating point", "yes");
   for (const FormulaText& guess : document.guesses) all.add("guess " + formula(guess), "yes");
   for (const auto& row : document.rows)
     if (!row.on) all.add("row off at the start " + row.name, "yes");

@@ -291,6 +291,162 @@ TEST_F(Circuits, ANetlistOfControlledSources) {
   EXPECT_NEAR(value(out, "V(c)"), 2.0 * std::exp(-1.0), 1e-5);
 }
 
+/// The root of a rising function between two numbers.
+template <class F>
+double root(double low, double high, const F& f) {
+  for (int k = 0; k < 200; ++k) (f(0.5 * (low + high)) > 0.0 ? high : low) = 0.5 * (low + high);
+  return low;
+}
+
+constexpr double thermal_voltage_at_27 = 8.617333262e-5 * 300.15;
+
+/// Without 'uic' the motion starts at the operating point, and stays there where nothing changes.
+TEST_F(Circuits, ANetlistStartsAtItsOperatingPoint) {
+  const std::string file = netlist(
+      "operating point\n"
+      ".param v=5\n"
+      "V1 a 0 {v}\n"
+      "R1 a b 1k\n"
+      "C1 b 0 1u\n"
+      "R2 b c 1k\n"
+      "L1 c d 1m\n"
+      "R3 d 0 3k\n"
+      "R4 a e 1k\n"
+      "D1 e 0 DX\n"
+      "I1 0 g 2m\n"
+      "R5 g 0 1k\n"
+      "E1 h 0 g 0 3\n"
+      "C2 h k 1u\n"
+      "C3 k 0 3u\n"
+      ".model DX D(IS=1e-14)\n"
+      ".tran 10u 100u\n"
+      ".print V(b) I(L1) V(e) I(D1) V(g) V(h) V(k)\n");
+  for (const double v : {5.0, 10.0}) {
+    const Json out = json(file, "--set v=" + std::to_string(v))["outputs"];
+    EXPECT_NEAR(value(out, "V(b)"), 0.8 * v, 1e-9 * v) << v;
+    EXPECT_NEAR(value(out, "I(L1)"), v / 5000.0, 1e-12) << v;
+    const double u = root(
+        0.0, 1.0, [&](double e) { return 1e-14 * std::expm1(e / thermal_voltage_at_27) - (v - e) / 1000.0; });
+    EXPECT_NEAR(value(out, "V(e)"), u, 1e-9) << v;
+    EXPECT_NEAR(value(out, "I(D1)"), (v - u) / 1000.0, 1e-10) << v;
+    EXPECT_NEAR(value(out, "V(g)"), 2.0, 1e-9) << v;
+    EXPECT_NEAR(value(out, "V(h)"), 6.0, 1e-9) << v;
+    EXPECT_NEAR(value(out, "V(k)"), 1.5, 1e-9) << v << ": the charge between the capacitors stays 0";
+  }
+}
+
+/// From the operating point of what a source begins with: 1 V through a high pass to 3 V, and an offset of 2
+/// V.
+TEST_F(Circuits, SourcesMayBeginAnywhere) {
+  const Json pass =
+      json(netlist("high pass\n"
+                   "V1 a 0 PULSE(1 3 0.2m 1u 1u 0.5m 1m)\n"
+                   "C1 a b 0.1u\n"
+                   "R1 b 0 1k\n"
+                   ".tran 5u 0.6m\n"
+                   ".print V(b)\n"))["outputs"];
+  const double tau = 1e-4;
+  EXPECT_NEAR(value(pass, "V(b)"), 2e6 * tau * std::expm1(1e-6 / tau) * std::exp(-4e-4 / tau), 1e-6);
+  const Json low =
+      json(netlist("low pass with an offset\n"
+                   "V1 a 0 SIN(2 1 1k)\n"
+                   "R1 a b 1k\n"
+                   "C1 b 0 1u\n"
+                   ".tran 5u 1m\n"
+                   ".print V(b)\n"))["outputs"];
+  const double w = 2e3 * M_PI, x = w * 1e-3;
+  EXPECT_NEAR(value(low, "V(b)"), 2.0 + (-x + x * std::exp(-1.0)) / (1.0 + x * x), 1e-7);
+}
+
+/// 0.1 A through 1 mH and 10 Ω; the current that nothing stores is found.
+TEST_F(Circuits, InductorsHaveAStart) {
+  const Json out =
+      json(netlist("RL\n"
+                   "L1 a 0 1m IC=0.1\n"
+                   "R1 a 0 10\n"
+                   ".tran 1u 0.2m uic\n"
+                   ".print I(L1) V(a)\n"))["outputs"];
+  EXPECT_NEAR(value(out, "I(L1)"), 0.1 * std::exp(-2.0), 1e-9);
+  EXPECT_NEAR(value(out, "V(a)"), -std::exp(-2.0), 1e-8);
+}
+
+TEST_F(Circuits, ACircuitWithoutAnOperatingPointSaysWhy) {
+  expect_misuse("run " + netlist("shorted\nV1 a 0 5\nL1 a 0 1m\n.tran 1u 1m\n"),
+                {"no operating point", "'qL1'", "uic"});
+  expect_misuse("run " + netlist("pumped\nI1 0 a 1m\nC1 a 0 1u\n.tran 1u 1m\n"),
+                {"no operating point", "node_a"});
+}
+
+/// The same from a scene file, whose start says where to look: 1, 2 and 3 V are operating points, since the
+/// currents differ by (u − 1)(u − 2)(u − 3).
+TEST_F(Circuits, AnOperatingPointNearTheStartOfASceneFile) {
+  for (const double near : {0.7, 2.9}) {
+    const Json out =
+        outputs(element("source_voltage", "V", "ground", "a", "value = 4") +
+                element("resistor", "R", "a", "b", "value = 1") +
+                element("capacitor", "C", "b", "ground", "energy = \"q^2/2\"") +
+                element("source_current", "G", "b", "ground", "value = \"V(b)^3 - 6*V(b)^2 + 10*V(b) - 2\"") +
+                "[start]\noperating_point = true\nqC = " + std::to_string(near) +
+                "\n[outputs]\nb = \"V(b)\"\n" + span(0.1, 0.01));
+    EXPECT_NEAR(value(out, "b"), std::round(near), 1e-9);
+  }
+}
+
+TEST_F(Circuits, ATitleThatReadsAsAnElementIsTold) {
+  const Outcome told = run("run " + netlist("V1 a 0 1\nV2 a 0 2\nR1 a 0 1k\n.tran 1u 10u\n.print V(a)\n"));
+  EXPECT_EQ(told.status, 0) << told.err;
+  EXPECT_NE(told.err.find("nothing is read from 'V1 a 0 1'"), std::string::npos) << told.err;
+  const Outcome quiet =
+      run("run " + netlist("Divider by two, 10 V\nV2 a 0 2\nR1 a 0 1k\n.tran 1u 10u\n.print V(a)\n"));
+  EXPECT_EQ(quiet.err.find("title"), std::string::npos) << quiet.err;
+}
+
+/// 2 i + i³ = 1 − u with C u' = i: 2 ln(i/i0) + 3 (i² − i0²)/2 = −t/C; and one in a divider of nothing but
+/// resistors.
+TEST_F(Circuits, NonlinearResistorsNeedNoInductor) {
+  const std::string resistor = "voltage = \"2*i + i^3\"";
+  for (const char* method : {"", "--method type1/gl:3", "--method damped/radau:3"}) {
+    const Json out = outputs(element("source_voltage", "V", "ground", "a", "value = 1") +
+                                 element("resistor", "R", "a", "b", resistor) +
+                                 element("capacitor", "C", "b", "ground", "value = 0.5") +
+                                 "[outputs]\nu = \"V(b)\"\ni = \"I(R)\"\n" + span(1.0, 0.02),
+                             method);
+    const double i0 = root(0.0, 1.0, [](double i) { return 2.0 * i + i * i * i - 1.0; });
+    const double i = root(
+        1e-6, i0, [&](double x) { return 2.0 * std::log(x / i0) + 1.5 * (x * x - i0 * i0) + 1.0 / 0.5; });
+    EXPECT_NEAR(value(out, "i"), i, 1e-8) << method;
+    EXPECT_NEAR(value(out, "u"), 1.0 - 2.0 * i - i * i * i, 1e-8) << method;
+    const Json divided = outputs(element("source_voltage", "V", "ground", "a", "value = \"3*sin(t)\"") +
+                                     element("resistor", "R1", "a", "b", "value = 1") +
+                                     element("resistor", "R", "b", "ground", resistor) +
+                                     "[outputs]\nu = \"V(b)\"\n" + span(1.0, 0.02),
+                                 method);
+    const double at = root(0.0, 1.0, [](double x) { return 3.0 * x + x * x * x - 3.0 * std::sin(1.0); });
+    EXPECT_NEAR(value(divided, "u"), 2.0 * at + at * at * at, 1e-9) << method;
+  }
+}
+
+/// Two diodes without capacitance and resistors: nothing but algebra, with a node between the diodes that
+/// nothing else meets.
+TEST_F(Circuits, DiodesWithoutCapacitanceAreAlgebra) {
+  const std::string file = netlist(
+      "clipped\n"
+      "V1 a 0 SIN(0 5 1k)\n"
+      "D1 a m DX\n"
+      "D2 m b DX\n"
+      "R1 b 0 1k\n"
+      ".model DX D(IS=1e-14 CJO=0)\n"
+      ".tran 5u 1.25m\n"
+      ".print V(b) V(m) I(D1)\n");
+  const double u = root(0.0, 5.0, [](double b) {
+    return b / 1000.0 - 1e-14 * std::expm1(0.5 * (5.0 - b) / thermal_voltage_at_27);
+  });
+  const Json out = json(file)["outputs"];
+  EXPECT_NEAR(value(out, "V(b)"), u, 1e-8);
+  EXPECT_NEAR(value(out, "V(m)"), 0.5 * (5.0 + u), 1e-8);
+  EXPECT_NEAR(value(out, "I(D1)"), u / 1000.0, 1e-11);
+}
+
 TEST_F(Circuits, WhatIsWrongInACircuitIsToldWithItsLine) {
   const auto refused = [&](const std::string& text, int line, const std::vector<std::string>& words) {
     std::vector<std::string> all = words;
@@ -329,7 +485,7 @@ TEST_F(Circuits, WhatANetlistDoesNotKnowIsRefusedByItsLine) {
   expect_refused(head + "D1 a 0 DX\n" + tail, 4, {"no .model 'DX'"});
   expect_refused(head + ".model QX NPN\n" + tail, 4, {"type 'NPN'"});
   expect_refused(head + "F1 a 0 VX 2\n" + tail, 4, {"no voltage source 'VX'"});
-  expect_refused(head + "V2 b 0 5\nR2 b 0 1\n" + tail, 4, {"'uic'", "operating point"});
+  expect_refused(head + "C2 a 0 1u IC=1\n" + tail, 4, {"'uic'", "operating point"});
   expect_refused(head + "K1 L1 L2 0.5\n" + tail, 4, {"no branch 'L1'"});
   expect_refused(head + "R2 a 0 {rl}\n" + tail, 4, {"unknown name 'rl'"});
   expect_refused(head, 1, {".tran"});

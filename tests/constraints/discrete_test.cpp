@@ -140,6 +140,83 @@ TEST(InducedRows, ASceneThatGivesTheDiscreteConstraintAloneMovesAsWithBoth) {
   }
 }
 
+/// Peng and Yoshimura's (±) finite difference maps (arXiv 2411.09530), (q0,q1) ↦ (q0, (q1 − q0)/h) for (+)
+/// and (q1, (q1 − q0)/h) for (−), pull the rows of z' = F(x,y)·(x',y') and L = |v|²/2 − k |q|²/2 back to Q×Q.
+template <class Slopes>
+struct FiniteDifferenceMaps {
+  Slopes slopes;  ///< (F_x, F_y) at (x, y)
+  double stiffness;
+
+  template <class T>
+  std::array<T, 1> row(const std::array<T, 3>& base, const std::array<T, 3>& q0,
+                       const std::array<T, 3>& q1) const {
+    const std::array<T, 2> f = slopes(base);
+    return {q1[2] - q0[2] - f[0] * (q1[0] - q0[0]) - f[1] * (q1[1] - q0[1])};
+  }
+  std::shared_ptr<const DiscreteRows> rows(bool plus) const {
+    return discrete_rows<3, 1>(
+        [*this, plus]<class T>(const std::array<T, 3>& q0, const std::array<T, 3>& q1) {
+          return row(plus ? q0 : q1, q0, q1);
+        });
+  }
+  std::shared_ptr<const Scene> scene() const {
+    Scene scene;
+    scene.name = "finite_differences";
+    scene.coordinates = {"x", "y", "z"};
+    scene.lagrangian = lagrangian<3>([k = stiffness](const auto& q, const auto& v) {
+      return 0.5 * (v[0] * v[0] + v[1] * v[1] + v[2] * v[2] - k * (q[0] * q[0] + q[1] * q[1] + q[2] * q[2]));
+    });
+    scene.constraints = {pfaffian<3, 1>([s = slopes]<class T>(const std::array<T, 3>& q) {
+      const std::array<T, 2> f = s(q);
+      return std::array<std::array<T, 3>, 1>{{{-f[0], -f[1], T(1.0)}}};
+    })};
+    scene.start = {0.0, Vector{{0.6, -0.3, 0.2}}, Vector{{0.4, 0.7, 0.0}}, {}};
+    const auto at_start = slopes(std::array<double, 3>{0.6, -0.3, 0.2});
+    scene.start.v[2] = at_start[0] * 0.4 + at_start[1] * 0.7;
+    return std::make_shared<const Scene>(scene);
+  }
+
+  /// q2 of the (±) discrete Lagrange–d'Alembert equations for h L(q_k, …) and h L(q_{k+1}, …),
+  ///   D2 L_d(q0,q1) + D1 L_d(q1,q2) = μ ω(q1),   ω(q1 or q2)(q2 − q1) = 0,
+  /// which are (q1 − q0)/h − (q2 − q1)/h − h k q1 = μ ω(q1) for both, by Newton's method for μ.
+  Vector next(bool plus, double h, const Vector& q0, const Vector& q1) const {
+    const auto array = [](const Vector& q) { return std::array<double, 3>{q[0], q[1], q[2]}; };
+    const auto f = slopes(array(q1));
+    const Vector form{{-f[0], -f[1], 1.0}}, free = 2.0 * q1 - q0 - h * h * stiffness * q1;
+    const auto off = [&](double mu) {
+      const Vector q2 = free - mu * form;
+      return row(plus ? array(q1) : array(q2), array(q1), array(q2))[0];
+    };
+    double mu = 0.0;
+    for (int k = 0; k < 20; ++k) mu -= off(mu) * 2e-6 / (off(mu + 1e-6) - off(mu - 1e-6));
+    return free - mu * form;
+  }
+
+  void expect_equal(bool plus) const {
+    constexpr double h = 0.05;
+    const auto samples = samples_of(
+        scene(), {.method = plus ? "type1/left" : "type1/right", .step = h, .constraint_rule = rows(plus)},
+        200);
+    for (std::size_t k = 0; k + 2 < samples.size(); ++k) {
+      const Vector q2 = next(plus, h, samples[k].q, samples[k + 1].q);
+      ASSERT_LT((samples[k + 2].q - q2).lpNorm<Eigen::Infinity>(), 1e-13) << (plus ? "+ " : "- ") << k;
+    }
+  }
+};
+
+/// The Heisenberg system of their paper, z' = y x' − x y' with |v|²/2, where both maps give the same row
+/// z1 − z0 = y0 x1 − x0 y1; and z' = (1 + y²) x' + x y in a well, where they differ.
+TEST(FiniteDifferenceMapsOfPengAndYoshimura, TakeTheDiscreteLagrangeDAlembertStep) {
+  const auto heisenberg = []<class T>(const std::array<T, 3>& q) { return std::array<T, 2>{q[1], -q[0]}; };
+  const auto bent = []<class T>(const std::array<T, 3>& q) {
+    return std::array<T, 2>{1.0 + q[1] * q[1], q[0]};
+  };
+  for (const bool plus : {true, false}) {
+    FiniteDifferenceMaps<decltype(heisenberg)>{heisenberg, 0.0}.expect_equal(plus);
+    FiniteDifferenceMaps<decltype(bent)>{bent, 1.0}.expect_equal(plus);
+  }
+}
+
 template <class F>
 void expect_refused(F formula, std::initializer_list<std::string> parts) {
   const IntegratorOptions options{.step = 0.1, .constraint_rule = discrete_rows<3, 1>(formula)};

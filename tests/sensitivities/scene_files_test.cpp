@@ -166,6 +166,52 @@ void expect_as_runs_of(const std::string& text, const std::string& parameter, do
   EXPECT_LT(distance(exact, approximate), 3e-9) << parameter << ", " << options.method;
 }
 
+/// A loop of a source, R and L with C beside a second resistor, whose charge between C1 and C2 stays as
+/// given.
+const char* const at_operating_point = R"toml(name = "at_rest"
+[parameters]
+v = 2
+r = 3
+c = 0.5
+l = 0.7
+[[source_voltage]]
+name = "V"
+nodes = ["ground", "a"]
+value = "v*cos(t)"
+[[resistor]]
+name = "R"
+nodes = ["a", "b"]
+value = "r"
+[[inductor]]
+name = "L"
+nodes = ["b", "d"]
+value = "l"
+[[resistor]]
+name = "RL"
+nodes = ["d", "ground"]
+value = 2
+[[capacitor]]
+name = "C1"
+nodes = ["b", "m"]
+value = "c"
+[[capacitor]]
+name = "C2"
+nodes = ["m", "ground"]
+value = "2*c*v"
+[start]
+operating_point = true
+qC1 = "0.1*r"
+[span]
+end = 1
+step = 0.1
+)toml";
+
+TEST(SceneSensitivities, FollowAnOperatingPoint) {
+  for (const auto& [parameter, value] :
+       std::map<std::string, double>{{"v", 2.0}, {"r", 3.0}, {"c", 0.5}, {"l", 0.7}})
+    expect_as_runs_of(at_operating_point, parameter, value, {.method = "type1/gl:3", .step = 0.05});
+}
+
 const char* const rod = R"toml(name = "rod"
 lagrangian = "m*(v_x^2 + v_y^2)/2 - m*g*y"
 [parameters]

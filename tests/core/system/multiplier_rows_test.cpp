@@ -1,0 +1,83 @@
+#include <gtest/gtest.h>
+
+#include <diracstep/constraints/holonomic.hpp>
+
+#include "misuse.hpp"
+#include "stepping.hpp"
+
+namespace diracstep {
+namespace {
+
+using testing::expect_misuse;
+using testing::samples_of;
+
+struct Links {
+  /// What two links of length 1 make zero, of q = (x1, y1, x2, y2, …).
+  template <class Q>
+  static auto apart(const Q& q) {
+    const auto first = q[0] * q[0] + q[1] * q[1] - 1.0;
+    const auto dx = q[2] - q[0], dy = q[3] - q[1];
+    return std::array{first, dx * dx + dy * dy - 1.0};
+  }
+  template <class Q, class V>
+  static auto free(const Q& q, const V& v) {
+    return 0.5 * (v[0] * v[0] + v[1] * v[1]) + (v[2] * v[2] + v[3] * v[3]) - q[1] - 2.0 * q[3];
+  }
+};
+
+/// A double pendulum with its two multipliers, a and b, as coordinates: L = L0 − a φ1 − 3 b φ2.
+std::shared_ptr<const Scene> with_multipliers() {
+  auto scene = std::make_shared<Scene>();
+  scene->name = "multipliers";
+  scene->coordinates = {"x1", "y1", "x2", "y2", "a", "b"};
+  scene->lagrangian = lagrangian<6>([](const auto& q, const auto& v) {
+    const auto phi = Links::apart(q);
+    return Links::free(q, v) - q[4] * phi[0] - 3.0 * q[5] * phi[1];
+  });
+  scene->start = {0.0, Vector{{1.0, 0.0, 1.0, 1.0, 0.7, -0.2}}, Vector{{0.0, 0.3, 0.5, 0.3, 0.0, 0.0}}, {}};
+  return scene;
+}
+
+std::shared_ptr<const Scene> with_rows() {
+  auto scene = std::make_shared<Scene>();
+  scene->name = "rows";
+  scene->coordinates = {"x1", "y1", "x2", "y2"};
+  scene->lagrangian = lagrangian<4>([](const auto& q, const auto& v) { return Links::free(q, v); });
+  scene->constraints = {
+      holonomic<4, 2>([]<class T>(const std::array<T, 4>& q) { return std::array<T, 2>(Links::apart(q)); })};
+  scene->start = {0.0, Vector{{1.0, 0.0, 1.0, 1.0}}, Vector{{0.0, 0.3, 0.5, 0.3}}, {}};
+  return scene;
+}
+
+/// The motion of the scene whose author writes rows, with the forces of these as the last coordinates, for
+/// methods of every kind; so the orders are those of holonomic rows.
+TEST(MultipliersAsCoordinates, AreTheForcesOfTheRowsTheyStandFor) {
+  const std::vector<IntegratorOptions> all{{.method = "type1/gl:1", .step = 0.02},
+                                           {.method = "type1/gl:3", .step = 0.05},
+                                           {.method = "type1/midpoint", .order = 4, .step = 0.02},
+                                           {.method = "type1/trapezoidal", .step = 0.02},
+                                           {.method = "damped/radau:2", .step = 0.02}};
+  for (const IntegratorOptions& options : all) {
+    const auto mine = samples_of(with_multipliers(), options, 60),
+               rows = samples_of(with_rows(), options, 60);
+    for (std::size_t k = 0; k < mine.size(); ++k) {
+      ASSERT_LT((mine[k].q.head(4) - rows[k].q).lpNorm<Eigen::Infinity>(), 1e-11) << options.method << k;
+      ASSERT_LT((mine[k].v.head(4) - rows[k].v).lpNorm<Eigen::Infinity>(), 1e-10) << options.method << k;
+      ASSERT_NEAR(mine[k].q[4], -rows[k].lambda[0], 1e-9) << options.method << k;
+      ASSERT_NEAR(mine[k].q[5], -rows[k].lambda[1] / 3.0, 1e-9) << options.method << k;
+    }
+  }
+}
+
+TEST(MultipliersAsCoordinates, OfWhatMovesWithTheTimeAreRefused) {
+  auto scene = std::make_shared<Scene>(*with_multipliers());
+  scene->lagrangian = lagrangian<6>([](const auto& q, const auto& v, const auto& t) {
+    const auto phi = Links::apart(q);
+    return Links::free(q, v) - q[4] * (phi[0] - t) - q[5] * phi[1];
+  });
+  expect_misuse([&] { Integrator(scene, Registry::with_built_ins(), kinsol(), {.step = 0.1}); },
+                {"'multipliers'", "a", "neither a potential nor a force determines it"});
+}
+
+}  // namespace
+}  // namespace diracstep
