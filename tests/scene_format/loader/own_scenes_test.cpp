@@ -43,9 +43,9 @@ TEST(Schema, HasTheKeysOfTheReader) {
         "rows",        "force",       "start",       "span",     "reference",      "invariants",
         "recommended", "inductor",    "capacitor",   "resistor", "source_voltage", "mutual",
         "redundant",   "inputs",      "states",      "outputs",  "events",         "source_current",
-        "diode",       "switch",      "transformer", "gyrator",  "opamp"})
+        "diode",       "switch",      "transformer", "gyrator",  "opamp",          "field"})
     EXPECT_TRUE(schema.contains(key)) << key;
-  EXPECT_EQ(schema.size(), 35u);
+  EXPECT_EQ(schema.size(), 36u);
 }
 
 }  // namespace
