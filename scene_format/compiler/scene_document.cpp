@@ -10,6 +10,7 @@
 #include <diracstep/scene_format/compiler/scene_document.hpp>
 #include <diracstep/scene_format/compiler/size_limits.hpp>
 #include <diracstep/scene_format/compiler/table_reader.hpp>
+#include <diracstep/scene_format/fields/field_expansion.hpp>
 #include <filesystem>
 #include <initializer_list>
 #include <set>
@@ -614,11 +615,19 @@ SceneDocument read_document(const std::string& file, const std::string& text) {
     guess_currents(document);
     return document;
   }
+  toml::table root;
   try {
-    const toml::table root = toml::parse(std::string_view(text), std::string_view(file));
+    root = toml::parse(std::string_view(text), std::string_view(file));
+    if (root.contains("field")) expand_field(root, is_reserved);
     return DocumentReader(file, text).read(root);
   } catch (const toml::parse_error& error) {
     throw SceneError(file, place_of(error.source()), std::string(error.description()));
+  } catch (const FieldError& error) {
+    const TableReader reader(file, text);
+    throw SceneError(file,
+                     error.node->is_string() ? reader.formula(*error.node, "").place(error.offset)
+                                             : place_of(error.node->source()),
+                     error.message);
   }
 }
 

@@ -453,7 +453,7 @@ class SceneCompiler {
   void compile_start() {
     bool velocities = false;
     for (const auto& entry : document_.start) {
-      program_.start.push_back(named_value(entry, {.what = "the start"}));
+      program_.start.push_back(named_value(entry, {.what = "the start", .time = true}));
       const NamedValue& value = program_.start.back();
       if (value.role != Role::second) continue;
       if (velocities && program_.start_by_momentum != value.momentum)

@@ -44,9 +44,9 @@ TEST(Schema, HasTheKeysOfTheReader) {
         "recommended", "inductor",    "capacitor",   "resistor", "source_voltage", "mutual",
         "redundant",   "inputs",      "states",      "outputs",  "events",         "source_current",
         "diode",       "switch",      "transformer", "gyrator",  "opamp",
-        "gravity",     "body",        "joint",       "wheel",    "rolling",        "spring"})
+        "field", "gravity",     "body",        "joint",       "wheel",    "rolling",        "spring"})
     EXPECT_TRUE(schema.contains(key)) << key;
-  EXPECT_EQ(schema.size(), 41u);
+  EXPECT_EQ(schema.size(), 42u);
 }
 
 }  // namespace
