@@ -44,7 +44,7 @@ void GroupPoint::evaluate(double t, ConstVectorRef q, ConstVectorRef xi) {
   for (const int a : space_.turns()) force_[a] = momentum_.dot(space_.bracket(unit(space_, a), xi_));
 }
 
-void GroupPoint::derivatives(Derivatives& out) {
+void GroupPoint::derivatives(Derivatives& out) const {
   const Lagrangian& lagrangian = *scene_.lagrangian;
   const SparsityPattern& pattern = lagrangian.pattern();
   Vector qq(pattern.nonzeros()), qv(qq), vv(qq);

@@ -25,7 +25,7 @@ class GroupPoint {
     Columns momentum_g, momentum_xi, force_g, force_xi;
     double curvature;  ///< largest entry of ∂²L/∂g²
   };
-  void derivatives(Derivatives& out);
+  void derivatives(Derivatives& out) const;
 
  private:
   const Scene& scene_;
