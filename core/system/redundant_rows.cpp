@@ -2,6 +2,7 @@
 #include <Eigen/SVD>
 #include <Eigen/SparseCholesky>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/system/redundant_rows.hpp>
@@ -79,6 +80,39 @@ std::vector<int> dependent_in_parts(const Eigen::SparseMatrix<double>& one_forms
   return dependent;
 }
 
+using RowKinds = std::array<std::vector<int>, 2>;  ///< numbers of the holonomic rows, and of the others
+
+RowKinds kinds_of(const ConstraintBlocks& blocks) {
+  RowKinds kinds;
+  int row = 0;
+  for (const auto& block : blocks)
+    for (int r = 0; r < block->rows(); ++r) kinds[block->holonomic() ? 0 : 1].push_back(row++);
+  return kinds;
+}
+
+/// dependent_columns, with those of holonomic rows among holonomic ones alone: a nonholonomic row may go
+/// where a holonomic one makes the same demand of the velocities, which then still holds the place, and not
+/// the other way.
+std::vector<int> dependent_by_kind(const Columns& one_forms, const RowKinds& kinds, double tolerance) {
+  const auto& [holonomic, others] = kinds;
+  if (holonomic.empty() || others.empty()) return dependent_columns(one_forms, tolerance);
+  std::vector<int> dependent, kept = holonomic;
+  for (const int k : dependent_columns(one_forms(Eigen::all, holonomic), tolerance))
+    dependent.push_back(holonomic[static_cast<std::size_t>(k)]);
+  std::erase_if(kept, [&](int c) { return std::ranges::find(dependent, c) != dependent.end(); });
+  const Eigen::HouseholderQR<Columns> first(one_forms(Eigen::all, kept));
+  const Columns basis =
+      first.householderQ() * Columns::Identity(one_forms.rows(), static_cast<Eigen::Index>(kept.size()));
+  Columns rest = one_forms(Eigen::all, others);
+  rest -= basis * (basis.transpose() * rest);
+  const Eigen::ColPivHouseholderQR<Columns> qr(rest);
+  const auto& order = qr.colsPermutation().indices();
+  for (Eigen::Index k = 0; k < rest.cols(); ++k)  // in parts of the columns, which are of size 1
+    if (k >= rest.rows() || !(std::abs(qr.matrixQR()(k, k)) > tolerance))
+      dependent.push_back(others[static_cast<std::size_t>(order[k])]);
+  return dependent;
+}
+
 /// Poses around the start fulfil the rows to about 1e-10, and what depends on others there does so to as
 /// much.
 constexpr double pose_tolerance = 1e-7;
@@ -120,11 +154,12 @@ double margin_without(const std::vector<int>& dropped, const std::vector<Columns
 }
 
 /// Of the choices that each pose would make the one that suits all best.
-std::vector<int> best_choice(std::vector<int> at_start, const std::vector<Columns>& poses, double tolerance) {
+std::vector<int> best_choice(std::vector<int> at_start, const std::vector<Columns>& poses,
+                             const RowKinds& kinds, double tolerance) {
   constexpr double clearly = 2.0;
   double best = margin_without(at_start, poses);
   for (std::size_t k = 1; k < poses.size(); ++k) {
-    std::vector<int> other = dependent_columns(poses[k], std::max(tolerance, pose_tolerance));
+    std::vector<int> other = dependent_by_kind(poses[k], kinds, std::max(tolerance, pose_tolerance));
     if (other.size() != at_start.size()) continue;
     const double margin = margin_without(other, poses);
     if (margin <= clearly * best) continue;
@@ -225,10 +260,11 @@ std::vector<std::string> redundant_rows(const Scene& scene, const Start& start, 
   ConstraintsAtPoint rows(scene.constraints, scene.dimension());
   rows.evaluate(start.time, start.q);
   const bool full = scene.rows() <= max_rows_in_full;
-  std::vector<int> numbers = full ? dependent_columns(full_one_forms(rows), tolerance)
+  const RowKinds kinds = kinds_of(scene.constraints);
+  std::vector<int> numbers = full ? dependent_by_kind(full_one_forms(rows), kinds, tolerance)
                                   : dependent_in_parts(sparse_one_forms(rows), tolerance);
   if (numbers.empty()) return {};
-  if (full) numbers = best_choice(std::move(numbers), one_forms_around(scene, start), tolerance);
+  if (full) numbers = best_choice(std::move(numbers), one_forms_around(scene, start), kinds, tolerance);
   const std::vector<std::string> names = scene.row_names();
   std::vector<std::string> dependent;
   for (const int r : numbers) dependent.push_back(names[static_cast<std::size_t>(r)]);

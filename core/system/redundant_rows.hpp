@@ -29,7 +29,8 @@ std::vector<int> dependent_columns(const Columns& one_forms, double tolerance);
 /// more than 100 rows, where sparse products are factored, to within 1e-6 at best.  Empty where all rows are
 /// independent.  Of the rows that could be named it takes those without which the others are farthest from
 /// being dependent at the start and at poses around it that the rows allow, so that leaving them out does no
-/// harm while the rank stays the same.
+/// harm while the rank stays the same.  A holonomic row is named only where holonomic ones alone make it
+/// redundant: a nonholonomic one leaves the place free.
 std::vector<std::string> redundant_rows(const Scene& scene, const Start& start, double tolerance = 1e-10);
 
 /// How rows depend on others at the start.

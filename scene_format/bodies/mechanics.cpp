@@ -47,7 +47,7 @@ void Mechanics::outputs(const std::string& name, const Vec& vector, bool plane, 
 
 void Mechanics::guess(const std::string& coordinate, bool velocity) {
   const std::string name = velocity ? velocity_of(coordinate) : coordinate;
-  if (std::ranges::find(made_.guesses, name) == made_.guesses.end()) made_.guesses.push_back(name);
+  if (guessed_.insert(name).second) made_.guesses.push_back(name);
 }
 
 void Mechanics::push(const std::string& coordinate, const Formula& force, int) {

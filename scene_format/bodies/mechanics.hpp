@@ -2,6 +2,7 @@
 
 #include <diracstep/scene_format/bodies/mechanism.hpp>
 #include <map>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -96,6 +97,7 @@ class Mechanics {
   std::vector<Frame> frames_;
   Formula lagrangian_ = 0.0, dissipation_ = 0.0;
   std::map<std::string, Formula> force_;
+  std::set<std::string> guessed_;
 };
 
 /// lambda_ROW.

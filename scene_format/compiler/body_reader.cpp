@@ -109,7 +109,12 @@ void BodyReader::know_values(const toml::table& root) {
 }
 
 double BodyReader::value_of(const FormulaText& text, const std::string& what) {
-  const NodeData data = graph_[parser_.formula(text, {.what = what})];
+  NodeData data;
+  try {
+    data = graph_[parser_.formula(text, {.what = what})];
+  } catch (const FormulaGraph::TooLarge&) {
+    tables_.fail(text.start, fmt::format("{}: the formulas of bodies have too many parts", what));
+  }
   if (data.op != Op::number || !std::isfinite(data.value))
     tables_.fail(text.start,
                  fmt::format("{}: expected a finite number or a formula in the parameters", what));
@@ -240,6 +245,11 @@ void BodyReader::read_body(const toml::table& table) {
     body.rate[2] = formula(*table.get("rate"), fmt::format("'rate' of {}", what));
   else if (body.rate_given)
     body.rate = vector(*table.get("rate"), fmt::format("'rate' of {}", what), false);
+  add(std::move(body));
+}
+
+void BodyReader::add(Body body) {
+  numbers_.emplace(body.name, static_cast<int>(mechanism_.bodies.size()));
   mechanism_.bodies.push_back(std::move(body));
 }
 

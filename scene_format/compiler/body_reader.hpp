@@ -81,6 +81,7 @@ class BodyReader {
                                     const std::string& name, int source);
   void read_gravity(const toml::table& root);
   void read_body(const toml::table& table);
+  void add(bodies::Body body);
   void draw(const bodies::Body& body);
   void read_inertia(const toml::table& table, bodies::Body& body, const std::string& what);
   void read_shape(const toml::table& table, bodies::Body& body, const std::string& what);
@@ -109,6 +110,7 @@ class BodyReader {
   Symbols symbols_;
   FormulaParser parser_;
   bodies::Mechanism mechanism_;
+  std::map<std::string, int> numbers_;  ///< of bodies by name
   std::set<std::string> names_;
   BodyParts parts_;
 };

@@ -33,8 +33,7 @@ int BodyReader::body_number(const toml::node& node, const std::string& what, boo
   if (!node.is_string()) tables_.fail(place, what + ": expected the name of a body in quotes");
   const std::string name = node.as_string()->get();
   if (or_ground && name == "ground") return ground;
-  const auto found = std::ranges::find(mechanism_.bodies, name, &Body::name);
-  if (found != mechanism_.bodies.end()) return static_cast<int>(found - mechanism_.bodies.begin());
+  if (const auto found = numbers_.find(name); found != numbers_.end()) return found->second;
   std::vector<std::string> known;
   if (or_ground) known.emplace_back("ground");
   for (const Body& body : mechanism_.bodies) known.push_back(body.name);
@@ -284,7 +283,7 @@ void BodyReader::read_wheel(const toml::table& table) {
     contact.surface = surface->text;
     parts_.formulas[contact.name + "_h"] = surface->start;
   }
-  mechanism_.bodies.push_back(std::move(body));
+  add(std::move(body));
   mechanism_.joints.push_back(std::move(joint));
   mechanism_.contacts.push_back(std::move(contact));
 }

@@ -83,8 +83,14 @@ a = "atan2(0.6, 0.8)"
 TEST_F(Bodies, AJointCarriesTheWeightAndItsMoment) {
   const CatalogueScene arm = scene(with_span(R"toml(gravity = "g"
 parameters = { g = 10 }
-body = [{ name = "arm", mass = 3, shape = "box", size = [1, 0.1, 0.1], position = [0.5, 0, 0] }]
-joint = [{ name = "wall", kind = "fixed", between = ["ground", "arm"], point = [0, 0, 0] }]
+body = [
+  { name = "cart", mass = 2, shape = "box", size = [0.1, 0.1, 0.1] },
+  { name = "arm", mass = 3, shape = "box", size = [1, 0.1, 0.1], position = [0.5, 0, 0] },
+]
+joint = [
+  { name = "rail", kind = "prismatic", between = ["ground", "cart"], point = [0, 0, 0], axis = [1, 0, 0] },
+  { name = "wall", kind = "fixed", between = ["cart", "arm"], point = [0, 0, 0] },
+]
 )toml"));
   const Sample end = end_of(arm.scene, 0.1, 0.02);
   for (const auto& [name, value] : {std::pair{"wall_force_x", 0.0},
@@ -130,7 +136,7 @@ body = [
   { name = "b", plane = true, mass = 2, shape = "rod", from = [0.6, 0.2], to = [1.4, 0.1], rate = 0 },
 ]
 joint = [
-  { name = "p", kind = "revolute", between = ["ground", "a"], point = [0, 0] },
+  { name = "h", kind = "revolute", between = ["ground", "a"], point = [0, 0] },
   { name = "q", kind = "revolute", between = ["a", "b"], point = [0.6, 0.2], torque = "-0.1*q_rate" },
 ]
 )toml"));
@@ -140,7 +146,7 @@ body = [
   { name = "b", mass = 2, inertia = ["1.3/12", "1.3/12", "1.3/12"], position = [1, 0.15, 0], rate = [0, 0, 0] },
 ]
 joint = [
-  { name = "p", kind = "revolute", between = ["ground", "a"], point = [0, 0, 0], axis = [0, 0, 1] },
+  { name = "h", kind = "revolute", between = ["ground", "a"], point = [0, 0, 0], axis = [0, 0, 1] },
   { name = "q", kind = "revolute", between = ["a", "b"], point = [0.6, 0.2, 0], axis = [0, 0, 1], torque = "-0.1*q_rate" },
 ]
 )toml"));
@@ -148,7 +154,7 @@ joint = [
                b = end_of(space.scene, 1.0, 0.02, "type1/gl:4");
   for (const char* coordinate : {"a_x", "a_y", "b_x", "b_y"})
     EXPECT_NEAR(at(plane, a.q, coordinate), at(space, b.q, coordinate), 1e-9) << coordinate;
-  for (const char* force : {"p_force_x", "p_force_y", "q_force_x", "q_force_y"})
+  for (const char* force : {"h_force_x", "h_force_y", "q_force_x", "q_force_y"})
     EXPECT_NEAR(output(plane, a, force), output(space, b, force), 1e-6) << force;
 }
 
@@ -240,6 +246,27 @@ TEST_F(Bodies, OnABowlTheyKeepTheirEnergy) {
 
 TEST_F(Bodies, AWheelOfACartRollsAndCarriesItsShare) {
   const CatalogueScene cart = scene(with_span(R"toml(gravity = 10
+body = [{ name = "cart", mass = 8, shape = "box", size = [1, 0.5, 0.1], position = [0, 0, 0.2], velocity = [2, 0, 0], rate = [0, 0, 0] }]
+wheel = [
+  { name = "w1", on = "cart", centre = [0.4, 0, 0.2], axle = [0, 1, 0], radius = 0.2, mass = 1 },
+  { name = "w2", on = "cart", centre = [-0.4, 0, 0.2], axle = [0, 1, 0], radius = 0.2, mass = 1 },
+]
+)toml"));
+  const Sample end = end_of(cart.scene, 0.5, 0.02);
+  EXPECT_NEAR(at(cart, end.q, "cart_x"), 1.0, 1e-10);
+  double carried = 0.0;
+  for (const char* wheel : {"w1", "w2"}) {
+    carried += output(cart, end, std::string(wheel) + "_contact_force_z");
+    EXPECT_NEAR(std::remainder(output(cart, end, std::string(wheel) + "_axle_turned") - 1.0 / 0.2,
+                               2.0 * std::numbers::pi),
+                0.0, 1e-9);
+  }
+  EXPECT_NEAR(carried, 100.0, 1e-7);
+}
+
+/// Wheels on one axle forbid the same shift; what is left out is a row of slip, not one that holds a wheel.
+TEST_F(Bodies, OfTwoWheelsOnAnAxleOneRowOfSlipIsLeftOut) {
+  const CatalogueScene cart = scene(with_span(R"toml(gravity = 10
 redundant = "drop"
 body = [{ name = "cart", mass = 8, shape = "box", size = [1, 0.5, 0.1], position = [0, 0, 0.2], velocity = [2, 0, 0], rate = [0, 0, 0] }]
 wheel = [
@@ -248,14 +275,10 @@ wheel = [
   { name = "w3", on = "cart", centre = [-0.4, 0, 0.2], axle = [0, 1, 0], radius = 0.2, mass = 1 },
 ]
 )toml"));
-  const Sample end = end_of(cart.scene, 0.5, 0.02);
-  EXPECT_NEAR(at(cart, end.q, "cart_x"), 1.0, 1e-10);
-  double carried = 0.0;
-  for (const char* wheel : {"w1", "w2", "w3"}) {
-    carried += output(cart, end, std::string(wheel) + "_contact_force_z");
-    EXPECT_NEAR(output(cart, end, std::string(wheel) + "_axle_turned"), 1.0 / 0.2, 1e-9);
-  }
-  EXPECT_NEAR(carried, 110.0, 1e-7);
+  ASSERT_FALSE(cart.changes.empty());
+  EXPECT_NE(cart.changes.back().find("contact_slip_y'"), std::string::npos) << cart.changes.back();
+  EXPECT_EQ(cart.changes.back().find("axle"), std::string::npos) << cart.changes.back();
+  EXPECT_NEAR(at(cart, end_of(cart.scene, 0.5, 0.02).q, "cart_x"), 1.0, 1e-10);
 }
 
 /// Every way to lay a body down is the same turn.
@@ -276,7 +299,7 @@ TEST_F(Bodies, TheFilesOwnFormulasJoinThoseOfTheBodies) {
 dissipation = "0.1*v_b_x^2"
 coordinates = { s = { unit = "m" } }
 force = { b_y = "0.5" }
-start = { b_x = 0.25, s = 1 }
+start = { b_y = 0.25, s = 1 }
 body = [
   { name = "b", plane = true, mass = 2, inertia = 1, velocity = [0.5, 0] },
   { name = "d", plane = true, mass = 1, inertia = 1, position = [1, 0] },
@@ -286,10 +309,10 @@ spring = [{ name = "k", between = ["b", "d"], points = [[0, 0], [0, 0]], stiffne
 )toml";
   const std::string text = "name = \"both\"\n" + both + span;
   const CatalogueScene entry = scene(text);
-  EXPECT_EQ(at(entry, entry.scene->start.q, "b_x"), 0.25);  // the file's own start
+  EXPECT_EQ(at(entry, entry.scene->start.q, "b_y"), 0.25);  // the file's own start
   const std::string plain = scene_compiler::plain_scene("scene.toml", text);
   for (const char* part :
-       {"+ bodies_lagrangian\"", "+ bodies_dissipation\"", "+ bodies_force_b_y\"", "b_x = 0.25"})
+       {"+ bodies_lagrangian\"", "+ bodies_dissipation\"", "+ bodies_force_b_y\"", "b_y = 0.25"})
     EXPECT_NE(plain.find(part), std::string::npos) << part << " not in\n" << plain;
 }
 
@@ -403,7 +426,7 @@ TEST_F(Bodies, MistakesAreToldWithTheirPlace) {
             {"scene.toml:14:1", "unknown key 'force'"}},
            {"axis = [0, 1, 0]", "axis = [0, 1, 0]\ntorque = \"b\"", {"scene.toml:14:11", "unknown name 'b'"}},
            {"name = \"pin\"", "name = \"bob\"", {"scene.toml:9:8", "used twice"}},
-           {"[[body]]", "[[bodies]]", {"scene.toml:3", "unknown key 'bodies'", "did you mean 'body'"}},
+           {"[[body]]", "[[bodies]]", {"scene.toml:3", "unknown key 'bodies'"}},
            {"[[body]]\n", "[[rolling]]\nbody = \"x\"\n[[body]]\n", {"there is no body 'x'", "known are bob"}},
            {"gravity = 9.81", "hamiltonian = \"1\"", {"no 'hamiltonian'"}}}) {
     std::string text = unchanged;

@@ -43,8 +43,8 @@ TEST(Schema, HasTheKeysOfTheReader) {
         "rows",        "force",       "start",       "span",     "reference",      "invariants",
         "recommended", "inductor",    "capacitor",   "resistor", "source_voltage", "mutual",
         "redundant",   "inputs",      "states",      "outputs",  "events",         "source_current",
-        "diode",       "switch",      "transformer", "gyrator",  "opamp",
-        "field", "gravity",     "body",        "joint",       "wheel",    "rolling",        "spring"})
+        "diode",       "switch",      "transformer", "gyrator",  "opamp",          "field",
+        "gravity",     "body",        "joint",       "wheel",    "rolling",        "spring"})
     EXPECT_TRUE(schema.contains(key)) << key;
   EXPECT_EQ(schema.size(), 42u);
 }
