@@ -349,8 +349,8 @@ TEST(BoundaryValues, PeriodicOrbitsOfALagrangianLinearInTheVelocity) {
     const BoundaryReport report = solved(
         scene, options, periodic(2),
         [&](double t) {
-          return GuessedPoint{guess[static_cast<std::size_t>(std::lround(t / options.step))].q,
-                              Vector::Zero(2)};
+          const Sample& at = guess[static_cast<std::size_t>(std::lround(t / options.step))];
+          return GuessedPoint{at.q, at.v};
         },
         count);
     ASSERT_TRUE(report.converged) << report.ending;

@@ -15,7 +15,7 @@ using namespace testing;
 /// So many first coordinates are states; conditions name coordinates (first) by value (second).
 using Values = std::vector<std::pair<int, double>>;
 
-BoundaryReport controlled(const ScenePointer& scene, const IntegratorOptions& options, long steps,
+BoundaryReport controlled(const ScenePointer& scene, const IntegratorOptions& options, long count,
                           const Values& start, const Values& end, const GuessedMotion& guess) {
   const int n = scene->dimension();
   const auto rows = static_cast<Eigen::Index>(start.size() + end.size());
@@ -30,7 +30,7 @@ BoundaryReport controlled(const ScenePointer& scene, const IntegratorOptions& op
     conditions.value[row++] = value;
   }
   return solve_boundary_values(
-      {scene, Registry::with_built_ins(), kinsol(), options, steps, conditions, guess});
+      {scene, Registry::with_built_ins(), kinsol(), options, count, conditions, guess});
 }
 
 GuessedMotion resting_at(const Vector& q) {

@@ -182,7 +182,7 @@ TEST_F(FitVerb, RefusesDataThatAreNone) {
     EXPECT_EQ(outcome.status, 2) << text;
     EXPECT_NE(outcome.err.find(message), std::string::npos) << outcome.err;
   };
-  refused("t,z\n1,2\n", "no coordinate or velocity");
+  refused("t,z\n1,2\n", "no coordinate, velocity or output");
   refused("x,t\n1,2\n", "expected t");
   refused("t,x\n1,two\n", "not a number");
   refused("t,x\n1\n", "fields");
