@@ -29,6 +29,16 @@ def test_ctrl_c_ends_a_run_and_keeps_what_is_computed(skate):
     assert not skate.run(steps=10, step=0.01).interrupted  # the next one is not affected
 
 
+def test_ctrl_c_ends_a_run_through_events():
+    clock = ds.parse('name = "clock"\nlagrangian = "v_x^2/2"\n[coordinates]\nx = {}\n[start]\nv_x = 1\n[span]\nend = 1\nstep = 0.01\n'
+                     '[[events]]\nname = "turn"\nevery = 1.0\nset = { v_x = "-v_x" }\n')
+    timer = interrupt_soon()
+    with pytest.warns(ds.Interrupted, match="interrupted at t = "):
+        run = clock.run(steps=10**9, every=1000)
+    timer.join()
+    assert run.interrupted and not run.stopped and len(run) >= 2 and run.events and np.abs(run["x"]).max() < 1.001
+
+
 def test_ctrl_c_ends_many_steps_by_hand(skate):
     integrator = skate.integrator(step=0.01)
     timer = interrupt_soon()
