@@ -9,7 +9,7 @@ namespace diracstep {
 namespace {
 
 constexpr std::size_t most_parts_of_a_step = 40;
-constexpr int most_tries = 60, most_halvings = 20, most_returns = 2, most_hidden = 4;
+constexpr int most_tries = 60, most_halvings = 12, most_returns = 2, most_hidden = 4;
 constexpr double finest_part = 1e-14, returned_within = 1e-6;  // of the step
 constexpr double reach_of_estimates = 2.0;                     // in changes within a step
 
@@ -101,19 +101,17 @@ StepSequence::Outcome StepDivision::solve(Interval step, const State& start, Gue
 bool StepDivision::follow(const State& start, Work& work) {
   State from = start;
   const double whole = std::abs(undivided_.back().start + undivided_.back().size - undivided_.front().start);
-  int crossed = -1, returns = 0, hidden = 0;
+  int crossed = -1, returns = 0, hidden = 0, halvings = 0;
   parts_.clear();
   for (const Interval& given : undivided_)
     for (double left = given.size;;) {
       Interval part{given.start + (given.size - left), left};
       if (parts_.size() == most_parts_of_a_step) return give_up(crossed, part.start);
       read(part.start, from, true, before_);
-      bool solved = false;
-      for (int k = 0; k < most_halvings && !solved; ++k) {
-        if (k > 0) part.size *= 0.5;
-        solved = sequence_->solve({&part, 1}, from, Guess::plain, work).ok();
+      while (!sequence_->solve({&part, 1}, from, Guess::plain, work).ok()) {
+        if (++halvings > most_halvings) return crossed >= 0 && give_up(crossed, part.start);
+        part.size *= 0.5;
       }
-      if (!solved) return crossed >= 0 && give_up(crossed, part.start);
       read(part.start + part.size, sequence_->end(), true, after_);
       if (const double place =
               first_change() < 0 && hidden < most_hidden ? hidden_place(part, from, sequence_->end()) : 0.0;
