@@ -49,12 +49,17 @@ double StepDivision::hidden_place(Interval step, const State& start, const State
   for (const double place : {0.5, 0.25, 0.75}) {
     position_ = start.q + place * step.size * velocity_ - 0.5 * place * (1.0 - place) * step.size * speed_up_;
     between_.resize(kinks_->count());
-    kinks_->evaluate(step.start + place * step.size, position_, velocity_ + (place - 0.5) * speed_up_,
-                     between_);
-    for (Eigen::Index k = 0; k < between_.size(); ++k)
-      if (kinks_->kinds()[static_cast<std::size_t>(k)] == Kinks::Kind::kink && before_[k] * after_[k] > 0.0 &&
-          between_[k] * before_[k] < 0.0)
-        return place;
+    speed_ = velocity_ + (place - 0.5) * speed_up_;
+    kinks_->evaluate(step.start + place * step.size, position_, speed_, between_);
+    bool nearer = false;
+    for (Eigen::Index k = 0; k < between_.size(); ++k) {
+      if (kinks_->kinds()[static_cast<std::size_t>(k)] != Kinks::Kind::kink ||
+          !(before_[k] * after_[k] > 0.0))
+        continue;
+      if (between_[k] * before_[k] < 0.0) return place;
+      nearer = nearer || std::abs(between_[k]) < 0.5 * std::min(std::abs(before_[k]), std::abs(after_[k]));
+    }
+    if (!nearer) return 0.0;  // what is no nearer to zero in the middle is taken to have none
   }
   return 0.0;
 }
