@@ -14,20 +14,28 @@ bool is_same_time(double a, double b, double size) {
   return std::abs(a - b) <= std::max(part * std::abs(size), units * std::abs(a));
 }
 
+/// The first of the instants from `next` on that a motion at t has not come to; several may share a time.
+std::size_t next_instant(const std::vector<double>& instants, std::size_t next, double t, double sign,
+                         double size) {
+  while (next < instants.size() &&
+         (sign * (instants[next] - t) <= 0.0 || is_same_time(t, instants[next], size)))
+    ++next;
+  return next;
+}
+
 }  // namespace
 
 void AdaptiveIntegrator::start_local_control() {
   local_->start(main_);
   whole_->reset();
   local_work_ = {};
-  instant_ = 0;
+  instant_ = next_instant(instants_, 0, time(), sign_, local_->first_size());
   next_size_ = up_to_instant(sign_ * local_->first_size());
 }
 
 /// From a point that the motion has jumped to.
 void AdaptiveIntegrator::go_on_local_control() {
-  instant_ = 0;
-  while (instant_ < instants_.size() && sign_ * (instants_[instant_] - time()) <= 0.0) ++instant_;
+  instant_ = next_instant(instants_, 0, time(), sign_, next_size_);
   next_size_ = up_to_instant(sign_ * std::min(std::abs(next_size_), local_->first_size()));
 }
 
@@ -49,10 +57,9 @@ StepReport AdaptiveIntegrator::error_step() {
   local_work_.steps = report.ok() ? steps + 1 : steps;
   if (!report.ok()) return report;
   note(size);
-  if (instant_ < instants_.size() && is_same_time(time(), instants_[instant_], size)) {
-    ++instant_;
-    next_size_ = sign_ * std::min(std::abs(next_size_), local_->first_size());
-  }
+  const std::size_t next = next_instant(instants_, instant_, time(), sign_, size);
+  if (next > instant_) next_size_ = sign_ * std::min(std::abs(next_size_), local_->first_size());
+  instant_ = next;
   next_size_ = up_to_instant(next_size_);
   return report;
 }

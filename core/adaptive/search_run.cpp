@@ -1,5 +1,6 @@
 #include <cmath>
 #include <diracstep/core/adaptive/search_run.hpp>
+#include <diracstep/core/numerics/errors.hpp>
 
 namespace diracstep::detail {
 
@@ -20,13 +21,27 @@ StepReport run_fixed(Integrator& integrator, const ErrorControlReport::Steps& st
       });
 }
 
+constexpr double far_ahead = 1e7;  // steps, which no run is allowed
+constexpr long most_slow_steps = 5000;
+
+StepReport collapsed(double t, double size) {
+  StepReport report;
+  report.solve.status = SolveStatus::no_convergence;
+  report.time = t;
+  report.failure = "steps shrink to " + to_text(std::abs(size)) + " at t = " + to_text(t) +
+                   " and stay so, with which no end is reached";
+  return report;
+}
+
 StepReport run_variable(AdaptiveIntegrator& integrator, double end, const AtNode& at_node) {
   const ReadNode read = [&](Momentum momentum, Sample& sample) {
     return integrator.sample(momentum, sample);
   };
-  for (;;) {
+  for (long slow = 0;;) {
     const double left = end - integrator.time(), size = integrator.next_size();
     if (!at_node(read, false)) return {};
+    slow = std::abs(left) > far_ahead * std::abs(size) ? slow + 1 : 0;
+    if (slow > most_slow_steps) return collapsed(integrator.time(), size);
     if (std::abs(size) >= std::abs(left) * (1.0 - 1e-12)) break;
     StepReport report = integrator.step();
     if (!report.ok()) return report;

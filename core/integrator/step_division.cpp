@@ -9,7 +9,7 @@ namespace diracstep {
 namespace {
 
 constexpr std::size_t most_parts_of_a_step = 40;
-constexpr int most_tries = 60, most_halvings = 20, most_returns = 2, most_hidden = 4;
+constexpr int most_tries = 60, most_halvings = 12, most_returns = 2, most_hidden = 4;
 constexpr double finest_part = 1e-14, returned_within = 1e-6;  // of the step
 constexpr double reach_of_estimates = 2.0;                     // in changes within a step
 
@@ -49,12 +49,17 @@ double StepDivision::hidden_place(Interval step, const State& start, const State
   for (const double place : {0.5, 0.25, 0.75}) {
     position_ = start.q + place * step.size * velocity_ - 0.5 * place * (1.0 - place) * step.size * speed_up_;
     between_.resize(kinks_->count());
-    kinks_->evaluate(step.start + place * step.size, position_, velocity_ + (place - 0.5) * speed_up_,
-                     between_);
-    for (Eigen::Index k = 0; k < between_.size(); ++k)
-      if (kinks_->kinds()[static_cast<std::size_t>(k)] == Kinks::Kind::kink && before_[k] * after_[k] > 0.0 &&
-          between_[k] * before_[k] < 0.0)
-        return place;
+    speed_ = velocity_ + (place - 0.5) * speed_up_;
+    kinks_->evaluate(step.start + place * step.size, position_, speed_, between_);
+    bool nearer = false;
+    for (Eigen::Index k = 0; k < between_.size(); ++k) {
+      if (kinks_->kinds()[static_cast<std::size_t>(k)] != Kinks::Kind::kink ||
+          !(before_[k] * after_[k] > 0.0))
+        continue;
+      if (between_[k] * before_[k] < 0.0) return place;
+      nearer = nearer || std::abs(between_[k]) < 0.5 * std::min(std::abs(before_[k]), std::abs(after_[k]));
+    }
+    if (!nearer) return 0.0;  // what is no nearer to zero in the middle is taken to have none
   }
   return 0.0;
 }
@@ -101,19 +106,17 @@ StepSequence::Outcome StepDivision::solve(Interval step, const State& start, Gue
 bool StepDivision::follow(const State& start, Work& work) {
   State from = start;
   const double whole = std::abs(undivided_.back().start + undivided_.back().size - undivided_.front().start);
-  int crossed = -1, returns = 0, hidden = 0;
+  int crossed = -1, returns = 0, hidden = 0, halvings = 0;
   parts_.clear();
   for (const Interval& given : undivided_)
     for (double left = given.size;;) {
       Interval part{given.start + (given.size - left), left};
       if (parts_.size() == most_parts_of_a_step) return give_up(crossed, part.start);
       read(part.start, from, true, before_);
-      bool solved = false;
-      for (int k = 0; k < most_halvings && !solved; ++k) {
-        if (k > 0) part.size *= 0.5;
-        solved = sequence_->solve({&part, 1}, from, Guess::plain, work).ok();
+      while (!sequence_->solve({&part, 1}, from, Guess::plain, work).ok()) {
+        if (++halvings > most_halvings) return crossed >= 0 && give_up(crossed, part.start);
+        part.size *= 0.5;
       }
-      if (!solved) return crossed >= 0 && give_up(crossed, part.start);
       read(part.start + part.size, sequence_->end(), true, after_);
       if (const double place =
               first_change() < 0 && hidden < most_hidden ? hidden_place(part, from, sequence_->end()) : 0.0;

@@ -58,7 +58,7 @@ class StepDivision {
   std::vector<KinkPassed> passed_;
   std::string stuck_;
   bool divided_ = false;
-  Vector before_, after_, between_, velocity_, speed_up_, position_;
+  Vector before_, after_, between_, velocity_, speed_, speed_up_, position_;
 };
 
 }  // namespace diracstep

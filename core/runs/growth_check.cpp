@@ -14,7 +14,7 @@ constexpr long most_steps_followed = 1000, parts_of_a_long_run = 40, fewest_step
 constexpr int most_followed = 12;  // coordinates and rows
 constexpr long points_of_a_part = 8;
 constexpr double growth_of_no_power = 1e4, too_uncertain = 0.02;
-constexpr double steady_growth = 400.0, least_share = 0.5;  // of the mean of the logarithms
+constexpr double steady_growth = 40.0, least_share = 0.6;  // of the mean of the logarithms
 
 }  // namespace
 

@@ -18,7 +18,7 @@ inline constexpr double distance_beside = 1e-13;
 /// A run of more than 1000 steps, or of more than 12 coordinates and rows together, is followed in two parts
 /// of it, at its start and behind its middle, of 1/40 of it each, where that is less of a quarter of it and
 /// of 1000 steps.  Each part is judged as a run of its own.  Where errors grow steadily in both, by a factor
-/// of 400 or more and in each third of a part by at least the sixth root of its growth, the smaller of the
+/// of 400 or more and in each third of a part by at least the fifth root of its growth, the smaller of the
 /// rates is held to be that of the whole run: G is what it comes to.  So a growth that is slower, or none in
 /// one of the two parts, is not seen.
 class GrowthCheck {

@@ -130,7 +130,7 @@ TEST_F(Believed, ErrorsThatAMotionAmplifiesAreSeen) {
   const Outcome plain = run("run " + file);
   EXPECT_EQ(plain.status, 3) << plain.err;
   EXPECT_TRUE(says(plain, "amplifies errors by a factor of")) << plain.err;
-  for (const char* step : {"0.01", "0.002"}) {  // in parts of a long run
+  for (const char* step : {"0.01", "0.005"}) {  // in parts of a long run
     const Outcome longer = run("run " + file + " --step " + step);
     EXPECT_EQ(longer.status, 3) << step;
     EXPECT_TRUE(says(longer, "amplifies errors by a factor of 10 in each 2.3 of t")) << longer.err;
