@@ -26,10 +26,11 @@ struct DampingSurvey {
   bool strong() const { return failure.empty() && product > strong_from; }
   /// What is fastest dies out within a fixed step, and that is too long for the motion, or so much too long
   /// that the survey ends within it, as where a diode begins to conduct: GL(s) loses Newton's method there.
-  static constexpr double switching_from = 3.0, finer_from = 3.0, far_finer_from = 100.0;
+  static constexpr double switching_from = 3.0, finer_from = 3.0;
+  static constexpr double begins_from = 0.1, far_finer_from = 100.0;
   bool switching() const {
     return failure.empty() && ((product > switching_from && finer > finer_from) ||
-                               (product > 0.0 && finer > far_finer_from && covered < step));
+                               (product > begins_from && finer > far_finer_from && covered < step));
   }
 };
 

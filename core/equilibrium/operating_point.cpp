@@ -135,29 +135,30 @@ class OperatingPointEquations {
     return values;
   }
 
-  /// The equation that is met worst beside its terms; empty where all are met.
+  /// The equations that are met worst beside their terms; empty where all are met.
   std::string contradiction(const Vector& x, const Vector& residual, const Columns& jacobian,
                             const BalancedMatrix& matrix) const {
     constexpr double beside_the_largest = 1e-6;  // round-off of what is zero
     const Vector terms = jacobian.cwiseAbs() * x.cwiseAbs() + residual.cwiseAbs() +
-                         beside_the_largest * matrix.sizes_in_rows(x);
-    Eigen::Index worst = -1;
-    double largest = contradicted_from;
-    for (Eigen::Index i = 0; i < residual.size(); ++i)
-      if (const double part = std::abs(residual[i]) / std::max(terms[i], smallest_scale); part > largest) {
-        largest = part;
-        worst = i;
-      }
-    if (worst < 0) return {};
-    const std::string amount = to_text(residual[worst], 3);
-    if (worst < n_)
-      return amount + " is left along '" + scene_.coordinates[static_cast<std::size_t>(worst)] + "'";
-    if (worst < n_ + m_)
-      return amount + " is left of " + row_label(scene_.constraints, static_cast<int>(worst - n_));
-    return "what stays as it is at the start contradicts the others";
+                         beside_the_largest * matrix.sizes_in_rows(x) +
+                         Vector::Constant(residual.size(), smallest_scale);
+    const Vector parts = residual.cwiseAbs().cwiseQuotient(terms);
+    const double worst = max_norm(parts);
+    if (worst <= contradicted_from) return {};
+    std::string text;
+    for (Eigen::Index i = 0; i < parts.size(); ++i)
+      if (parts[i] >= 0.5 * worst)
+        text += (text.empty() ? "" : ", ") + to_text(residual[i], 3) + " is left " + equation(i);
+    return text;
   }
 
  private:
+  std::string equation(Eigen::Index i) const {
+    if (i < n_) return "along '" + scene_.coordinates[static_cast<std::size_t>(i)] + "'";
+    if (i < n_ + m_) return "of " + row_label(scene_.constraints, static_cast<int>(i - n_));
+    return "of what stays as it is at the start";
+  }
+
   void find_what_stays() {
     const Vector none = Vector::Zero(m_);
     Vector generic = start_.v;

@@ -58,19 +58,27 @@ struct AtTwoPoints {
   Columns mass, by_q, one_forms;
 };
 
-/// Whether the force along the columns of `free` is anything but linear in v, near the start.
+/// Whether the force on coordinates that move along the columns of `free` is anything but linear in v, near
+/// the start: each component in its own units, and to both sides, since a diode blocks on one.
 bool non_linear_in_velocity(const Scene& scene, const Columns& free) {
+  constexpr double linear_to = 1e-9;
   const Start& start = scene.start;
-  Vector v = start.v, once(v.size()), twice = once, none = once;
-  for (Eigen::Index i = 0; i < v.size(); ++i)
-    v[i] += 0.3 * size_or_one(max_norm(start.v)) * std::cos(0.3 + 2.3 * static_cast<double>(i));
-  scene.force->value(start.time, start.q, v, once);
-  scene.force->value(start.time, start.q, 2.0 * v, twice);
-  scene.force->value(start.time, start.q, Vector::Zero(v.size()), none);
-  const Vector off = twice - 2.0 * once + none;
-  const double size = std::max(max_norm(twice), max_norm(none));
-  const double along = max_norm(free.transpose() * off);
-  return !(along <= 1e-12 * size_or_one(size));
+  const Eigen::Index n = start.v.size();
+  Vector once(n), twice(n), none(n);
+  scene.force->value(start.time, start.q, Vector::Zero(n), none);
+  for (const double side : {1.0, -1.0}) {
+    Vector v = start.v;
+    for (Eigen::Index i = 0; i < n; ++i)
+      v[i] += side * size_or_one(max_norm(start.v)) * std::cos(0.3 + 2.3 * static_cast<double>(i));
+    scene.force->value(start.time, start.q, v, once);
+    scene.force->value(start.time, start.q, 2.0 * v, twice);
+    for (Eigen::Index i = 0; i < n; ++i) {
+      const double off = std::abs(twice[i] - 2.0 * once[i] + none[i]);
+      const double terms = std::abs(twice[i]) + 2.0 * std::abs(once[i]) + std::abs(none[i]);
+      if (!(off <= linear_to * terms) && max_norm(free.row(i).transpose()) > 0.0) return true;
+    }
+  }
+  return false;
 }
 
 /// Whether a scene may have motions by_force: the test without matrices that most scenes end with.

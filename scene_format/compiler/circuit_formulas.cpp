@@ -14,6 +14,7 @@ namespace diracstep::scene_compiler {
 namespace {
 
 constexpr double usual_capacitance = 1e-12;        // F, of a diode
+constexpr double least_conductance = 1e-12;        // A/V, of a diode without capacitance; SPICE's GMIN
 constexpr double usual_thermal_voltage = 0.02585;  // V, kT/e at 300 K
 constexpr std::size_t most_nodes_on_paths = 300;
 
@@ -137,8 +138,10 @@ Node CircuitFormulas::conducted(const Branch& branch, Node index) {
   }
   if (branch.has("saturation")) {  // I_s (exp(u/u_T) − 1)
     const Node x = graph_.divide(u, value_or(branch, index, "thermal_voltage", usual_thermal_voltage));
-    return graph_.multiply(value(branch, index, "saturation"),
-                           graph_.subtract(graph_.apply(Op::exp, x), graph_.number(1.0)));
+    const Node own = graph_.multiply(value(branch, index, "saturation"),
+                                     graph_.subtract(graph_.apply(Op::exp, x), graph_.number(1.0)));
+    if (!has_flux(branch)) return own;
+    return graph_.add(own, graph_.multiply(graph_.number(least_conductance), u));
   }
   // u/off below the threshold, and with the slope 1/on above it
   const Node threshold = value_or(branch, index, "threshold", 0.0), off = value(branch, index, "off");

@@ -315,12 +315,14 @@ TEST_F(Circuits, ANetlistStartsAtItsOperatingPoint) {
       "D1 e 0 DX\n"
       "I1 0 g 2m\n"
       "R5 g 0 1k\n"
-      "E1 h 0 g 0 3\n"
+      "E1 x 0 g 0 3\n"
+      "RX x 0 1k\n"
+      "V2 h 0 6\n"
       "C2 h k 1u\n"
       "C3 k 0 3u\n"
       ".model DX D(IS=1e-14)\n"
       ".tran 10u 100u\n"
-      ".print V(b) I(L1) V(e) I(D1) V(g) V(h) V(k)\n");
+      ".print V(b) I(L1) V(e) I(D1) V(g) V(x) V(k)\n");
   for (const double v : {5.0, 10.0}) {
     const Json out = json(file, "--set v=" + std::to_string(v))["outputs"];
     EXPECT_NEAR(value(out, "V(b)"), 0.8 * v, 1e-9 * v) << v;
@@ -330,7 +332,7 @@ TEST_F(Circuits, ANetlistStartsAtItsOperatingPoint) {
     EXPECT_NEAR(value(out, "V(e)"), u, 1e-9) << v;
     EXPECT_NEAR(value(out, "I(D1)"), (v - u) / 1000.0, 1e-10) << v;
     EXPECT_NEAR(value(out, "V(g)"), 2.0, 1e-9) << v;
-    EXPECT_NEAR(value(out, "V(h)"), 6.0, 1e-9) << v;
+    EXPECT_NEAR(value(out, "V(x)"), 6.0, 1e-9) << v;
     EXPECT_NEAR(value(out, "V(k)"), 1.5, 1e-9) << v << ": the charge between the capacitors stays 0";
   }
 }
@@ -374,7 +376,7 @@ TEST_F(Circuits, ACircuitWithoutAnOperatingPointSaysWhy) {
   expect_misuse("run " + netlist("shorted\nV1 a 0 5\nL1 a 0 1m\n.tran 1u 1m\n"),
                 {"no operating point", "'qL1'", "uic"});
   expect_misuse("run " + netlist("pumped\nI1 0 a 1m\nC1 a 0 1u\n.tran 1u 1m\n"),
-                {"no operating point", "node_a"});
+                {"no operating point", "'node_a'", "'current_I1'"});
 }
 
 /// The same from a scene file, whose start says where to look: 1, 2 and 3 V are operating points, since the

@@ -2,6 +2,7 @@
 
 #include <diracstep/constraints/discrete.hpp>
 #include <diracstep/constraints/pfaffian.hpp>
+#include <diracstep/core/numerics/scales.hpp>
 
 #include "misuse.hpp"
 #include "scenes.hpp"
@@ -199,7 +200,7 @@ struct FiniteDifferenceMaps {
         200);
     for (std::size_t k = 0; k + 2 < samples.size(); ++k) {
       const Vector q2 = next(plus, h, samples[k].q, samples[k + 1].q);
-      ASSERT_LT((samples[k + 2].q - q2).lpNorm<Eigen::Infinity>(), 1e-13) << (plus ? "+ " : "- ") << k;
+      ASSERT_LT(max_norm(samples[k + 2].q - q2), 1e-13) << (plus ? "+ " : "- ") << k;
     }
   }
 };
