@@ -19,6 +19,19 @@ bool started_by_mpirun() {
   return false;
 }
 
+/// All messages at once: no order of them can block.
+void exchange_by_mpi(std::span<const Exchanged> messages) {
+  std::vector<MPI_Request> requests(2 * messages.size());
+  auto* request = requests.data();
+  for (const Exchanged& message : messages) {
+    MPI_Irecv(message.in.data(), static_cast<int>(message.in.size()), MPI_DOUBLE, message.with, 0,
+              MPI_COMM_WORLD, request++);
+    MPI_Isend(message.out.data(), static_cast<int>(message.out.size()), MPI_DOUBLE, message.with, 0,
+              MPI_COMM_WORLD, request++);
+  }
+  MPI_Waitall(static_cast<int>(requests.size()), requests.data(), MPI_STATUSES_IGNORE);
+}
+
 }  // namespace
 
 MpiProcesses::MpiProcesses(int& count, char**& arguments) {
@@ -47,6 +60,12 @@ Processes MpiProcesses::processes() {
     return drawn;
   };
   all.meet = [] { MPI_Barrier(MPI_COMM_WORLD); };
+  all.exchange = exchange_by_mpi;
+  all.gather = [count = all.count](double number) {
+    std::vector<double> numbers(static_cast<std::size_t>(count));
+    MPI_Allgather(&number, 1, MPI_DOUBLE, numbers.data(), 1, MPI_DOUBLE, MPI_COMM_WORLD);
+    return numbers;
+  };
   return all;
 }
 
