@@ -2,6 +2,7 @@
 
 #include <cstdlib>
 #include <diracstep/command/mpi_processes.hpp>
+#include <diracstep/command/session.hpp>
 
 namespace diracstep::command {
 
@@ -71,7 +72,7 @@ Processes MpiProcesses::processes() {
 
 void MpiProcesses::end(int status) {
   if (memory_ == nullptr) return;
-  if (status != 0) MPI_Abort(MPI_COMM_WORLD, status);
+  if (status == failed || status == misused) MPI_Abort(MPI_COMM_WORLD, status);
   MPI_Win_free(&memory_->window);
   MPI_Finalize();
 }

@@ -28,6 +28,7 @@ class PartMotion {
   double time() const { return time_; }
   auto q() const { return q_.head(part_->own()); }
   Vector v() const;
+  double kinetic_energy() const { return 0.5 * (part_->mass().array() * v().array().square()).sum(); }
   double energy() const { return part_->energy(time_, q_, v()); }
   const PartTraffic& traffic() const { return traffic_; }
 

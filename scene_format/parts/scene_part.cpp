@@ -84,6 +84,7 @@ ScenePart::ScenePart(const std::string& file, const std::string& text,
 
 const std::string& ScenePart::name() const { return scene_->program->document.name; }
 double ScenePart::natural_step() const { return scene_->program->document.step; }
+bool ScenePart::keeps_energy() const { return scene_->program->lagrangian->autonomous; }
 double ScenePart::natural_end() const { return scene_->program->document.t_end; }
 
 /// Whether a term has an own coordinate; its coordinates get their places here.

@@ -56,6 +56,7 @@ class ScenePart {
   void force(double t, const Vector& q, Vector& lq);
   /// Σ m v²/2 + V over terms whose first coordinate is an own one: the sum over all parts is the energy.
   double energy(double t, const Vector& q, const Vector& v) const;
+  bool keeps_energy() const;  ///< L does not depend on t
 
  private:
   /// `as_written`: see FormulaGraph.

@@ -34,5 +34,12 @@ for ranks in 2 4; do
   messages=$(sed -n '/"messages"/,/]/p' ranks.json | grep -c "$(( (ranks == 2 ? 1 : 2) * (2 + 40 * 5) ))")
   [ "$messages" = "$ranks" ]
 done
+# Steps that are too large end with what is doubted, in one process and in two.
+for run in "$command" "$mpirun -n 2 $with_mpi"; do
+  status=0
+  $run parts toda_200 --step 4 --end 400 2>messages >/dev/null || status=$?
+  [ "$status" = 3 ]
+  grep -q "take smaller steps\|too large" messages
+done
 if "$mpirun" -n 2 "$with_mpi" parts toda_200 --out no/such/folder/end.npy 2>messages; then exit 1; fi
 grep -q "no/such/folder" messages

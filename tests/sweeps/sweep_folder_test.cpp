@@ -356,10 +356,16 @@ step = 0.01
 
 /// Steps that are far too large: doubted, unless the checks are left out; the numbers are the same.
 TEST_F(SweepFolder, ChecksMayBeLeftOut) {
-  const std::string text =
-      "scene = \"kepler_e06\"\nmethod = \"type1/midpoint\"\nstep = 0.2\nend = 12\n[grid]\ne = "
-      "[0.6]\n[record]\n"
-      "values = [\"x\"]\n";
+  const std::string text = R"(scene = "kepler_e06"
+method = "type1/midpoint"
+step = 0.2
+end = 12
+[grid]
+e = [0.6]
+[record]
+values = ["x"]
+extrema = ["energy"]
+)";
   const SweepReport with = run(read_sweep(write("with.toml", text)), {.folder = path("with")});
   const SweepReport without =
       run(read_sweep(write("without.toml", "checks = false\n" + text)), {.folder = path("without")});
