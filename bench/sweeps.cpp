@@ -54,12 +54,13 @@ int main(int count, char** arguments) {
   const SceneFile file = scene_source("kepler_e06");
   const auto folder = std::filesystem::temp_directory_path() / "diracstep_bench_sweeps";
   std::printf("kepler_e06, type1/gl:3, e varied, %ld steps a member\n", steps);
-  std::printf("%10s%10s%12s%12s%12s%12s%12s\n", "members", "threads", "seconds", "processor", "in steps",
-              "processors", "memory");
-  for (const long size : {members / 10, members})
+  std::printf("%10s%10s%10s%12s%12s%12s%12s%12s\n", "members", "checks", "threads", "seconds", "processor",
+              "in steps", "processors", "memory");
+  for (const auto& [size, checks] : {std::pair{members / 10, true}, {members / 10, false}, {members, false}})
     for (const int threads : {1, 2}) {
       std::filesystem::remove_all(folder);
-      const Sweep sweep = orbits(size);
+      Sweep sweep = orbits(size);
+      sweep.checks = checks;
       const auto begin = std::chrono::steady_clock::now();
       const double before = processor_seconds();
       const SweepReport report =
@@ -70,9 +71,9 @@ int main(int count, char** arguments) {
       rusage usage{};
       getrusage(RUSAGE_SELF, &usage);
       if (report.ok != size) std::printf("%ld members are not ok\n", size - report.ok);
-      std::printf("%10ld%10d%12.2f%12.2f%11.0f%%%12.2f%9ld MB\n", size, threads, seconds, processor,
-                  100.0 * seconds_of_steps(sweep, file, registry) / processor, processor / seconds,
-                  usage.ru_maxrss / 1024);
+      std::printf("%10ld%10s%10d%12.2f%12.2f%11.0f%%%12.2f%9ld MB\n", size, checks ? "yes" : "no", threads,
+                  seconds, processor, 100.0 * seconds_of_steps(sweep, file, registry) / processor,
+                  processor / seconds, usage.ru_maxrss / 1024);
     }
   std::filesystem::remove_all(folder);
 }

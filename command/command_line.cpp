@@ -166,6 +166,7 @@ int with_all_verbs(int count, char** arguments, bool run_verbs, const Processes&
   add_list(app, session);
   add_new(app, session);
   add_orders(app, session);
+  add_parts(app, session);
   add_plan(app, session);
   add_run(app, session);
   add_stability(app, session);

@@ -2,6 +2,7 @@
 
 #include <cstdlib>
 #include <diracstep/command/mpi_processes.hpp>
+#include <diracstep/command/session.hpp>
 
 namespace diracstep::command {
 
@@ -17,6 +18,19 @@ bool started_by_mpirun() {
   for (const char* name : {"OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "PMIX_RANK"})
     if (std::getenv(name) != nullptr) return true;
   return false;
+}
+
+/// All messages at once: no order of them can block.
+void exchange_by_mpi(std::span<const Exchanged> messages) {
+  std::vector<MPI_Request> requests(2 * messages.size());
+  auto* request = requests.data();
+  for (const Exchanged& message : messages) {
+    MPI_Irecv(message.in.data(), static_cast<int>(message.in.size()), MPI_DOUBLE, message.with, 0,
+              MPI_COMM_WORLD, request++);
+    MPI_Isend(message.out.data(), static_cast<int>(message.out.size()), MPI_DOUBLE, message.with, 0,
+              MPI_COMM_WORLD, request++);
+  }
+  MPI_Waitall(static_cast<int>(requests.size()), requests.data(), MPI_STATUSES_IGNORE);
 }
 
 }  // namespace
@@ -47,12 +61,18 @@ Processes MpiProcesses::processes() {
     return drawn;
   };
   all.meet = [] { MPI_Barrier(MPI_COMM_WORLD); };
+  all.exchange = exchange_by_mpi;
+  all.gather = [count = all.count](double number) {
+    std::vector<double> numbers(static_cast<std::size_t>(count));
+    MPI_Allgather(&number, 1, MPI_DOUBLE, numbers.data(), 1, MPI_DOUBLE, MPI_COMM_WORLD);
+    return numbers;
+  };
   return all;
 }
 
 void MpiProcesses::end(int status) {
   if (memory_ == nullptr) return;
-  if (status != 0) MPI_Abort(MPI_COMM_WORLD, status);
+  if (status == failed || status == misused) MPI_Abort(MPI_COMM_WORLD, status);
   MPI_Win_free(&memory_->window);
   MPI_Finalize();
 }

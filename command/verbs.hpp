@@ -15,6 +15,7 @@ void add_fit(CLI::App& app, Session& session);
 void add_list(CLI::App& app, Session& session);
 void add_new(CLI::App& app, Session& session);
 void add_orders(CLI::App& app, Session& session);
+void add_parts(CLI::App& app, Session& session);
 void add_plan(CLI::App& app, Session& session);
 void add_run(CLI::App& app, Session& session);
 void add_stability(CLI::App& app, Session& session);

@@ -11,6 +11,7 @@
 #include <diracstep/scene_format/parametric_scene_file.hpp>
 #include <diracstep/scene_format/scene_catalogue.hpp>
 #include <diracstep/scene_format/scene_file.hpp>
+#include <diracstep/scene_format/scene_text.hpp>
 
 namespace diracstep {
 
@@ -56,10 +57,7 @@ void set_tolerances(CatalogueScene& entry, const Parameters& tolerances) {
   entry.scene = std::move(scene);
 }
 
-namespace {
-
-/// The text of a scene by its name or the path of its file.
-std::string text_of_scene(const std::string& name) {
+std::string scene_text(const std::string& name) {
   if (is_scene_file(name)) return read_file(name, "the scene file", scene_compiler::size_limits().file_bytes);
   std::string known;
   for (const ShippedScene& scene : shipped_scenes()) {
@@ -70,24 +68,22 @@ std::string text_of_scene(const std::string& name) {
                known + "; or give the path of a file NAME.toml or NAME.cir");
 }
 
-}  // namespace
-
 CatalogueScene make_scene(const std::string& name, const Parameters& changes) {
   return scene_source(name).load(changes);
 }
 
 std::string expanded_scene(const std::string& name) {
-  return scene_compiler::plain_scene(name, text_of_scene(name));
+  return scene_compiler::plain_scene(name, scene_text(name));
 }
 
-SceneFile scene_source(const std::string& name) { return {name, text_of_scene(name)}; }
+SceneFile scene_source(const std::string& name) { return {name, scene_text(name)}; }
 
 ParametricScene parametric_scene(const std::string& name, const CatalogueScene& entry,
                                  const std::vector<std::string>& parameters, const Parameters& changes) {
   if (parameters.empty()) return {entry.scene, nullptr};
   if (!entry.stated_start)
     throw Misuse("scene '" + name + "' is not from a file: it has no parameters to be differentiated by");
-  return parametric_scene_from_text(name, text_of_scene(name), entry, parameters, changes);
+  return parametric_scene_from_text(name, scene_text(name), entry, parameters, changes);
 }
 
 }  // namespace diracstep

@@ -11,6 +11,8 @@
 #include <diracstep/scene_format/compiler/size_limits.hpp>
 #include <diracstep/scene_format/drawn_bodies.hpp>
 #include <diracstep/scene_format/loader/defined_start.hpp>
+#include <diracstep/scene_format/loader/named_values.hpp>
+#include <diracstep/scene_format/loader/parameter_values.hpp>
 #include <diracstep/scene_format/loader/scene_definition.hpp>
 #include <diracstep/scene_format/loader/scene_functions.hpp>
 #include <diracstep/scene_format/loader/scene_kinks.hpp>
@@ -29,77 +31,6 @@ namespace {
 
 constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
 constexpr double same_time = 1e-12;  // relative difference of times that are the same
-
-const SceneDocument::Parameter* find_parameter(const SceneDocument& document, const std::string& name) {
-  const auto found = std::ranges::find(document.parameters, name, &SceneDocument::Parameter::name);
-  return found == document.parameters.end() || found->array ? nullptr : &*found;
-}
-
-void require_parameter(const SceneDocument& document, const std::string& name, double value) {
-  const SceneDocument::Parameter* parameter = find_parameter(document, name);
-  if (parameter == nullptr) {
-    std::string known;
-    for (const auto& other : document.parameters)
-      if (!other.array) known += ' ' + other.name;
-    throw Misuse(fmt::format("scene '{}' has no parameter '{}'; its parameters are{}", document.name, name,
-                             known.empty() ? " none" : known));
-  }
-  if (!std::isfinite(value))
-    throw Misuse(
-        fmt::format("scene '{}': parameter {} = {}; a finite number is needed", document.name, name, value));
-  if (!parameter->limits.allow(value))
-    throw Misuse(fmt::format("scene '{}': {} {} = {:g}; it must be {}", document.name,
-                             parameter->size ? "size" : "parameter", name, value, parameter->limits.text()));
-  if (parameter->size && value != std::floor(value))
-    throw Misuse(
-        fmt::format("scene '{}': size {} = {:g}; a whole number is needed", document.name, name, value));
-}
-
-ParameterValues parameter_values(const SceneDocument& document, const Parameters& changes) {
-  for (const auto& [name, value] : changes) require_parameter(document, name, value);
-  ParameterValues values;
-  for (const auto& parameter : document.parameters) {
-    values.push_back(parameter.values);
-    const auto change = changes.find(parameter.name);
-    if (change != changes.end()) values.back() = {change->second};
-  }
-  return values;
-}
-
-/// Calls set(index, value) for each element that `named` gives a value to.
-template <class Set>
-void for_each_value(const LoadedScene& loaded, const NamedValue& named, double t, const Set& set) {
-  const SceneProgram& program = *loaded.program;
-  std::vector<Node> roots = named.values;
-  const bool two = named.index != none && program.graph[named.index].op == Op::list;
-  if (two)
-    roots.insert(roots.end(), {program.graph[named.index].a, program.graph[named.index].b});
-  else if (named.index != none)
-    roots.push_back(named.index);
-  Evaluator evaluator(program, loaded.parameters, roots);
-  evaluator.set_time(t);
-  if (named.index != none) {
-    evaluator.evaluate();
-    const std::array<long, 2> index{evaluator.whole(1), two ? evaluator.whole(2) : 0};
-    const int position = loaded.layout.position(named.family, index);
-    if (position < 0)
-      throw SceneError(program.document.file, named.place,
-                       "there is no " + loaded.layout.name(named.family, index));
-    return set(position, static_cast<double>(evaluator.value(0)));
-  }
-  const long count = loaded.layout.count(named.family);
-  if (named.values.size() > 1 && static_cast<long>(named.values.size()) != count)
-    throw SceneError(program.document.file, named.place,
-                     fmt::format("{} values; expected {}", named.values.size(), count));
-  const auto& loops = program.symbols.families[static_cast<std::size_t>(named.family)].loops;
-  for (long i = 0; i < count; ++i) {
-    const auto index = loaded.layout.element(named.family, i);
-    for (std::size_t k = 0; k < loops.size(); ++k) evaluator.set_loop(loops[k], index[k]);
-    evaluator.evaluate();
-    const std::size_t which = named.values.size() > 1 ? static_cast<std::size_t>(i) : 0;
-    set(loaded.layout.position(named.family, index), static_cast<double>(evaluator.value(which)));
-  }
-}
 
 StatedStart start_of(const LoadedScene& loaded) {
   const SceneProgram& program = *loaded.program;

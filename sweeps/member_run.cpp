@@ -10,6 +10,7 @@
 #include <diracstep/core/runs/event_steps.hpp>
 #include <diracstep/core/runs/run.hpp>
 #include <diracstep/core/system/consistent_start.hpp>
+#include <diracstep/sweeps/member_derivatives.hpp>
 #include <diracstep/sweeps/member_run.hpp>
 #include <limits>
 
@@ -98,6 +99,7 @@ MemberRuns::MemberRuns(const Sweep& sweep, SceneMaker make_scene, const Registry
   if (sweep_.step == 0.0 && !sweep_.error) sweep_.step = example_.natural_step;
   sweep_.values = recorded_values(sweep, example_);
   const Recorded checked(sweep_, example_);
+  const DerivativeNames checked_too(sweep_, example_);
   choose_method();
 }
 
@@ -124,16 +126,23 @@ void MemberRuns::choose_method() {
       {options_.order, 0.0, options_.constraint_rule, large_from(options_.dense_limit)});
   options_.method = sweep_.method = chosen.method;
   options_.order = sweep_.order = chosen.order;
-  if (step_is_open && example_.events.empty()) local_error_ = chosen.local_error;
+  if (step_is_open && example_.events.empty() && sweep_.derivatives.empty())
+    local_error_ = chosen.local_error;
 }
 
-CatalogueScene MemberRuns::scene_of(long number) const {
+Parameters MemberRuns::parameters_of(long number) const {
   const std::vector<std::string> names = sweep_.names();
   const std::vector<double> values = sweep_.member(number);
   Parameters changes = sweep_.set;
   for (std::size_t k = 0; k < names.size(); ++k)
     if (!names[k].starts_with(start_prefix)) changes[names[k]] = values[k];
-  CatalogueScene entry = make_scene_(changes);
+  return changes;
+}
+
+CatalogueScene MemberRuns::scene_of(long number) const {
+  const std::vector<std::string> names = sweep_.names();
+  const std::vector<double> values = sweep_.member(number);
+  CatalogueScene entry = make_scene_(parameters_of(number));
   Start start = entry.scene->start;
   std::vector<std::string> given;
   for (std::size_t k = 0; k < names.size(); ++k) {
@@ -169,16 +178,17 @@ MemberResult MemberRuns::run(long number) const {
 MemberResult MemberRuns::take(long number) const {
   const CatalogueScene entry = scene_of(number);
   require_inputs_until(entry, *sweep_.end, "end");
-  return sweep_.error ? search(entry) : take_steps(entry);
+  return sweep_.error ? search(entry) : take_steps(number, entry);
 }
 
-MemberResult MemberRuns::take_steps(const CatalogueScene& entry) const {
+MemberResult MemberRuns::take_steps(long number, const CatalogueScene& entry) const {
   const double start = entry.scene->start.time;
   const StepGrid grid = fit_steps(start, *sweep_.end, std::copysign(sweep_.step, *sweep_.end - start));
   IntegratorOptions options = options_;
   options.step = grid.step;
   Recorded recorded(sweep_, entry);
   if (local_error_ > 0.0) return run_by_local_error(entry, options, recorded);
+  if (!sweep_.derivatives.empty()) return run_with_derivatives(number, entry, options, grid.steps, recorded);
   return entry.events.empty() ? run_without_events(entry, options, grid.steps, recorded)
                               : run_through_events(entry, options, grid.steps, recorded);
 }
@@ -186,31 +196,63 @@ MemberResult MemberRuns::take_steps(const CatalogueScene& entry) const {
 MemberResult MemberRuns::run_without_events(const CatalogueScene& entry, const IntegratorOptions& options,
                                             long steps, Recorded& recorded) const {
   Integrator integrator(entry.scene, registry_, solvers_, options);
-  RunChecks checks(integrator, steps);
+  std::optional<RunChecks> checks;
+  if (sweep_.checks) checks.emplace(integrator, steps);
   Sample end;
   const auto see = [&](const Sample& node) {
     recorded.see(entry, node);
     end = node;
     return true;
   };
-  const RunReport report = run_steps(integrator, steps, Momentum::projected,
-                                     recorded.needs_every_point() ? 1 : steps, see, &checks);
-  return result_of(report.last.failure, checks.text(), entry, end, recorded);
+  const RunReport report =
+      run_steps(integrator, steps, Momentum::projected, recorded.needs_every_point() ? 1 : steps, see,
+                checks ? &*checks : nullptr);
+  return result_of(report.last.failure, checks ? checks->text() : "", entry, end, recorded);
+}
+
+MemberResult MemberRuns::run_with_derivatives(long number, const CatalogueScene& entry,
+                                              const IntegratorOptions& options, long steps,
+                                              Recorded& recorded) const {
+  Integrator integrator(entry.scene, registry_, solvers_, options);
+  MemberDerivatives derivatives(sweep_, entry, parameters_of(number), registry_, integrator);
+  std::optional<RunChecks> checks;
+  if (sweep_.checks) checks.emplace(integrator, steps);
+  Sample end;
+  std::vector<double> numbers;
+  long seen = 0;  // the start is seen first
+  const RunReport report = run_steps(
+      integrator, steps, Momentum::projected, 1,
+      [&](const Sample& node) {
+        if (seen > 0) derivatives.follow_step();
+        recorded.see(entry, node);
+        end = node;
+        if (seen++ == steps) numbers = derivatives.numbers();  // before the checks take further steps
+        return true;
+      },
+      checks ? &*checks : nullptr);
+  const std::string doubt = joined_doubts({checks ? checks->text() : "", derivatives.doubt()});
+  MemberResult result = result_of(report.last.failure, doubt, entry, end, recorded);
+  if (result.status != MemberResult::Status::failed)
+    result.numbers.insert(result.numbers.end(), numbers.begin(), numbers.end());
+  return result;
 }
 
 MemberResult MemberRuns::run_by_local_error(const CatalogueScene& entry, const IntegratorOptions& options,
                                             Recorded& recorded) const {
   AdaptiveIntegrator integrator(entry.scene, registry_, solvers_, options,
                                 {.eps = local_error_, .end = *sweep_.end});
-  VariableRunChecks checks(integrator, {entry.scene, registry_, solvers_, integrator.options()});
+  std::optional<VariableRunChecks> checks;
+  if (sweep_.checks)
+    checks.emplace(integrator, Integrator(entry.scene, registry_, solvers_, integrator.options()));
   Sample end;
   const auto see = [&](const Sample& node) {
     recorded.see(entry, node);
     end = node;
     return true;
   };
-  const RunReport report = run_until(integrator, *sweep_.end, Momentum::projected, 1, see, &checks);
-  return result_of(report.last.failure, checks.text(), entry, end, recorded);
+  const RunReport report =
+      run_until(integrator, *sweep_.end, Momentum::projected, 1, see, checks ? &*checks : nullptr);
+  return result_of(report.last.failure, checks ? checks->text() : "", entry, end, recorded);
 }
 
 /// Without the checks of a run: those of steps between events say little of the whole.

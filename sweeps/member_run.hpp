@@ -36,9 +36,12 @@ class MemberRuns {
   MemberResult run(long number) const;
 
  private:
+  Parameters parameters_of(long number) const;
   CatalogueScene scene_of(long number) const;
   MemberResult take(long number) const;
-  MemberResult take_steps(const CatalogueScene& entry) const;
+  MemberResult take_steps(long number, const CatalogueScene& entry) const;
+  MemberResult run_with_derivatives(long number, const CatalogueScene& entry,
+                                    const IntegratorOptions& options, long steps, Recorded& recorded) const;
   MemberResult run_without_events(const CatalogueScene& entry, const IntegratorOptions& options, long steps,
                                   Recorded& recorded) const;
   MemberResult run_by_local_error(const CatalogueScene& entry, const IntegratorOptions& options,

@@ -34,10 +34,10 @@ constexpr std::array<Polynomial, sobol_dimensions - 1> polynomials{{{1, 0, {1}},
                                                                     {5, 4, {1, 1, 5, 5, 5}},
                                                                     {5, 7, {1, 1, 7, 11, 19}}}};
 
-using Directions = std::array<std::uint32_t, 32>;
+using SobolDirections = std::array<std::uint32_t, 32>;
 
-Directions directions(int dimension) {
-  Directions v{};
+SobolDirections directions(int dimension) {
+  SobolDirections v{};
   if (dimension == 0) {
     for (unsigned k = 0; k < 32; ++k) v[k] = 1u << (31 - k);
     return v;
@@ -55,9 +55,9 @@ Directions directions(int dimension) {
   return v;
 }
 
-const std::array<Directions, sobol_dimensions>& all_directions() {
+const std::array<SobolDirections, sobol_dimensions>& all_directions() {
   static const auto all = [] {
-    std::array<Directions, sobol_dimensions> made{};
+    std::array<SobolDirections, sobol_dimensions> made{};
     for (int d = 0; d < sobol_dimensions; ++d) made[static_cast<std::size_t>(d)] = directions(d);
     return made;
   }();
@@ -71,7 +71,7 @@ double uniform_number(std::uint64_t seed, std::uint64_t member, std::uint64_t va
 }
 
 std::uint32_t sobol_bits(std::uint64_t index, int dimension) {
-  const Directions& v = all_directions()[static_cast<std::size_t>(dimension)];
+  const SobolDirections& v = all_directions()[static_cast<std::size_t>(dimension)];
   std::uint64_t gray = index ^ (index >> 1);
   std::uint32_t bits = 0;
   for (std::size_t k = 0; gray != 0 && k < v.size(); ++k, gray >>= 1)

@@ -114,7 +114,8 @@ std::vector<double> Recorded::numbers(const CatalogueScene& entry, const Sample&
 }
 
 std::vector<std::string> recorded_values(const Sweep& sweep, const CatalogueScene& entry) {
-  if (!sweep.values.empty() || !sweep.extrema.empty() || !sweep.events.empty()) return sweep.values;
+  if (!sweep.values.empty() || !sweep.extrema.empty() || !sweep.events.empty() || !sweep.derivatives.empty())
+    return sweep.values;
   std::vector<std::string> names = entry.scene->coordinates;
   for (const std::string& name : entry.scene->coordinates) names.push_back("v_" + name);
   return names;
@@ -124,6 +125,7 @@ std::vector<std::string> recorded_names(const Sweep& sweep) {
   std::vector<std::string> names = sweep.values;
   for (const std::string& name : sweep.extrema) names.insert(names.end(), {"min_" + name, "max_" + name});
   for (const std::string& name : sweep.events) names.insert(names.end(), {name + "_time", name + "_count"});
+  names.insert(names.end(), sweep.derivatives.begin(), sweep.derivatives.end());
   return names;
 }
 

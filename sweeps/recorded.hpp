@@ -29,7 +29,7 @@ class Recorded {
   /// A node of the run.
   void see(const CatalogueScene& entry, const Sample& node);
   void see_event(const std::string& name, double time);
-  /// All numbers, in the order of recorded_names().
+  /// All numbers but derivatives, in the order of recorded_names().
   std::vector<double> numbers(const CatalogueScene& entry, const Sample& end) const;
 
  private:
@@ -50,7 +50,7 @@ class Recorded {
 /// Sweep::values, or what stands for them where there are none.
 std::vector<std::string> recorded_values(const Sweep& sweep, const CatalogueScene& entry);
 
-/// "x", …; "min_x", "max_x", …; "EVENT_time", "EVENT_count", ….
+/// "x", …; "min_x", "max_x", …; "EVENT_time", "EVENT_count", …; "d(x)/d(m)", ….
 std::vector<std::string> recorded_names(const Sweep& sweep);
 
 }  // namespace diracstep

@@ -36,7 +36,7 @@ struct Sweep {
   std::optional<double> end;
   std::optional<double> error;  ///< solve_to_error() for each member, in place of steps
   bool project = false;         ///< starts are moved onto the constraints, but for what the sweep gives
-                                ///<
+  bool checks = true;           ///< members are held to the checks of a run (core/runs/run_checks.hpp)
   long block = 0;               ///< members of a block; 0: as many as take about ten seconds
 
   struct Axis {
@@ -56,6 +56,8 @@ struct Sweep {
   std::vector<std::string> values;
   std::vector<std::string> extrema;  ///< their smallest and largest values over the nodes of the run
   std::vector<std::string> events;   ///< of the scene: the time of the first, and how many there were
+
+  std::vector<std::string> derivatives;  ///< at the end, of the discrete motion: "d(x)/d(m)", "d(v_x)/d(m)"
 
   long members() const;
   std::vector<std::string> names() const;  ///< of all that varies: axes, table, draws

@@ -30,8 +30,8 @@ class SweepReader : TableReader {
 
   Sweep read(const toml::table& root) {
     check_keys(root, "the sweep",
-               {"scene", "method", "order", "rule", "step", "end", "error", "project", "block", "set", "grid",
-                "table", "random", "sobol", "record"});
+               {"scene", "method", "order", "rule", "step", "end", "error", "project", "checks", "block",
+                "set", "grid", "table", "random", "sobol", "record"});
     read_run(root);
     for (const Item& item : items(root, "set")) {
       if (item.key.starts_with("start."))
@@ -80,6 +80,7 @@ class SweepReader : TableReader {
     sweep_.end = number(root, "end");
     sweep_.error = positive(root, "error");
     sweep_.project = flag(root, "project");
+    sweep_.checks = !root.contains("checks") || flag(root, "checks");
     sweep_.block = whole(root, "block", 1, 1e9);
     if (sweep_.error && sweep_.step > 0.0)
       fail(place_of(root.get("step")->source()), "'error' finds the step itself; leave out one of the two");
@@ -201,10 +202,11 @@ class SweepReader : TableReader {
     if (node == nullptr) return;
     if (!node->is_table()) fail(place_of(node->source()), "expected a table [record]");
     const toml::table& record = *node->as_table();
-    check_keys(record, "[record]", {"values", "extrema", "events"});
+    check_keys(record, "[record]", {"values", "extrema", "events", "derivatives"});
     sweep_.values = texts(record, "values");
     sweep_.extrema = texts(record, "extrema");
     sweep_.events = texts(record, "events");
+    sweep_.derivatives = texts(record, "derivatives");
     if (sweep_.error && (!sweep_.extrema.empty() || !sweep_.events.empty()))
       fail(place_of(node->source()),
            "extrema and events are taken from runs of fixed steps: leave out 'error'");

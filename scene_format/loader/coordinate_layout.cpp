@@ -10,7 +10,7 @@ using scene_compiler::Node;
 using scene_compiler::SceneError;
 
 CoordinateLayout::CoordinateLayout(const scene_compiler::SceneProgram& program,
-                                   const scene_compiler::ParameterValues& parameters) {
+                                   const scene_compiler::ParameterValues& parameters, bool named) {
   const long max_coordinates = static_cast<long>(scene_compiler::size_limits().coordinates);
   long total = 0;
   for (std::size_t f = 0; f < program.symbols.families.size(); ++f) {
@@ -35,7 +35,7 @@ CoordinateLayout::CoordinateLayout(const scene_compiler::SceneProgram& program,
     total += elements;
     families_.push_back(std::move(family));
   }
-  names_.resize(static_cast<std::size_t>(total));
+  dimension_ = static_cast<int>(total);
   std::size_t begin = 0;
   for (std::size_t end = 1; end <= families_.size(); ++end) {
     const bool same = end < families_.size() && families_[end].loops > 0 &&
@@ -46,6 +46,11 @@ CoordinateLayout::CoordinateLayout(const scene_compiler::SceneProgram& program,
     place_group(begin, end);
     begin = end;
   }
+  if (named) place_names();
+}
+
+void CoordinateLayout::place_names() {
+  names_.resize(static_cast<std::size_t>(dimension_));
   for (std::size_t f = 0; f < families_.size(); ++f)
     for (long i = 0; i < count(static_cast<int>(f)); ++i) {
       const auto index = element(static_cast<int>(f), i);

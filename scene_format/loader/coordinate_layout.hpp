@@ -11,11 +11,12 @@ namespace diracstep {
 /// other in the file are interleaved, so that the coordinates of one body are neighbours: x_1 y_1 x_2 y_2 …
 class CoordinateLayout {
  public:
-  /// More coordinates than SizeLimits::coordinates throw SceneError.
+  /// More coordinates than SizeLimits::coordinates throw SceneError.  Without `named` names() stays empty,
+  /// which is what takes memory.
   CoordinateLayout(const scene_compiler::SceneProgram& program,
-                   const scene_compiler::ParameterValues& parameters);
+                   const scene_compiler::ParameterValues& parameters, bool named = true);
 
-  int dimension() const { return static_cast<int>(names_.size()); }
+  int dimension() const { return dimension_; }
   const std::vector<std::string>& names() const { return names_; }
 
   /// Number of elements of a family, and the loop values of each in turn.
@@ -36,7 +37,9 @@ class CoordinateLayout {
   };
   const Family& family(int number) const { return families_[static_cast<std::size_t>(number)]; }
   void place_group(std::size_t begin, std::size_t end);
+  void place_names();
 
+  int dimension_ = 0;
   std::vector<Family> families_;
   std::vector<std::string> names_;
 };

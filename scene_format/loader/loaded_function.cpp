@@ -28,14 +28,14 @@ const CompiledKernel* table_of(const LoadedScene& scene, const SceneFunction& fu
 
 }  // namespace
 
-LoadedFunction::LoadedFunction(LoadedScenePtr scene, const SceneFunction& function)
+LoadedFunction::LoadedFunction(LoadedScenePtr scene, const SceneFunction& function, KeepTurn keep)
     : scene_(std::move(scene)), function_(&function), table_(table_of(*scene_, function)) {
   place_rows();
-  for (const Piece& piece : function.pieces) load(piece);
+  for (const Piece& piece : function.pieces) load(piece, keep);
   const auto small = [](const LoadedPiece& loaded) {
     return loaded.slots.size() + loaded.instance.size() <= largest_table;
   };
-  if (dimension() <= most_coordinates && std::ranges::all_of(pieces_, small)) copy_slots();
+  if (!keep && dimension() <= most_coordinates && std::ranges::all_of(pieces_, small)) copy_slots();
   plan_jobs();
 }
 
@@ -85,7 +85,7 @@ int LoadedFunction::coordinate(const Evaluator& body, std::size_t root, Node lea
                    fmt::format("there is no {}{}", scene_->layout.name(data.a, index), turns.text()));
 }
 
-void LoadedFunction::load(const Piece& piece) {
+void LoadedFunction::load(const Piece& piece, const KeepTurn& keep) {
   const SceneProgram& program = *scene_->program;
   std::vector<Node> roots;
   std::vector<std::size_t> first_root;  // of the index of each slot
@@ -117,6 +117,8 @@ void LoadedFunction::load(const Piece& piece) {
     body.evaluate();
     for (std::size_t k = 0; k < piece.slots.size(); ++k)
       loaded.slots.push_back(coordinate(body, first_root[k], piece.slots[k], turns));
+    if (keep && !keep(std::span(loaded.slots).last(piece.slots.size())))
+      return loaded.slots.resize(loaded.slots.size() - piece.slots.size());
     for (const int group : piece.groups)
       loaded.slots.push_back(first_rows_[static_cast<std::size_t>(group)] +
                              (piece.counting_loops > 0 ? static_cast<int>(row) : 0));

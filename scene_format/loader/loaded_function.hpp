@@ -3,6 +3,8 @@
 #include <diracstep/core/numerics/sparsity_pattern.hpp>
 #include <diracstep/scene_format/loader/loaded_scene.hpp>
 #include <diracstep/scene_format/loader/turns.hpp>
+#include <functional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -13,7 +15,12 @@ namespace diracstep {
 /// has its coordinates, its rows and its constants.
 class LoadedFunction {
  public:
-  LoadedFunction(LoadedScenePtr scene, const scene_compiler::SceneFunction& function);
+  /// Of the coordinates of one turn of a repeated piece: whether the turn is kept; they may be renumbered.
+  using KeepTurn = std::function<bool(std::span<int> coordinates)>;
+
+  /// With `keep`, a function of those turns alone, of coordinates as they are numbered there.
+  LoadedFunction(LoadedScenePtr scene, const scene_compiler::SceneFunction& function,
+                 KeepTurn keep = nullptr);
   LoadedFunction(LoadedFunction&&) = default;  // its jobs point into its pieces
 
   const scene_compiler::SceneFunction& function() const { return *function_; }
@@ -64,7 +71,7 @@ class LoadedFunction {
   template <class Visit>
   void for_each_entry(const LoadedPiece& loaded, bool curvature, const Visit& visit) const;
   void place_rows();
-  void load(const scene_compiler::Piece& piece);
+  void load(const scene_compiler::Piece& piece, const KeepTurn& keep);
   int coordinate(const scene_compiler::Evaluator& body, std::size_t root, scene_compiler::Node leaf,
                  const Turns& turns) const;
 

@@ -12,13 +12,14 @@ double constant(const SceneProgram& program, long double value) {
   return rounded;
 }
 
-LoadedScene::LoadedScene(std::shared_ptr<const CompiledScene> scene, ParameterValues values)
+LoadedScene::LoadedScene(std::shared_ptr<const CompiledScene> scene, ParameterValues values,
+                         bool named_coordinates)
     : compiled(std::move(scene)),
       program(compiled->program.get()),
       library(compiled->library),
       stage_kernels(compiled->stage_kernels),
       parameters(std::move(values)),
-      layout(*program, parameters) {
+      layout(*program, parameters, named_coordinates) {
   Evaluator evaluator(*program, parameters, program->known.nodes());
   evaluator.evaluate();
   for (std::size_t i = 0; i < program->known.nodes().size(); ++i)

@@ -26,7 +26,9 @@ struct CompiledScene {
 
 /// A scene file with its parameters set: all that its functions share.
 struct LoadedScene {
-  LoadedScene(std::shared_ptr<const CompiledScene> scene, scene_compiler::ParameterValues values);
+  /// Without `named_coordinates` the layout has no names.
+  LoadedScene(std::shared_ptr<const CompiledScene> scene, scene_compiler::ParameterValues values,
+              bool named_coordinates = true);
 
   std::shared_ptr<const CompiledScene> compiled;
   const scene_compiler::SceneProgram* program;  ///< that of `compiled`, as the two below

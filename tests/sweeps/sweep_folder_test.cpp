@@ -279,6 +279,102 @@ step = 0.01
   EXPECT_NEAR(std::stod(line[5]), -0.6, 1e-3);
 }
 
+/// x = x0 cos(sqrt(k2/m) t): the second of two springs varies.
+TEST_F(SweepFolder, ElementsOfArraysOfParametersVary) {
+  write("springs.toml", R"(name = "springs"
+lagrangian = "v_x^2/2 - k[2]*x^2/2 + 0*k[1]"
+[coordinates]
+x = {}
+[parameters]
+k = { value = [3, 1], above = 0 }
+[start]
+x = 1
+[span]
+end = 1
+step = 0.01
+)");
+  const auto sweep = [&](const std::string& name, const std::string& values) {
+    return read_sweep(
+        write("springs_sweep.toml", "scene = \"springs.toml\"\nmethod = \"type1/gl:3\"\n[grid]\n\"" + name +
+                                        "\" = " + values + "\n[record]\nvalues = [\"x\"]\n"));
+  };
+  EXPECT_EQ(run(sweep("k[2]", "[4, 9]"), {.folder = path("out")}).ok, 2);
+  EXPECT_NEAR(std::stod(fields(rows("out")[1])[4]), std::cos(2.0), 1e-9);
+  EXPECT_NEAR(std::stod(fields(rows("out")[2])[4]), std::cos(3.0), 1e-9);
+  for (const char* name : {"k[3]", "k[0]", "k[]", "k[2", "k[1 ]", "k", "m[1]"})
+    expect_misuse([&] { (void)run(sweep(name, "[1, 2]"), {.folder = path("none")}); },
+                  {"no parameter '" + std::string(name) + "'", "k[1..2]"});
+  expect_misuse([&] { (void)run(sweep("k[1]", "[-1]"), {.folder = path("none")}); }, {"k[1]", "above 0"});
+}
+
+/// x = cos(w t): derivatives of a member by a parameter, at the parameters of the member.
+TEST_F(SweepFolder, DerivativesOfMembersAreRecorded) {
+  write("swing.toml", R"(name = "swing"
+lagrangian = "v_x^2/2 - w^2*x^2/2"
+[coordinates]
+x = {}
+[parameters]
+w = { value = 1, above = 0 }
+a = 1
+[start]
+x = "a"
+[span]
+end = 1
+step = 0.01
+)");
+  const auto sweep = [&](const std::string& more) {
+    return read_sweep(
+        write("swings.toml", "scene = \"swing.toml\"\nmethod = \"type1/gl:3\"\n[grid]\nw = [2, 3]\n" + more));
+  };
+  const SweepReport report =
+      run(sweep("[record]\nvalues = [\"x\"]\nderivatives = [\"d(x)/d(w)\", \"d(v_x)/d(a)\"]\n"),
+          {.folder = path("out")});
+  EXPECT_EQ(report.ok, 2) << (report.reasons.empty() ? "" : report.reasons[0]);
+  const std::vector<std::string> head = fields(rows("out")[0]);
+  EXPECT_EQ(head[5], "d(x)/d(w)");
+  for (std::size_t k = 0; k < 2; ++k) {
+    const std::vector<std::string> line = fields(rows("out")[1 + k]);
+    const double w = 2.0 + static_cast<double>(k);
+    EXPECT_NEAR(std::stod(line[4]), std::cos(w), 1e-9);
+    EXPECT_NEAR(std::stod(line[5]), -std::sin(w), 1e-8);
+    EXPECT_NEAR(std::stod(line[6]), -w * std::sin(w), 1e-8);
+  }
+  for (const char* text : {"d(y)/d(w)", "d(x)/d(b)", "x/w", "d(x)/d(w"})
+    expect_misuse(
+        [&] {
+          (void)run(sweep(std::string("[record]\nderivatives = [\"") + text + "\"]\n"),
+                    {.folder = path("none")});
+        },
+        {text, "expected d(x)/d(m)"});
+  expect_misuse(
+      [&] {
+        (void)run(sweep("\"start.x\" = [1]\n[record]\nderivatives = [\"d(x)/d(w)\"]\n"),
+                  {.folder = path("none")});
+      },
+      {"'derivatives'", "starts that vary"});
+}
+
+/// Steps that are far too large: doubted, unless the checks are left out; the numbers are the same.
+TEST_F(SweepFolder, ChecksMayBeLeftOut) {
+  const std::string text = R"(scene = "kepler_e06"
+method = "type1/midpoint"
+step = 0.2
+end = 12
+[grid]
+e = [0.6]
+[record]
+values = ["x"]
+extrema = ["energy"]
+)";
+  const SweepReport with = run(read_sweep(write("with.toml", text)), {.folder = path("with")});
+  const SweepReport without =
+      run(read_sweep(write("without.toml", "checks = false\n" + text)), {.folder = path("without")});
+  EXPECT_EQ(with.doubted, 1);
+  EXPECT_EQ(without.doubted, 0);
+  EXPECT_EQ(without.ok, 1);
+  EXPECT_EQ(fields(rows("with")[1])[4], fields(rows("without")[1])[4]);
+}
+
 TEST_F(SweepFolder, UnknownNamesAreRefusedBeforeAnythingIsRun) {
   const auto refused = [&](const std::string& text, std::initializer_list<std::string> parts) {
     const Sweep sweep = read_sweep(write("s.toml", text));
