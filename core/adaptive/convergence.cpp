@@ -38,10 +38,22 @@ void Convergence::add(double step, double difference) {
   if (runs() < 2) return;
   stagnant_ = runs() > 2 && difference > 0.5 * differences_.back() ? stagnant_ + 1 : 0;
   differences_.push_back(difference);
+  judge();
+}
+
+void Convergence::insert(std::size_t later, double step, double from_coarser, double from_finer) {
+  const auto at = static_cast<std::ptrdiff_t>(runs() - later);
+  steps_.insert(steps_.begin() + at, step);
+  differences_[static_cast<std::size_t>(at) - 1] = from_finer;
+  differences_.insert(differences_.begin() + at - 1, from_coarser);
+  judge();
+}
+
+void Convergence::judge() {
   double usable = order_;
   for (const std::size_t last : {runs(), runs() - 1})
     if (const double p = order_of(last); p < order_ - 1.0) usable = std::min(usable, std::max(p, 0.5));
-  estimate_ = difference / (std::pow(steps_[runs() - 2] / step, usable) - 1.0);
+  estimate_ = differences_.back() / (std::pow(1.0 / ratio(runs() - 1), usable) - 1.0);
 }
 
 double Convergence::order_of(std::size_t runs) const {
@@ -56,9 +68,20 @@ bool Convergence::confirmed(std::size_t runs) const {
 
 bool Convergence::by_order() const { return order_confirmed() && safety * estimate_ <= error_; }
 
-bool Convergence::by_three_runs() const {
-  if (runs() < 3) return false;
-  return safety * differences_.back() <= error_ && safety * differences_[runs() - 3] <= error_;
+/// Whether a run and the one before differ so little that both may have the error asked for, if their steps
+/// are in this ratio.
+bool Convergence::agree(std::size_t k, double ratio) const {
+  const double likeness = std::max(1.0, 0.5 / (1.0 - ratio));
+  return safety * likeness * differences_[k - 1] <= error_;
+}
+
+bool Convergence::by_three_runs() const { return runs() >= 3 && agree(runs() - 1) && agree(runs() - 2); }
+
+std::size_t Convergence::confirmed_by_run_before() const {
+  if (runs() < 2 || accepted()) return 0;
+  if (agree(runs() - 1, std::sqrt(ratio(runs() - 1)))) return 1;
+  if (runs() < 3 || !confirmed(runs()) || safety * estimate_ > error_) return 0;
+  return ratio(runs() - 2) <= ratio(runs() - 1) ? 2 : 1;  // the coarser one is cheaper
 }
 
 bool Convergence::near_round_off() const {

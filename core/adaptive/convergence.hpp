@@ -17,7 +17,13 @@ namespace diracstep {
 ///
 ///  * two observed orders in a row that agree with the stated one to within one, or half of one for orders
 ///    below 3, with falling differences, and 2.5 times the estimate below the error asked for; or
-///  * two differences in a row, those of three runs, below the error asked for divided by 2.5.
+///  * two differences in a row, those of three runs, below the error asked for divided by 2.5; where the
+///  steps
+///    of two runs are in a ratio r above 1/2, their difference counts 0.5/(1 − r) times, since runs of any
+///    order agree whose steps are nearly the same.
+///
+/// The runs need not come in this order: one between two others may be cheaper than a finer one and says as
+/// much of the order.
 ///
 /// What all runs of a sequence step over alike, it does not see: see ForceSurvey.
 class Convergence {
@@ -27,6 +33,9 @@ class Convergence {
   /// The next run, of a smaller step than those before it, and its difference from the last one; that of the
   /// first is not used.
   void add(double step, double difference);
+  /// A run between two, `later` of which have smaller steps, at least one; its differences from its
+  /// neighbours.
+  void insert(std::size_t later, double step, double from_coarser, double from_finer);
   void clear();
 
   std::size_t runs() const { return steps_.size(); }
@@ -35,6 +44,9 @@ class Convergence {
   double observed_order() const { return order_of(runs()); }  ///< NaN before the third
 
   bool accepted() const { return by_order() || by_three_runs(); }
+  /// Whether the last run would be accepted if one more between the last runs confirmed it: how many of them
+  /// have smaller steps than that one, 0 where none would help.
+  std::size_t confirmed_by_run_before() const;
   /// The better of the last two orders observed; 0 before there are two.
   double better_order() const;
   /// Whether the last two observed orders agree with the stated one.
@@ -56,6 +68,11 @@ class Convergence {
   static constexpr double none = std::numeric_limits<double>::quiet_NaN();
   double order_of(std::size_t runs) const;
   bool confirmed(std::size_t runs) const;
+  void judge();
+  /// Of steps_[k] and the run before.
+  double ratio(std::size_t k) const { return steps_[k] / steps_[k - 1]; }
+  bool agree(std::size_t k, double ratio) const;
+  bool agree(std::size_t k) const { return agree(k, ratio(k)); }
   bool by_order() const;
   bool by_three_runs() const;
 

@@ -12,7 +12,10 @@ namespace {
 
 using detail::RefinementSearch;
 
-constexpr double cost_of_variable = 1.4;   // of a variable step beside a fixed one of the same method
+constexpr double cost_of_variable = 2.5;         // of a variable step beside a fixed one of the same method
+constexpr double lowest_of_median = 0.3;         // MonitorScales::lowest
+constexpr double ratio_beside_explicit = 100.0;  // max ω / min ω from which variable steps may save any time
+constexpr double error_near_round_off = 1e-11;
 constexpr double first_parts = 10.0;       // of the work allowed, of which the first run takes one
 constexpr double most_over_median = 30.0;  // of the rate that the first fixed step follows
 
@@ -37,7 +40,7 @@ FirstSteps first_steps(const ErrorControlOptions& options, const RateSurvey& sur
   const double radians = std::clamp(12.0 * accuracy, 0.05, 4.0);
   double step = options.first_step > 0.0 ? options.first_step : span / 20.0;
   // Where a force jumps the fastest rate is without meaning; coarse runs that are too coarse cost little.
-  const double median = survey.scales.lowest / 0.3;
+  const double median = survey.scales.lowest / lowest_of_median;
   if (options.first_step <= 0.0 && survey.fastest > 0.0)
     step = std::min(step, radians / std::min(survey.fastest, most_over_median * median));
   // However little work is allowed, the first runs fit into it, and their answer has an estimated error.
@@ -57,14 +60,17 @@ ErrorControlReport search_both(const RefinementSearch::Motion& motion, const Err
   RefinementSearch by_variable(motion, variable, first.eps), by_fixed(motion, fixed, first.fixed);
   const bool measured = by_variable.measure(motion.options.max_solves);
   const double of_variable = measured ? cost_of_variable * by_variable.predicted_solves() : HUGE_VAL;
-  const bool fixed_is_dearer = measured && first.fixed_solves > of_variable;
+  const bool there = by_variable.converged();
+  const bool fixed_is_dearer = there || (measured && first.fixed_solves > of_variable);
   const double of_fixed = !fixed_is_dearer && by_fixed.measure(motion.options.max_solves)
                               ? by_fixed.predicted_solves()
                               : HUGE_VAL;
   const bool take_variable = measured && (fixed_is_dearer || of_variable < of_fixed);
   ErrorControlReport& taken = take_variable ? variable : fixed;
   const Work other = (take_variable ? fixed : variable).work;
-  if (fixed_is_dearer)
+  if (there)
+    taken.reason += "; coarse runs with variable steps agree already";
+  else if (fixed_is_dearer)
     taken.reason += "; a fixed step would take more solves";
   else if (measured)
     taken.reason += "; measured, a run to the error would cost " + to_text(of_variable, 3) +
@@ -82,16 +88,30 @@ ErrorControlReport search_both(const RefinementSearch::Motion& motion, const Err
   return fixed;
 }
 
+/// Whether variable steps may take less time: their number goes with the mean rate, that of fixed ones with
+/// the largest.
+bool variable_steps_may_pay(const RateSurvey& survey, bool explicit_steps) {
+  if (explicit_steps) return survey.ratio() > ratio_beside_explicit;
+  return survey.variable_steps_pay() &&
+         survey.fastest * lowest_of_median > cost_of_variable * survey.scales.lowest;
+}
+
+/// What is decided before the search, beside what its report says.
+struct Choice {
+  bool may_compensate = false;  ///< sums, where round-off shows
+  bool explicit_steps = false;
+};
+
 /// The method and its order, and whether sums are compensated: for small errors, where the library chooses.
-void choose_method(const std::shared_ptr<const Scene>& scene, const Registry& registry,
-                   const SolverFactory& solvers, double end, const ErrorControlOptions& options,
-                   ErrorControlReport& report) {
+Choice choose_method(const std::shared_ptr<const Scene>& scene, const Registry& registry,
+                     const SolverFactory& solvers, double end, const ErrorControlOptions& options,
+                     ErrorControlReport& report) {
   if (options.method != automatic_method) {
     const MethodInfo info = registry.method(options.method).info;
     report.method = info.name;
     report.order = options.order == 0 ? info.order : options.order;
     report.compensated_sums = options.compensated_sums.value_or(false);
-    return;
+    return {};
   }
   const DefaultMethod choice =
       default_method_of_motion(scene, registry, solvers, end, options.first_step, options.integrator,
@@ -100,12 +120,13 @@ void choose_method(const std::shared_ptr<const Scene>& scene, const Registry& re
                                 .rule = options.integrator.constraint_rule,
                                 .large = large_from(options.integrator.dense_limit)});
   const MethodInfo info = registry.method(choice.method).info;
-  const bool has_compensated_sums = info.stages > 0;
+  const bool may_compensate = !options.compensated_sums && info.stages > 0 && has_accelerations(*scene);
   report.method = choice.method;
   report.order = choice.order == 0 ? info.order : choice.order;
   report.method_reason = choice.reason;
-  report.compensated_sums = options.compensated_sums.value_or(
-      has_compensated_sums && has_accelerations(*scene) && options.error < 1e-8);
+  report.compensated_sums =
+      options.compensated_sums.value_or(may_compensate && options.error < error_near_round_off);
+  return {may_compensate, choice.explicit_steps};
 }
 
 }  // namespace
@@ -118,13 +139,19 @@ ErrorControlReport solve_to_error(const std::shared_ptr<const Scene>& given, con
   const auto scene = completed(given);
   const bool accelerates = has_accelerations(*scene);
   ErrorControlReport report;
-  choose_method(scene, registry, solvers, end, options, report);
+  const Choice choice = choose_method(scene, registry, solvers, end, options, report);
   const bool damped = registry.method(report.method).info.damped;
   RateSurvey survey;
   if (accelerates && !damped) survey = survey_rate(*scene, solvers, end);
   const FirstSteps first = first_steps(options, survey, report.order, std::abs(end - scene->start.time));
-  const RefinementSearch::Motion motion{
-      scene, registry, solvers, end, options, survey.scales, RefinementSearch::Clock::now()};
+  const RefinementSearch::Motion motion{scene,
+                                        registry,
+                                        solvers,
+                                        end,
+                                        options,
+                                        survey.scales,
+                                        choice.may_compensate,
+                                        RefinementSearch::Clock::now()};
   report.reason = options.adaptive          ? "as asked for"
                   : damped                  ? "by their local error, as the damping family allows"
                   : options.monitor.rate    ? "a monitor is given"
@@ -132,7 +159,7 @@ ErrorControlReport solve_to_error(const std::shared_ptr<const Scene>& given, con
                   : !survey.failure.empty() ? "how fast it changes is not known: " + survey.failure
                                             : "max ω / min ω = " + to_text(survey.ratio(), 3);
   const bool may_pay = accelerates && !damped && survey.failure.empty() &&
-                       (options.monitor.rate || survey.variable_steps_pay());
+                       (options.monitor.rate || variable_steps_may_pay(survey, choice.explicit_steps));
   if (!options.adaptive && may_pay) return search_both(motion, report, first);
   report.adaptive = options.adaptive.value_or(damped);
   RefinementSearch(motion, report, report.adaptive ? first.eps : first.fixed).go();

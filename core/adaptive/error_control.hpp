@@ -27,7 +27,7 @@ struct ErrorControlOptions {
   StepControl control = StepControl::integrating;
   double first_step = 0.0;                    ///< of a fixed step, without sign; 0: from the survey
   std::optional<bool> compensated_sums = {};  ///< empty: where the library chooses the method and the error
-                                              ///< is below 1e-8
+                                              ///< is below 1e-11, or round-off stops the search without them
   IntegratorOptions integrator = {};          ///< the rule of rows and all else that is not said above
   long max_solves = usual_max_solves;         ///< nonlinear systems, or explicit steps; where fixed and
                                               ///< variable steps are both tried, of each

@@ -28,16 +28,15 @@ struct ChebyshevPoints {
   }
   /// out = values · l(x), the polynomial through the columns of `values`.
   void interpolate(const Columns& values, double at, Vector& out) const {
-    out.setZero(values.rows());
-    double sum = 0.0;
+    Eigen::Matrix<double, nodes, 1> w;
     for (int k = 0; k < nodes; ++k) {
       const auto i = static_cast<std::size_t>(k);
       if (at == x[i]) return void(out = values.col(k));
-      const double w = weight[i] / (at - x[i]);
-      out += w * values.col(k);
-      sum += w;
+      w[k] = weight[i] / (at - x[i]);
     }
-    out /= sum;
+    w /= w.sum();
+    out.resize(values.rows());
+    for (Eigen::Index r = 0; r < values.rows(); ++r) out[r] = values.row(r).dot(w);
   }
 };
 const ChebyshevPoints chebyshev;

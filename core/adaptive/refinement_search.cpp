@@ -20,9 +20,13 @@ constexpr long fewest_steps = 4;              // of a run with variable steps th
 constexpr double missed_allowed = 0.1;        // by the forces surveyed, in parts of the error asked for
 constexpr double error_out_of_reach = 1e-15;  // differences of runs hold nothing but round-off below it
 constexpr long nodes_between_looks = 64;
+constexpr std::size_t runs_kept = 3;
+constexpr std::size_t runs_to_measure = 3;      // what a run to the error asked for would take
 constexpr long energies_read = 100;             // of a run
 constexpr double growth_of_no_power = 1e6;      // of two runs apart: powers of the time lead to less
 constexpr double smallest_local_error = 2e-14;  // below it steps have one of round-off
+constexpr int most_abandoned = 3;               // of runs in a row
+constexpr long steps_for_a_rescue = 50;         // of a run that goes on
 
 std::string text(double value) { return to_text(value, 3); }
 
@@ -37,8 +41,11 @@ RefinementSearch::RefinementSearch(const Motion& motion, ErrorControlReport& rep
       convergence_(report.order, motion.options.error),
       local_(report.adaptive && motion.registry.method(report.method).info.damped),
       first_(first),
-      eps_step_(std::copysign(first, motion.end - motion.scene->start.time)) {
-  if (!report.adaptive) plan_ = StepPlan(known_stretches(*motion.scene, motion.end), first);
+      eps_step_(std::copysign(first, motion.end - motion.scene->start.time)),
+      unit_(motion.options.first_step > 0.0 ? 1 : 2),
+      refinement_(unit_) {
+  if (!report.adaptive)
+    plan_ = StepPlan(known_stretches(*motion.scene, motion.end), first * static_cast<double>(unit_));
 }
 
 ErrorControlReport::Steps RefinementSearch::steps_of(long refinement) const {
@@ -125,69 +132,155 @@ void RefinementSearch::count(ErrorControlRun& now, const Work& work) {
   report_.work.jacobian_evaluations += work.jacobian_evaluations;
 }
 
-RefinementSearch::Outcome RefinementSearch::run(long refinement) {
-  ErrorControlRun& now = report_.runs.emplace_back();
+/// Steps through the motion, and shows its points to the checks of a run and, where one is given, to a path.
+/// Steps so long that they are not solved from their guesses, and have to be followed from short ones, cost
+/// more than twice as many of half the size: a coarse run of such steps is given up.
+RefinementSearch::Passed RefinementSearch::pass(long refinement, ErrorControlRun& now,
+                                                std::vector<PathPoint>* path) {
+  Passed passed;
   const ErrorControlReport::Steps steps = steps_of(refinement);
   now.step = report_.adaptive ? steps.variable.eps : std::abs(plan_.mean_step(refinement));
-  last_refinement_ = refinement;
-  Sample end;
-  Work work;
   long nodes = 0;
   SolveReport read_end;
   NodeCheck windows(*motion_.scene, 0);
   EnergyCheck energy(*motion_.scene);
   const long between_energies = std::max(1L, plan_.steps() * refinement / energies_read);
+  const bool may_give_up =
+      !report_.adaptive && !kinks_on_the_way() && convergence_.runs() == 0 && failures_ < most_abandoned;
+  const long rescues_allowed = 2 + plan_.steps() * refinement / steps_for_a_rescue;
+  bool given_up = false;
   Sample node;
   const auto at_node = [&](const ReadNode& read, bool last) {
-    const bool wanted = windows.wants(nodes);
-    if (!last && (wanted || nodes % between_energies == 0) && read(Momentum::projected, node).ok()) {
-      if (wanted) windows.see(nodes, node);
-      energy.see(node);
-      largest_position_ = std::max(largest_position_, max_norm(node.q));
-      largest_momentum_ = std::max(largest_momentum_, max_norm(node.p));
-      largest_velocity_ = std::max(largest_velocity_, max_norm(node.v));
+    const bool wanted = windows.wants(nodes), looked_at = nodes % between_energies == 0;
+    if ((path || (!last && (wanted || looked_at))) && read(Momentum::projected, node).ok()) {
+      if (path) add_to_path(node, *path);
+      if (!last && wanted) windows.see(nodes, node);
+      if (!last && (wanted || looked_at)) {
+        energy.see(node);
+        largest_position_ = std::max(largest_position_, max_norm(node.q));
+        largest_momentum_ = std::max(largest_momentum_, max_norm(node.p));
+        largest_velocity_ = std::max(largest_velocity_, max_norm(node.v));
+      }
     }
-    if (last) read_end = read(Momentum::projected, end);
+    if (last) read_end = read(Momentum::projected, passed.end);
+    const Retries& retries = passed.work.retries;
+    given_up = !last && may_give_up && retries.continuations + retries.divided_steps > rescues_allowed;
+    if (given_up) return false;
     if (++nodes % nodes_between_looks != 0) return true;
     ended_ = motion_.options.go_on && !motion_.options.go_on();
     return !ended_ && !time_is_up() && report_.work.steps + nodes <= motion_.options.max_solves;
   };
   const StepReport done = run_steps_of(motion_.scene, motion_.registry, motion_.solvers, steps,
-                                       report_.adaptive, motion_.end, work, at_node);
-  count(now, work);
+                                       report_.adaptive, motion_.end, passed.work, at_node);
+  count(now, passed.work);
+  const Sample& end = passed.end;
   now.failure = done.failure;
+  if (given_up) now.failure = "given up: its steps are too long to be solved from their guesses";
   if (now.failure.empty() && end.q.size() == 0) {
     now.failure = ended_          ? "interrupted"
                   : read_end.ok() ? "not finished with the time or work allowed"
                                   : std::string("reading the end: ") + describe(read_end.status);
-    return read_end.ok() ? Outcome::ended : Outcome::failed;
+    passed.outcome = read_end.ok() ? Outcome::ended : Outcome::failed;
+    return passed;
   }
   if (now.failure.empty() && !(end.q.allFinite() && end.p.allFinite())) now.failure = "the end is not finite";
-  if (!now.failure.empty()) return Outcome::failed;
+  if (!now.failure.empty()) {
+    passed.outcome = Outcome::failed;
+    return passed;
+  }
+  energy.see(end);
+  passed.doubt =
+      joined_doubts({energy.denied(end, motion_.options.error, size_at_end(end.q, largest_position_),
+                                   size_at_end(end.p, largest_momentum_)),
+                     energy.text(), windows.text()});
+  return passed;
+}
+
+double RefinementSearch::difference(const Sample& fine, const Sample& coarse) const {
+  return std::max({relative_change(fine.q, coarse.q, largest_position_),
+                   relative_change(fine.p, coarse.p, largest_momentum_),
+                   relative_change(fine.v, coarse.v, largest_velocity_)});
+}
+
+RefinementSearch::Outcome RefinementSearch::run(long refinement) {
+  ErrorControlRun& now = report_.runs.emplace_back();
+  last_refinement_ = refinement;
   const bool first = convergence_.runs() == 0;
-  if (report_.adaptive && (work.steps < fewest_steps || work.steps <= last_steps_)) {
-    now.failure = work.steps < fewest_steps ? "too few steps to prove anything" : "no more steps than before";
+  std::vector<PathPoint> path;
+  Passed passed = pass(refinement, now, first && divisions_ == 0 && !local_ ? &path : nullptr);
+  if (passed.outcome != Outcome::counts) return passed.outcome;
+  const long steps = passed.work.steps;
+  if (report_.adaptive && (steps < fewest_steps || steps <= last_steps_)) {
+    now.failure = steps < fewest_steps ? "too few steps to prove anything" : "no more steps than before";
     return Outcome::does_not_count;
   }
-  last_steps_ = work.steps;
-  energy.see(end);
-  doubt_ = joined_doubts({energy.denied(end, motion_.options.error, size_at_end(end.q, largest_position_),
-                                        size_at_end(end.p, largest_momentum_)),
-                          energy.text(), windows.text()});
-  if (first) first_good_ = refinement;
-  if (!first)
-    now.difference = std::max({relative_change(end.q, report_.end.q, largest_position_),
-                               relative_change(end.p, report_.end.p, largest_momentum_),
-                               relative_change(end.v, report_.end.v, largest_velocity_)});
+  last_steps_ = steps;
+  doubt_ = std::move(passed.doubt);
+  if (first) {
+    coarsest_ = {refinement, steps, passed.end};
+    path_ = std::move(path);
+  } else {
+    now.difference = difference(passed.end, report_.end);
+  }
   convergence_.add(local_ ? first_ / static_cast<double>(refinement) : now.step, now.difference);
-  now.estimate = std::max(convergence_.estimate(), round_off_of(work.steps));
-  now.observed_order = convergence_.observed_order();
-  report_.end = std::move(end);
+  report_.end = passed.end;
+  if (last_.size() == runs_kept) last_.erase(last_.begin());
+  last_.push_back({refinement, steps, std::move(passed.end)});
   report_.step = report_.adaptive ? now.step : plan_.mean_step(refinement);
-  report_.steps = steps;
-  report_.estimate = now.estimate;
-  report_.observed_order = now.observed_order;
+  report_.steps = steps_of(refinement);
+  judge(now);
   return Outcome::counts;
+}
+
+/// The estimate for the last run.
+void RefinementSearch::judge(ErrorControlRun& last) {
+  report_.estimate = last.estimate = std::max(convergence_.estimate(), round_off_of(last_steps_));
+  report_.observed_order = last.observed_order = convergence_.observed_order();
+}
+
+/// One run more with steps between those of two that count, where that may confirm the last: it takes less
+/// than a finer one.
+void RefinementSearch::confirm() {
+  const std::size_t later = convergence_.confirmed_by_run_before();
+  if (later == 0 || last_.size() <= later) return;
+  const auto fine = last_.end() - static_cast<std::ptrdiff_t>(later), coarse = fine - 1;
+  const long refinement =
+      std::lround(std::sqrt(static_cast<double>(coarse->refinement) * static_cast<double>(fine->refinement)));
+  if (refinement <= coarse->refinement || refinement >= fine->refinement) return;
+  ErrorControlRun between;
+  Passed passed = pass(refinement, between, nullptr);
+  const long steps = passed.work.steps;
+  const bool counts = passed.outcome == Outcome::counts && steps > coarse->steps && steps < fine->steps;
+  if (counts) {
+    between.difference = difference(passed.end, coarse->end);
+    const double after = difference(fine->end, passed.end);
+    convergence_.insert(later, local_ ? first_ / static_cast<double>(refinement) : between.step,
+                        between.difference, after);
+    if (later == 1) report_.runs.back().difference = after;
+    last_.insert(fine, {refinement, steps, std::move(passed.end)});
+    if (last_.size() > runs_kept) last_.erase(last_.begin());
+  } else if (between.failure.empty()) {
+    between.failure = "its number of steps is not between those of two runs";
+  }
+  report_.runs.insert(report_.runs.end() - 1, between);
+  judge(report_.runs.back());
+}
+
+/// Begins anew with compensated sums where round-off shows without them.
+bool RefinementSearch::compensate() {
+  if (!motion_.may_compensate || report_.compensated_sums || !convergence_.near_round_off()) return false;
+  report_.compensated_sums = true;
+  begin_anew(std::max(unit_, refinement_ / 4));
+  return true;
+}
+
+void RefinementSearch::begin_anew(long refinement) {
+  convergence_.clear();
+  last_.clear();
+  report_.estimate = report_.observed_order = std::nan("");
+  refinement_ = refinement;
+  last_steps_ = 0;
+  surveyed_ = false;
 }
 
 /// One run more; false where the search has come to its end.
@@ -207,6 +300,13 @@ bool RefinementSearch::next(long max_solves) {
     case Outcome::counts:
       failures_ = 0;
   }
+  confirm();
+  return (measuring_ && convergence_.runs() >= runs_to_measure) || conclude();
+}
+
+/// What follows from the runs so far: their last is accepted, a finer one is to come, or the search ends,
+/// for which false stands.
+bool RefinementSearch::conclude() {
   if (convergence_.accepted()) {
     if (!survey(true)) return report_.refusal.empty();
     return accept();
@@ -215,6 +315,7 @@ bool RefinementSearch::next(long max_solves) {
   if (convergence_.runs() >= 4 && !convergence_.order_confirmed() && !surveyed_ && !kinks_on_the_way() &&
       !survey(false))
     return report_.refusal.empty();
+  if (compensate()) return true;
   const std::size_t patience = kinks_on_the_way() ? runs_to_resolve_kinks : runs_to_converge;
   if (convergence_.stagnates() && (convergence_.runs() > patience || convergence_.difference() < 1e-4))
     return refuse_unless_amplified(convergence_.obstacle());
@@ -224,14 +325,28 @@ bool RefinementSearch::next(long max_solves) {
 }
 
 bool RefinementSearch::measure(long max_solves) {
-  while (convergence_.runs() < 3)
+  measuring_ = true;
+  while (report_.refusal.empty() && convergence_.runs() < runs_to_measure)
     if (!next(std::min(max_solves, motion_.options.max_solves))) break;
-  return convergence_.runs() >= 3;
+  measuring_ = false;
+  return convergence_.runs() >= runs_to_measure;
 }
 
 void RefinementSearch::go() {
+  if (convergence_.runs() >= runs_to_measure && !conclude()) return;
   while (report_.refusal.empty() && !accepted_ && next(motion_.options.max_solves)) {
   }
+}
+
+/// The node of a run, and where a stretch ends the beginning of the next as well.
+void RefinementSearch::add_to_path(const Sample& point, std::vector<PathPoint>& path) const {
+  path.push_back({point.time, point.q, point.v, point.p});
+  if (report_.adaptive) return;
+  const auto& stretches = plan_.stretches();
+  for (std::size_t k = 0; k + 1 < stretches.size(); ++k)
+    if (std::abs(point.time - stretches[k].end) <= 1e-9 * std::abs(stretches[k].end - stretches[k].begin) &&
+        stretches[k + 1].begin != point.time)
+      path.push_back({stretches[k + 1].begin, point.q, point.v, point.p});
 }
 
 /// Points of a run that got to the end, for the survey: the run again, with its nodes read.
@@ -239,18 +354,9 @@ std::vector<PathPoint> RefinementSearch::path_of(long refinement) {
   std::vector<PathPoint> path;
   Work work;
   Sample point;
-  const auto& stretches = plan_.stretches();
-  std::size_t stretch = 0;
   const auto at_node = [&](const ReadNode& read, bool) {
     if (!read(Momentum::projected, point).ok()) return false;
-    path.push_back({point.time, point.q, point.v, point.p});
-    if (report_.adaptive || stretch + 1 >= stretches.size()) return !time_is_up();
-    const double end = stretches[stretch].end;
-    if (std::abs(point.time - end) <= 1e-9 * std::abs(end - stretches[stretch].begin)) {
-      ++stretch;
-      if (stretches[stretch].begin != point.time)
-        path.push_back({stretches[stretch].begin, point.q, point.v, point.p});
-    }
+    add_to_path(point, path);
     return !time_is_up();
   };
   (void)run_steps_of(motion_.scene, motion_.registry, motion_.solvers, steps_of(refinement), report_.adaptive,
@@ -266,8 +372,8 @@ bool RefinementSearch::survey(bool accepted) {
   surveyed_ = true;
   if (local_) return true;  // such steps are short where the forces change fast
   // A coarse run shows the way; after a division a fine one, for the place of a kink depends on the motion.
-  const long way = divisions_ == 0 ? first_good_ : refinement_;
-  const std::vector<PathPoint> path = path_of(way);
+  const long way = divisions_ == 0 ? coarsest_.refinement : refinement_;
+  const std::vector<PathPoint> path = divisions_ == 0 ? path_ : path_of(way);
   if (path.size() < 2 || !reached_end(path.back().time))
     return refuse("the time was used up before the forces along the motion were surveyed (--max-time)");
   ForceSurvey forces(*motion_.scene, motion_.options.error);
@@ -290,35 +396,27 @@ bool RefinementSearch::survey(bool accepted) {
 
 void RefinementSearch::divide(const ForceSurveyReport& found) {
   plan_ = StepPlan(found.stretches, first_);
-  convergence_.clear();
-  report_.estimate = report_.observed_order = std::nan("");
-  refinement_ = 1;
-  last_steps_ = 0;
-  surveyed_ = false;
+  begin_anew(unit_ = 1);
   report_.division = fast_ + ": the steps are divided there, into " +
                      std::to_string(plan_.stretches().size()) + " stretches";
 }
 
-/// How much farther apart two runs end than they begin, relative to the sizes of both; 0 where that is not
-/// known.
-double RefinementSearch::amplification(long refinement) {
+/// How much farther apart a run and one from beside its start end than they begin, relative to the sizes of
+/// both; 0 where that is not known.
+double RefinementSearch::amplification(const Counted& run) {
   auto moved = std::make_shared<Scene>(*motion_.scene);
   moved->start = beside(moved->start, largest_position_, largest_velocity_);
-  const auto end_of = [&](const std::shared_ptr<const Scene>& scene) {
-    Sample end;
-    Work work;
-    (void)run_steps_of(scene, motion_.registry, motion_.solvers, steps_of(refinement), report_.adaptive,
-                       motion_.end, work, [&](const ReadNode& read, bool last) {
-                         if (last && !read(Momentum::projected, end).ok()) end = {};
-                         return !time_is_up();
-                       });
-    report_.work.solves += work.solves;
-    return end;
-  };
-  const Sample one = end_of(motion_.scene), other = end_of(moved);
-  if (one.q.size() == 0 || other.q.size() == 0) return 0.0;
-  double apart = relative_change(other.q, one.q, largest_position_);
-  if (largest_momentum_ > 0.0) apart = std::max(apart, relative_change(other.p, one.p, largest_momentum_));
+  Sample end;
+  Work work;
+  (void)run_steps_of(moved, motion_.registry, motion_.solvers, steps_of(run.refinement), report_.adaptive,
+                     motion_.end, work, [&](const ReadNode& read, bool last) {
+                       if (last && !read(Momentum::projected, end).ok()) end = {};
+                       return !time_is_up();
+                     });
+  report_.work.solves += work.solves;
+  if (end.q.size() == 0) return 0.0;
+  double apart = relative_change(end.q, run.end.q, largest_position_);
+  if (largest_momentum_ > 0.0) apart = std::max(apart, relative_change(end.p, run.end.p, largest_momentum_));
   return std::isfinite(apart) ? apart / distance_beside : 0.0;
 }
 
@@ -326,11 +424,11 @@ double RefinementSearch::amplification(long refinement) {
 /// coarse one tells of too much, if that one is accepted.
 double RefinementSearch::amplified_round_off(bool accepted) {
   if (local_ || convergence_.runs() == 0) return 0.0;
-  growth_ = amplification(first_good_);
+  growth_ = amplification(coarsest_);
   const auto left = [this] {
     return growth_ > growth_of_no_power ? growth_ * round_off_of(last_steps_) : 0.0;
   };
-  if (accepted && left() > motion_.options.error) growth_ = amplification(refinement_);
+  if (accepted && left() > motion_.options.error) growth_ = amplification(last_.back());
   return left();
 }
 

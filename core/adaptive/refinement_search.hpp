@@ -20,27 +20,49 @@ class RefinementSearch {
     double end;
     const ErrorControlOptions& options;
     MonitorScales scales;
+    bool may_compensate;  ///< sums, where round-off stops the search
     Clock::time_point started;
   };
 
   /// `report` has the method and the kind of steps; the coarsest run has steps of `first`, or eps.
   RefinementSearch(const Motion& motion, ErrorControlReport& report, double first);
 
-  /// To the first estimate, with at most so many solves; false where there is none.
+  /// To the first observed order, with at most so many solves; false where there is none.  Nothing is
+  /// accepted or surveyed yet.
   bool measure(long max_solves);
   /// To the error asked for or a refusal; goes on after measure().
   void go();
   /// Solves that a run needs which meets the error, by the last estimate.
   double predicted_solves() const;
+  bool converged() const { return convergence_.accepted(); }
 
  private:
   enum class Outcome { counts, does_not_count, failed, ended };
+  /// A run that counts.
+  struct Counted {
+    long refinement, steps;
+    Sample end;
+  };
+  /// What one run left.
+  struct Passed {
+    Outcome outcome = Outcome::counts;
+    Work work = {};
+    Sample end = {};
+    std::string doubt = {};
+  };
   bool next(long max_solves);
+  bool conclude();
+  Passed pass(long refinement, ErrorControlRun& now, std::vector<PathPoint>* path);
   Outcome run(long refinement);
+  void judge(ErrorControlRun& last);
+  void confirm();
+  void begin_anew(long refinement);
+  bool compensate();
+  double difference(const Sample& fine, const Sample& coarse) const;
   ErrorControlReport::Steps steps_of(long refinement) const;
   /// Radians fall like the refinement; a local error falls so that the sizes of the steps do.
   double eps_of(long refinement) const {
-    const double fine = first_ / static_cast<double>(refinement);
+    const double fine = first_ * static_cast<double>(unit_) / static_cast<double>(refinement);
     return local_ ? std::pow(fine, report_.order + 1) : fine;
   }
   void count(ErrorControlRun& now, const Work& work);
@@ -49,10 +71,11 @@ class RefinementSearch {
   bool reached_end(double t) const;
   bool stopped(long max_solves);
   bool survey(bool accepted);
+  void add_to_path(const Sample& point, std::vector<PathPoint>& path) const;
   std::vector<PathPoint> path_of(long refinement);
   void divide(const ForceSurveyReport& found);
   bool accept();
-  double amplification(long refinement);
+  double amplification(const Counted& run);
   double amplified_round_off(bool accepted);
   bool refuse_unless_amplified(const std::string& why);
   std::string amplified(double left) const;
@@ -65,11 +88,15 @@ class RefinementSearch {
   bool local_;  ///< variable steps by their local error
   double first_;
   double eps_step_ = 0.0;  ///< of the options of variable steps, with its sign
-  long refinement_ = 1, last_steps_ = 0, last_refinement_ = 1, first_good_ = 0;
+  long unit_;  ///< refinement of the coarsest run: above 1 there are sizes between those of two runs
+  long refinement_, last_steps_ = 0, last_refinement_ = 1;
+  Counted coarsest_{};                ///< of the runs that count
+  std::vector<PathPoint> path_ = {};  ///< of that run
+  std::vector<Counted> last_ = {};    ///< the last three runs that count, the finest at the end
   double largest_position_ = 0.0, largest_momentum_ = 0.0, largest_velocity_ = 0.0;  ///< at the nodes read
   int failures_ = 0, divisions_ = 0;
   double growth_ = 0.0;  ///< of errors, where it has been asked for
-  bool surveyed_ = false, ended_ = false, accepted_ = false;
+  bool surveyed_ = false, ended_ = false, measuring_ = false, accepted_ = false;
   std::string fast_;   ///< empty, or where the forces change fast
   std::string doubt_;  ///< empty, or what the checks of a run say of the last one
 };

@@ -44,7 +44,10 @@ StepReport run_steps_of(const std::shared_ptr<const Scene>& scene, const Registr
   StepReport report;
   if (adaptive) {
     AdaptiveIntegrator integrator(scene, registry, solvers, steps.integrator, steps.variable);
-    report = run_variable(integrator, end, at_node);
+    report = run_variable(integrator, end, [&](const ReadNode& read, bool last) {
+      work = integrator.work();
+      return at_node(read, last);
+    });
     work = integrator.work();
     work.solves += integrator.side_work().solves;
     work.iterations += integrator.side_work().iterations;
@@ -52,7 +55,10 @@ StepReport run_steps_of(const std::shared_ptr<const Scene>& scene, const Registr
     work.jacobian_evaluations += integrator.side_work().jacobian_evaluations;
   } else {
     Integrator integrator(scene, registry, solvers, steps.integrator);
-    report = run_fixed(integrator, steps, at_node);
+    report = run_fixed(integrator, steps, [&](const ReadNode& read, bool last) {
+      work = integrator.work();
+      return at_node(read, last);
+    });
     work = integrator.work();
   }
   return report;

@@ -11,7 +11,7 @@ using ReadNode = std::function<SolveReport(Momentum, Sample&)>;
 /// Called at the start, at each node and at the end; false ends the run.
 using AtNode = std::function<bool(const ReadNode& read, bool last)>;
 
-/// One run with the steps of a report.  `work` receives what it took.
+/// One run with the steps of a report.  `work` is what it has taken so far, at each node and at the end.
 StepReport run_steps_of(const std::shared_ptr<const Scene>& scene, const Registry& registry,
                         const SolverFactory& solvers, const ErrorControlReport::Steps& steps, bool adaptive,
                         double end, Work& work, const AtNode& at_node);

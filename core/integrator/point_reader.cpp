@@ -132,6 +132,21 @@ SolveReport PointReader::velocity_by_hamiltonian(double t, ConstVectorRef q, Con
   return report;
 }
 
+namespace {
+
+/// a with M a = F, where M is diagonal: the residual at a = 0 is −F.
+SolveReport divide_by_masses(AccelerationProblem& problem, const Vector& mass, VectorRef residual,
+                             VectorRef a) {
+  a.setZero();
+  problem.residual(a, residual);
+  a = -residual.cwiseQuotient(mass);
+  SolveReport report;
+  if (!a.allFinite()) report.status = SolveStatus::not_finite;
+  return report;
+}
+
+}  // namespace
+
 SolveReport PointReader::acceleration(double t, ConstVectorRef q, ConstVectorRef v, Vector& a,
                                       Vector& lambda) {
   if (phase_space_velocity_ || first_order_velocity_) {
@@ -140,6 +155,11 @@ SolveReport PointReader::acceleration(double t, ConstVectorRef q, ConstVectorRef
     return {};
   }
   acceleration_problem().begin(t, q, v);
+  if (constant_diagonal_mass(t, q)) {
+    a.resize(mass_.size());
+    lambda.resize(0);
+    return divide_by_masses(*acceleration_, mass_, lq_, a);
+  }
   return solve_acceleration(*acceleration_, acceleration_solver_, a, lambda);
 }
 
@@ -174,9 +194,10 @@ SolveReport PointReader::solve_acceleration(NonlinearProblem& problem,
 SolveReport PointReader::acceleration_by_elimination(double t, ConstVectorRef q, ConstVectorRef v,
                                                      VectorRef a) {
   AccelerationProblem& problem = acceleration_problem();
+  problem.begin(t, q, v);
+  if (constant_diagonal_mass(t, q)) return divide_by_masses(problem, mass_, lq_, a);
   if (!elimination_) elimination_ = std::make_unique<Elimination>(problem.size());
   Elimination& system = *elimination_;
-  problem.begin(t, q, v);
   system.solution.setZero();
   problem.residual(system.solution, system.right);
   problem.jacobian(system.solution, system.matrix.reshaped());

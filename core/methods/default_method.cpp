@@ -25,7 +25,7 @@ bool explicit_by_hamiltonian(const Scene& scene) {
 }
 
 int order_for(double error, int size) {
-  if (size <= 12) return error > 1e-5 ? 6 : error > 1e-9 ? 8 : 12;
+  if (size <= 12) return error > 1e-5 ? 6 : error > 2e-10 ? 8 : 12;
   if (size <= 30) return error > 1e-8 ? 6 : 8;
   return error > 1e-7 ? 4 : 6;
 }
@@ -62,10 +62,12 @@ DefaultMethod default_method(const Scene& scene, const MethodRequest& request) {
   const std::string order = "order " + std::to_string(p) + ": " + reason;
   if (size > request.large && p <= composition_orders.back() && explicit_at_the_ends(scene))
     return {"type1/trapezoidal", p,
-            "explicit here: more than " + std::to_string(request.large) + " unknowns, no rows; " + order};
+            "explicit here: more than " + std::to_string(request.large) + " unknowns, no rows; " + order, 0.0,
+            true};
   if (size > request.large && p <= composition_orders.back() && explicit_by_hamiltonian(scene))
     return {"type2/euler", p,
-            "explicit here: more than " + std::to_string(request.large) + " unknowns, no rows; " + order};
+            "explicit here: more than " + std::to_string(request.large) + " unknowns, no rows; " + order, 0.0,
+            true};
   return {"type1/gl:" + std::to_string(p / 2), p, order};
 }
 

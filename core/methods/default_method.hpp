@@ -23,7 +23,8 @@ struct DefaultMethod {
   std::string method;
   int order = 0;
   std::string reason;
-  double local_error = 0.0;  ///< of variable steps by their local error; 0 where the method takes none
+  double local_error = 0.0;     ///< of variable steps by their local error; 0 where the method takes none
+  bool explicit_steps = false;  ///< nothing is solved in a step
 };
 
 /// The method for a scene where none is named; damping_survey.hpp asks first for damping.  First the order p:
@@ -31,7 +32,7 @@ struct DefaultMethod {
 ///   an order was asked for             that one
 ///   an error e was asked for           p from e and the size n + m of the systems: what took least time to
 ///                                      reach e on the scenes of bench/error_control
-///                                        n + m ≤ 12   6 for e > 1e-5, 8 for e > 1e-9, else 12
+///                                        n + m ≤ 12   6 for e > 1e-5, 8 for e > 2e-10, else 12
 ///                                        n + m ≤ 30   6 for e > 1e-8, else 8
 ///                                        larger       4 for e > 1e-7, else 6
 ///   neither                            6, the lowest order that is near the least time for errors of 1e-3

@@ -86,6 +86,36 @@ void examine(const std::string& name, Tally& tally) {
   }
 }
 
+/// Steps that have to be followed from short ones are given up after a few, and no run is taken twice.
+TEST(ErrorControl, ASearchSolvesLittleMoreThanItsRuns) {
+  for (const auto& [name, error] :
+       {std::pair{"pendulum_cartesian", 1e-9}, {"ball_turntable", 1e-6}, {"contact_oscillator", 1e-6}}) {
+    const CatalogueScene scene = make_scene(name);
+    const ErrorControlReport report =
+        solve_to_error(scene.scene, Registry::with_built_ins(), kinsol(), scene.t_end, {.error = error});
+    ASSERT_TRUE(report.ok()) << name << ": " << report.refusal;
+    EXPECT_LE(report.work.solves, 6 * report.runs.back().solves) << name;
+    EXPECT_LT(reference_end(scene, scene.t_end).distance(report.end), error) << name;
+  }
+}
+
+TEST(ErrorControl, StepsThatAreTooLongAreGivenUp) {
+  const CatalogueScene scene = make_scene("pendulum_cartesian");
+  const ErrorControlReport report = solve_to_error(scene.scene, Registry::with_built_ins(), kinsol(),
+                                                   scene.t_end, {.error = 1e-6, .first_step = 0.33});
+  ASSERT_TRUE(report.ok()) << report.refusal;
+  EXPECT_NE(report.runs.front().failure.find("given up"), std::string::npos) << report.runs.front().failure;
+  EXPECT_LT(report.runs.front().solves, 300);
+}
+
+TEST(ErrorControl, ExplicitStepsDoNotVary) {
+  const CatalogueScene scene = make_scene("toda_200");
+  const ErrorControlReport report =
+      solve_to_error(scene.scene, Registry::with_built_ins(), kinsol(), scene.t_end, {.error = 1e-6});
+  ASSERT_TRUE(report.ok()) << report.refusal;
+  EXPECT_FALSE(report.adaptive) << "a variable step reads accelerations, and takes 25 times as long";
+}
+
 TEST(ErrorControl, KeepsItsWordOverTheCatalogue_slow) {
   Tally tally;
   for (const std::string& name : scene_names()) examine(name, tally);

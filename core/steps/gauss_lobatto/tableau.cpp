@@ -1,6 +1,8 @@
+#include <array>
 #include <cmath>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/steps/gauss_lobatto/tableau.hpp>
+#include <mutex>
 #include <numbers>
 #include <string>
 #include <vector>
@@ -110,8 +112,9 @@ ExtendedVector column(const Row& row) {
 
 }  // namespace
 
-ExtendedGaussLobattoTableau extended_gauss_lobatto_tableau(int s) {
-  if (s < 1 || s > 20) throw Misuse("GL(" + std::to_string(s) + "): the number of stages must be 1 to 20");
+namespace {
+
+ExtendedGaussLobattoTableau computed_tableau(int s) {
   const Row c = gauss_nodes(s), b = gauss_weights(c), lc = lobatto_nodes(s), lb = lobatto_weights(lc);
   ExtendedGaussLobattoTableau t{column(c),
                                 column(b),
@@ -136,8 +139,23 @@ ExtendedGaussLobattoTableau extended_gauss_lobatto_tableau(int s) {
   return t;
 }
 
+constexpr int stages_kept = 20;
+
+}  // namespace
+
+/// Each is computed once in a program: a search for an error makes ten integrators.
+const ExtendedGaussLobattoTableau& extended_gauss_lobatto_tableau(int s) {
+  if (s < 1 || s > stages_kept)
+    throw Misuse("GL(" + std::to_string(s) + "): the number of stages must be 1 to 20");
+  static std::array<std::once_flag, stages_kept> once;
+  static std::array<ExtendedGaussLobattoTableau, stages_kept> tableaux;
+  const auto at = static_cast<std::size_t>(s - 1);
+  std::call_once(once[at], [&] { tableaux[at] = computed_tableau(s); });
+  return tableaux[at];
+}
+
 GaussLobattoTableau gauss_lobatto_tableau(int s) {
-  const ExtendedGaussLobattoTableau t = extended_gauss_lobatto_tableau(s);
+  const ExtendedGaussLobattoTableau& t = extended_gauss_lobatto_tableau(s);
   return {t.c.cast<double>(), t.b.cast<double>(),     t.lobatto_c.cast<double>(), t.lobatto_b.cast<double>(),
           t.a.cast<double>(), t.a_hat.cast<double>(), t.lobatto_a.cast<double>(), t.e.cast<double>()};
 }

@@ -24,7 +24,7 @@ using ExtendedGaussLobattoTableau = GaussLobattoTableauOf<long double>;
 /// Throws Misuse unless 1 ≤ s ≤ 20.
 GaussLobattoTableau gauss_lobatto_tableau(int s);
 /// The same, not rounded.
-ExtendedGaussLobattoTableau extended_gauss_lobatto_tableau(int s);
+const ExtendedGaussLobattoTableau& extended_gauss_lobatto_tableau(int s);
 
 /// Values at `points` of the polynomials that are 1 at one of `nodes` and 0 at the others: one row a point,
 /// one column a node.

@@ -53,7 +53,7 @@ RadauTableau radau_tableau(int s) {
     throw Misuse("damped/radau:" + std::to_string(s) + ": the number of stages must be 1 to " +
                  std::to_string(most_radau_stages));
   const std::vector<Extended> nodes = radau_nodes(s);
-  const ExtendedGaussLobattoTableau gauss = extended_gauss_lobatto_tableau(s);
+  const ExtendedGaussLobattoTableau& gauss = extended_gauss_lobatto_tableau(s);
   RadauTableau table{Vector(s), Columns(s, s)};
   for (int i = 0; i < s; ++i) {
     const Extended end = nodes[static_cast<std::size_t>(i)];

@@ -37,6 +37,44 @@ TEST(Convergence, TakesTheErrorOfThreeRunsWhateverTheOrder) {
   EXPECT_FALSE(after(8, 1e-6, {1e-3, 3e-7}).accepted());
 }
 
+TEST(Convergence, RunsOfNearlyTheSameStepsAgreeForNoReason) {
+  const auto after_steps_of = [](double ratio) {
+    Convergence convergence(2, 1e-3);
+    convergence.add(1.0, std::nan(""));
+    convergence.add(ratio, 3e-4);
+    convergence.add(ratio * ratio, 2.5e-4);
+    return convergence;
+  };
+  EXPECT_TRUE(after_steps_of(0.5).accepted());
+  EXPECT_FALSE(after_steps_of(0.9).accepted()) << "the error of these runs may be 3e-3";
+}
+
+/// y(h) = h^4: runs of sizes 1, 1/4 and, put between the two later, 1/2.
+TEST(Convergence, ARunBetweenTwoTellsTheOrderAsAFinerOneDoes) {
+  Convergence convergence(4, 1e-2);
+  convergence.add(1.0, std::nan(""));
+  convergence.add(0.25, 1.0 - 1.0 / 256.0);
+  EXPECT_TRUE(std::isnan(convergence.observed_order()));
+  convergence.insert(1, 0.5, 1.0 - 1.0 / 16.0, 1.0 / 16.0 - 1.0 / 256.0);
+  EXPECT_EQ(convergence.runs(), 3u);
+  EXPECT_NEAR(convergence.observed_order(), 4.0, 1e-6);
+  EXPECT_NEAR(convergence.estimate(), 1.0 / 256.0, 1e-12);
+  EXPECT_FALSE(convergence.accepted()) << "one order alone";
+  EXPECT_EQ(convergence.confirmed_by_run_before(), 2u) << "between the coarser two it is cheaper";
+  const auto power = [](double h) { return h * h * h * h; };
+  const double middle = std::sqrt(0.5);
+  convergence.insert(2, middle, 1.0 - power(middle), power(middle) - power(0.5));
+  EXPECT_TRUE(convergence.order_confirmed());
+  EXPECT_TRUE(convergence.accepted());
+}
+
+TEST(Convergence, ARunBeforeConfirmsOnlyWhatIsGoodEnough) {
+  EXPECT_EQ(after(4, 1e-5, {1.6e-1, 1e-2}).confirmed_by_run_before(), 0u) << "the last run is too coarse";
+  EXPECT_EQ(after(4, 1e-2, {1e-4}).confirmed_by_run_before(), 1u);
+  EXPECT_EQ(after(8, 1e-2, {3.7e-1, 8e-3}).confirmed_by_run_before(), 0u) << "the order is another";
+  EXPECT_EQ(after(4, 1e-2, {std::nan("")}).confirmed_by_run_before(), 0u);
+}
+
 TEST(Convergence, NeverTakesWhatIsNoNumber) {
   EXPECT_FALSE(after(4, 1e-2, {std::nan(""), std::nan(""), std::nan("")}).accepted());
   EXPECT_FALSE(after(4, 1e-2, {1e-9, 1e-9, std::nan("")}).accepted());

@@ -85,7 +85,7 @@ TEST(DefaultMethod, AnErrorDecidesTheOrderAndTheOrderTheMethod) {
   };
   for (const auto& scene : testing::every_constraint_class()) {
     EXPECT_EQ(with_error(*scene, 1e-4).method, "type1/gl:3") << scene->name;
-    EXPECT_EQ(with_error(*scene, 1e-8).method, "type1/gl:4") << scene->name;
+    EXPECT_EQ(with_error(*scene, 1e-9).method, "type1/gl:4") << scene->name;
     EXPECT_EQ(with_error(*scene, 1e-10).method, "type1/gl:6") << scene->name;
   }
   EXPECT_EQ(with_error(*separable<20>(), 1e-7).order, 6);
@@ -94,10 +94,12 @@ TEST(DefaultMethod, AnErrorDecidesTheOrderAndTheOrderTheMethod) {
     const DefaultMethod choice = with_error(*separable<45>(), error);
     EXPECT_EQ(choice.method, "type1/trapezoidal") << "an error asked for is no reason for an implicit step";
     EXPECT_EQ(choice.order, error > 1e-7 ? 4 : 6);
+    EXPECT_TRUE(choice.explicit_steps);
     const DefaultMethod same = default_method(*separable<45>(), {.order = choice.order});
     EXPECT_EQ(same.method, choice.method);
   }
   EXPECT_EQ(with_error(*separable<45>(), 1e-6, 50).method, "type1/gl:2");
+  EXPECT_FALSE(with_error(*separable<45>(), 1e-6, 50).explicit_steps);
 }
 
 TEST(DefaultMethod, RefusesOrdersThatItHasNoMethodFor) {
