@@ -7,6 +7,7 @@ namespace diracstep {
 
 namespace {
 
+constexpr double unlike = 0.3;             // 1 − the ratio of steps from which runs may agree for no reason
 constexpr double safety = 2.5;             // between the estimate and the error asked for
 constexpr double aimed = 0.2;              // part of the error asked for that the next run aims at
 constexpr double round_off_alone = 1e-15;  // differences below this hold nothing else
@@ -71,7 +72,7 @@ bool Convergence::by_order() const { return order_confirmed() && safety * estima
 /// Whether a run and the one before differ so little that both may have the error asked for, if their steps
 /// are in this ratio.
 bool Convergence::agree(std::size_t k, double ratio) const {
-  const double likeness = std::max(1.0, 0.5 / (1.0 - ratio));
+  const double likeness = std::max(1.0, unlike / (1.0 - ratio));
   return safety * likeness * differences_[k - 1] <= error_;
 }
 

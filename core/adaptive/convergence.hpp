@@ -19,7 +19,7 @@ namespace diracstep {
 ///    below 3, with falling differences, and 2.5 times the estimate below the error asked for; or
 ///  * two differences in a row, those of three runs, below the error asked for divided by 2.5; where the
 ///  steps
-///    of two runs are in a ratio r above 1/2, their difference counts 0.5/(1 − r) times, since runs of any
+///    of two runs are in a ratio r above 0.7, their difference counts 0.3/(1 − r) times, since runs of any
 ///    order agree whose steps are nearly the same.
 ///
 /// The runs need not come in this order: one between two others may be cheaper than a finer one and says as

@@ -12,8 +12,9 @@ namespace {
 
 using detail::RefinementSearch;
 
-constexpr double cost_of_variable = 2.5;         // of a variable step beside a fixed one of the same method
-constexpr double lowest_of_median = 0.3;         // MonitorScales::lowest
+constexpr double cost_of_variable = 2.5;       // of a variable step beside a fixed one of the same method
+constexpr double variable_over_median = 15.0;  // of max ω, from which they do: at 5 to 11 either kind may win
+constexpr double lowest_of_median = 0.3;       // MonitorScales::lowest
 constexpr double ratio_beside_explicit = 100.0;  // max ω / min ω from which variable steps may save any time
 constexpr double error_near_round_off = 1e-11;
 constexpr double first_parts = 10.0;       // of the work allowed, of which the first run takes one
@@ -88,12 +89,12 @@ ErrorControlReport search_both(const RefinementSearch::Motion& motion, const Err
   return fixed;
 }
 
-/// Whether variable steps may take less time: their number goes with the mean rate, that of fixed ones with
-/// the largest.
+/// Whether variable steps may take so much less time that it pays to measure it: their number goes with the
+/// mean rate, that of fixed ones with the largest.
 bool variable_steps_may_pay(const RateSurvey& survey, bool explicit_steps) {
   if (explicit_steps) return survey.ratio() > ratio_beside_explicit;
   return survey.variable_steps_pay() &&
-         survey.fastest * lowest_of_median > cost_of_variable * survey.scales.lowest;
+         survey.fastest * lowest_of_median > variable_over_median * survey.scales.lowest;
 }
 
 /// What is decided before the search, beside what its report says.

@@ -207,7 +207,8 @@ RefinementSearch::Outcome RefinementSearch::run(long refinement) {
   last_refinement_ = refinement;
   const bool first = convergence_.runs() == 0;
   std::vector<PathPoint> path;
-  Passed passed = pass(refinement, now, first && divisions_ == 0 && !local_ ? &path : nullptr);
+  const bool shows_the_way = (first || report_.adaptive) && divisions_ == 0 && !local_;
+  Passed passed = pass(refinement, now, shows_the_way ? &path : nullptr);
   if (passed.outcome != Outcome::counts) return passed.outcome;
   const long steps = passed.work.steps;
   if (report_.adaptive && (steps < fewest_steps || steps <= last_steps_)) {
@@ -216,12 +217,11 @@ RefinementSearch::Outcome RefinementSearch::run(long refinement) {
   }
   last_steps_ = steps;
   doubt_ = std::move(passed.doubt);
-  if (first) {
+  if (shows_the_way) path_ = std::move(path);
+  if (first)
     coarsest_ = {refinement, steps, passed.end};
-    path_ = std::move(path);
-  } else {
+  else
     now.difference = difference(passed.end, report_.end);
-  }
   convergence_.add(local_ ? first_ / static_cast<double>(refinement) : now.step, now.difference);
   report_.end = passed.end;
   if (last_.size() == runs_kept) last_.erase(last_.begin());
@@ -370,10 +370,11 @@ std::vector<PathPoint> RefinementSearch::path_of(long refinement) {
 /// search is refused.
 bool RefinementSearch::survey(bool accepted) {
   surveyed_ = true;
-  if (local_) return true;                // such steps are short where the forces change fast
+  if (local_) return true;  // such steps are short where the forces change fast
   if (motion_.scene->space) return true;  // the paths between points are those of R^n
-  // A coarse run shows the way; after a division a fine one, for the place of a kink depends on the motion.
-  const long way = divisions_ == 0 ? coarsest_.refinement : refinement_;
+  // A coarse run with fixed steps shows the way; the last one after a division, for the place of a kink
+  // depends on the motion, and with variable steps, which may be far longer than what they follow.
+  const long way = divisions_ == 0 && !report_.adaptive ? coarsest_.refinement : refinement_;
   const std::vector<PathPoint> path = divisions_ == 0 ? path_ : path_of(way);
   if (path.size() < 2 || !reached_end(path.back().time))
     return refuse("the time was used up before the forces along the motion were surveyed (--max-time)");

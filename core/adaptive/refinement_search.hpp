@@ -91,7 +91,7 @@ class RefinementSearch {
   long unit_;  ///< refinement of the coarsest run: above 1 there are sizes between those of two runs
   long refinement_, last_steps_ = 0, last_refinement_ = 1;
   Counted coarsest_{};                ///< of the runs that count
-  std::vector<PathPoint> path_ = {};  ///< of that run
+  std::vector<PathPoint> path_ = {};  ///< of that run, or of the last one with variable steps
   std::vector<Counted> last_ = {};    ///< the last three runs that count, the finest at the end
   double largest_position_ = 0.0, largest_momentum_ = 0.0, largest_velocity_ = 0.0;  ///< at the nodes read
   int failures_ = 0, divisions_ = 0;

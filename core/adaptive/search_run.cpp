@@ -6,9 +6,15 @@ namespace diracstep::detail {
 
 namespace {
 
-StepReport run_fixed(Integrator& integrator, const ErrorControlReport::Steps& steps, const AtNode& at_node) {
+constexpr double rounding_of_time = 1e-12;  // of the time of a node, in parts of the motion
+
+StepReport run_fixed(Integrator& integrator, const ErrorControlReport::Steps& steps, double end,
+                     const AtNode& at_node) {
+  const double span = std::abs(end - integrator.time());
   const ReadNode read = [&](Momentum momentum, Sample& sample) {
-    return integrator.sample(momentum, sample);
+    const SolveReport report = integrator.sample(momentum, sample);
+    if (std::abs(sample.time - end) <= rounding_of_time * span) sample.time = end;
+    return report;
   };
   if (!at_node(read, false)) return {};
   long left = steps.plan.steps() * steps.refinement;
@@ -74,7 +80,7 @@ StepReport run_steps_of(const std::shared_ptr<const Scene>& scene, const Registr
     work.jacobian_evaluations += integrator.side_work().jacobian_evaluations;
   } else {
     Integrator integrator(scene, registry, solvers, steps.integrator);
-    report = run_fixed(integrator, steps, [&](const ReadNode& read, bool last) {
+    report = run_fixed(integrator, steps, end, [&](const ReadNode& read, bool last) {
       work = integrator.work();
       return at_node(read, last);
     });
