@@ -128,7 +128,7 @@ TEST_F(Events, BadOnesAreToldWithTheirPlace) {
   expect_misuse("run " + ball("[[events]]\nname = \"a\"\nwhen = \"y\"\ndirection = \"up\"\n"),
                 {"ball.toml:16", "rising"});
   const std::string one = ball("[[events]]\nname = \"a\"\nwhen = \"y\"\n");
-  expect_misuse("run " + one + " --error 1e-6", {"--error", "events"});
+  expect_misuse("run " + one + " --error 1e-6 --adaptive", {"--error", "events"});
 }
 
 }  // namespace

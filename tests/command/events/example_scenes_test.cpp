@@ -74,14 +74,14 @@ TEST_F(ExampleScenes, APointLeavesASphere) {
   const double sine = std::sqrt(1.0 - cosine * cosine), speed = std::sqrt(g * radius * cosine);
   const double sinks = speed * sine, drop = radius * (1.0 + cosine);
   const double falls = (std::sqrt(sinks * sinks + 2.0 * g * drop) - sinks) / g;
-  const double lands = radius * sine + speed * cosine * falls;
+  const double landing = radius * sine + speed * cosine * falls;
   for (const auto& [options, error] : {std::pair{"", 1e-11},
                                        {"--adaptive", 1e-7},
-                                       {"--error 1e-6 --method type1/midpoint --step 0.1", 1e-6 * lands}}) {
+                                       {"--error 1e-6 --method type1/midpoint --step 0.1", 1e-6 * landing}}) {
     const auto json = result("leaving_a_sphere", options);
     ASSERT_EQ(json["events"].size(), 2U) << options;
     EXPECT_NEAR(json["events"][0]["q"]["y"].get<double>(), radius * cosine, error) << options;
-    EXPECT_NEAR(end_of(json, "q", "x"), lands, error) << options;
+    EXPECT_NEAR(end_of(json, "q", "x"), landing, error) << options;
     EXPECT_NEAR(json["events"][1]["t"].get<double>() - json["events"][0]["t"].get<double>(), falls, error)
         << options;
   }
