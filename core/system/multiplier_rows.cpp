@@ -1,3 +1,4 @@
+#include <Eigen/LU>
 #include <cmath>
 #include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/core/system/lagrangian_derivatives.hpp>
@@ -110,6 +111,10 @@ bool are_multipliers(const Scene& scene, const Columns& directions) {
     LagrangianDerivatives at(l);
     at.take_second(l, t, q, v);
     const Columns qq = l.pattern().full(at.qq), qv = l.pattern().full(at.qv);
+    const Columns factors = directions.transpose() * qq;  // ∂g/∂q, of independent rows
+    Eigen::FullPivLU<Columns> lu;
+    lu.setThreshold(1e-9);
+    if (vanishes_beside(factors, qq) || lu.compute(factors).rank() < directions.cols()) return false;
     Vector rate(n);
     l.position_gradient_rate(t, q, v, rate);
     if (!vanishes_beside(directions.transpose() * qq * directions, qq) ||
