@@ -61,7 +61,7 @@ TEST(Convergence, ARunBetweenTwoTellsTheOrderAsAFinerOneDoes) {
   EXPECT_NEAR(convergence.estimate(), 1.0 / 256.0, 1e-12);
   EXPECT_FALSE(convergence.accepted()) << "one order alone";
   EXPECT_EQ(convergence.confirmed_by_run_before(), 2u) << "between the coarser two it is cheaper";
-  const auto power = [](double h) { return h * h * h * h; };
+  const auto power = [](double size) { return size * size * size * size; };
   const double middle = std::sqrt(0.5);
   convergence.insert(2, middle, 1.0 - power(middle), power(middle) - power(0.5));
   EXPECT_TRUE(convergence.order_confirmed());

@@ -42,13 +42,13 @@ TEST_P(OnGroups, VariableStepsConvergeWithTheOrderOfTheirMethod) {
 }
 
 TEST_P(OnGroups, TheErrorAskedForIsReached) {
-  ErrorControlOptions options;
+  ErrorControlOptions asked;
   // Runs of different steps turn the frame of a sphere differently, by what falls with h²: they agree late.
-  options.error = GetParam().scene->space->turns().empty() ? 1e-7 : 1e-4;
+  asked.error = GetParam().scene->space->turns().empty() ? 1e-7 : 1e-4;
   const ErrorControlReport report =
-      solve_to_error(GetParam().scene, Registry::with_built_ins(), kinsol(), 2.0, options);
+      solve_to_error(GetParam().scene, Registry::with_built_ins(), kinsol(), 2.0, asked);
   ASSERT_TRUE(report.ok()) << report.refusal;
-  EXPECT_LT(error_of(report.end), options.error);
+  EXPECT_LT(error_of(report.end), asked.error);
 }
 
 TEST_P(OnGroups, RunsPassTheirChecks) {
