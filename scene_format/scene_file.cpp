@@ -512,7 +512,7 @@ ParametricScene parametric_scene_from_text(const std::string& file, const std::s
 struct SceneFile::Compiled {
   std::string file, text;
   std::shared_ptr<const CompiledScene> usual, as_written;
-  std::once_flag written;  ///< the latter, made where some values need it
+  std::mutex writing;  ///< the latter, made where some values need it
 };
 
 SceneFile::SceneFile(std::string file, std::string text) : compiled_(std::make_shared<Compiled>()) {
@@ -525,10 +525,10 @@ CatalogueScene SceneFile::load(const Parameters& changes) const {
   try {
     return diracstep::load(compiled_->usual, changes);
   } catch (const ConstantOutOfRange&) {
-    std::call_once(compiled_->written, [&] {
+    const std::scoped_lock lock(compiled_->writing);
+    if (!compiled_->as_written)
       compiled_->as_written =
           std::make_shared<const CompiledScene>(compile_scene(compiled_->file, compiled_->text, true));
-    });
     return diracstep::load(compiled_->as_written, changes);
   }
 }

@@ -4,6 +4,7 @@
 #include <diracstep/core/steps/gauss_lobatto/tableau.hpp>
 #include <mutex>
 #include <numbers>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -147,11 +148,12 @@ constexpr int stages_kept = 20;
 const ExtendedGaussLobattoTableau& extended_gauss_lobatto_tableau(int s) {
   if (s < 1 || s > stages_kept)
     throw Misuse("GL(" + std::to_string(s) + "): the number of stages must be 1 to 20");
-  static std::array<std::once_flag, stages_kept> once;
-  static std::array<ExtendedGaussLobattoTableau, stages_kept> tableaux;
-  const auto at = static_cast<std::size_t>(s - 1);
-  std::call_once(once[at], [&] { tableaux[at] = computed_tableau(s); });
-  return tableaux[at];
+  static std::mutex one_at_a_time;  // glibc aborts where what std::call_once calls throws and memory is short
+  static std::array<std::optional<ExtendedGaussLobattoTableau>, stages_kept> tableaux;
+  const std::scoped_lock lock(one_at_a_time);
+  auto& tableau = tableaux[static_cast<std::size_t>(s - 1)];
+  if (!tableau) tableau = computed_tableau(s);
+  return *tableau;
 }
 
 GaussLobattoTableau gauss_lobatto_tableau(int s) {
