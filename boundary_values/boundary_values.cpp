@@ -127,6 +127,15 @@ void add_family(const Solved& of, BoundaryReport& report) {
   });
 }
 
+/// Of the step from the integrator's point: the steps of the search are not divided at kinks, as a run is.
+std::string kink_on_the_way(Integrator& integrator, double size) {
+  if (!integrator.step(size).ok() || integrator.kinks_passed().empty()) return "";
+  return "the motion crosses a kink of the formulas at t = " +
+         to_text(integrator.kinks_passed().front().time) +
+         ", where a run divides its step and this search does not: a run from this start ends elsewhere; "
+         "compare with more steps";
+}
+
 /// Positions, velocities and projected momenta at the ends of the steps.
 void add_points(const Solved& of, BoundaryReport& report) {
   const std::vector<MotionEquations::Node> nodes = of.equations.nodes(of.u);
@@ -148,8 +157,10 @@ void add_points(const Solved& of, BoundaryReport& report) {
     report.v.col(k) = sample.v;
     report.p.col(k) = sample.p;
     energy.see(sample);
+    if (report.doubt.empty() && k + 1 < count && of.equations.scene().kinks)
+      report.doubt = kink_on_the_way(of.integrator, other.t - node.t);
   }
-  report.doubt = energy.text();
+  if (report.doubt.empty()) report.doubt = energy.text();
 }
 
 }  // namespace

@@ -62,6 +62,7 @@ int diracstep_differentiate(const diracstep_model* model, diracstep_integrator* 
       z << sensitivities.by_position(), sensitivities.by_velocity(), sensitivities.by_parameters();
       const StepReport report = sensitivities.jvp(wanted.steps, z);
       if (!report.ok()) throw Failure(report.failure);
+      integrator->doubt = sensitivities.doubt();
       const ReadDirections read = sensitivities.read(z);
       write(read.q, wanted.q, "q");
       write(read.v, wanted.v, "v");
@@ -74,6 +75,7 @@ int diracstep_differentiate(const diracstep_model* model, diracstep_integrator* 
       return read;
     });
     if (!gradient.report.ok()) throw Failure(gradient.report.failure);
+    integrator->doubt = sensitivities.doubt();
     write(gradient.by_start.q0, wanted.q, "q");
     write(gradient.by_start.v0, wanted.v, "v");
     if (wanted.parameters > 0) write(gradient.by_start.parameters, wanted.by_parameters, "parameters");

@@ -25,8 +25,8 @@ class RunSensitivities {
   RunSensitivities(const std::vector<std::string>& wanted, const ParametricScene& scene,
                    const Registry& registry, Integrator& integrator);
 
-  /// Of the scene: see ParametricScene::doubt.
-  const std::string& doubt() const { return doubt_; }
+  /// Of the scene or of the steps: see ParametricScene::doubt, Sensitivities::doubt.
+  const std::string& doubt() const { return doubt_.empty() ? sensitivities_.doubt() : doubt_; }
 
   /// After each step of the integrator.
   void follow_step();

@@ -25,6 +25,33 @@ Integrator& in_flat_space(Integrator& integrator) {
 
 }  // namespace
 
+namespace {
+
+/// Whether the force jumps where the motion crosses a kink, so that its values a little before and behind it
+/// do not come together.
+bool force_jumps(const Integrator& integrator, const KinkPassed& kink) {
+  constexpr double near = 1e-6, nearer = 1e-7;  // of a step
+  const Scene& scene = integrator.scene();
+  const Eigen::Index n = kink.at.q.size();
+  const double size = std::abs(integrator.options().step), left = integrator.time() - kink.time;
+  const Vector bend =
+      left != 0.0 ? Vector((integrator.velocity_estimate() - kink.at.v) / left) : Vector::Zero(n);
+  const auto force_at = [&](double away) {
+    const Vector q = kink.at.q + away * kink.at.v, v = kink.at.v + away * bend;
+    Vector force(n), momentum(n), more(n);
+    scene.force_and_momentum(kink.time, q, v, kink.at.p, force, momentum);
+    if (scene.force) {
+      scene.force->value(kink.time, q, v, more);
+      force += more;
+    }
+    return force;
+  };
+  const auto apart = [&](double part) { return max_norm(force_at(part * size) - force_at(-part * size)); };
+  return apart(nearer) > 0.5 * apart(near);
+}
+
+}  // namespace
+
 struct Sensitivities::Parts {
   Parts(Integrator& of, const Registry& registry, const ParametricScene& parametric)
       : integrator(in_flat_space(of)),
@@ -59,12 +86,21 @@ struct Sensitivities::Parts {
     return std::max(1L, std::lround(std::sqrt(static_cast<double>(steps))));
   }
 
+  /// After a step: a crossing of a jump of the force is told.
+  void note_kinks() {
+    for (const KinkPassed& kink : integrator.kinks_passed())
+      if (doubt.empty() && force_jumps(integrator, kink))
+        doubt = "the motion crosses a jump of the force at t = " + to_text(kink.time) +
+                ", whose time moves with the start and the parameters: the derivatives leave that out";
+  }
+
   Integrator& integrator;
   ParametricScene scene;
   std::unique_ptr<sensitivity::LinearisedMotion> motion;
   double time;
   Vector q, p, v;
   Sample sample;
+  std::string doubt;
 };
 
 Sensitivities::Sensitivities(Integrator& integrator, const Registry& registry, const ParametricScene& scene) {
@@ -78,6 +114,7 @@ Sensitivities::~Sensitivities() {
 }
 Sensitivities::Sensitivities(Sensitivities&&) noexcept = default;
 
+const std::string& Sensitivities::doubt() const { return parts_->doubt; }
 const Scene& Sensitivities::scene() const { return parts_->integrator.scene(); }
 int Sensitivities::coordinates() const { return parts_->n(); }
 int Sensitivities::parameters() const { return parts_->count(); }
@@ -125,6 +162,7 @@ StepReport Sensitivities::step(Directions& z) {
 
 void Sensitivities::follow(Directions& z) {
   require_size("directions: rows", z.rows(), 2 * coordinates() + parameters());
+  parts_->note_kinks();
   parts_->motion->push(parts_->integrator.solved_stages(), z);
 }
 
@@ -177,6 +215,7 @@ Sensitivities::Gradient Sensitivities::gradient(long steps, const Cotangent& cot
     if (k == 1 && interval < steps) segment.clear();  // all but the last are taken again
     result.report = integrator.step();
     if (!result.report.ok()) return result;
+    parts.note_kinks();
     if (k == 0 || k >= (steps - 1) / interval * interval) keep_step(k);
   }
   const Snapshot end = integrator.save();

@@ -38,8 +38,9 @@ struct StartGradient {
 /// 2016, arXiv 1503.04021).  The motion has the same bits with and without.
 ///
 /// A start moved off the rows is no start of a motion: directions dq0 with A dq0 ≠ 0 mean the formulas of the
-/// step there.  Not differentiated: when a kink or an event is met, and steps that vary.  Throws Misuse for
-/// discrete rows of one's own, which state no derivative by q0.
+/// step there.  Not differentiated: when a kink or an event is met, which changes nothing unless the force
+/// jumps there (doubt()), and steps that vary.  Throws Misuse for discrete rows of one's own, which state no
+/// derivative by q0.
 class Sensitivities {
  public:
   /// Of the motion from the current point of the integrator on, which outlives this and is stepped by it.
@@ -52,6 +53,8 @@ class Sensitivities {
   const Scene& scene() const;  ///< as it is stepped
   int coordinates() const;
   int parameters() const;
+  /// Empty, or what the derivatives of the steps so far lack: a jump of the force was crossed.
+  const std::string& doubt() const;
 
   /// Directions at the start: dq0, dv0 and dθ, n×k and P×k; dp0 = ∂(∂L/∂v).  Those of θ do not move the
   /// start.

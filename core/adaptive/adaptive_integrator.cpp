@@ -13,6 +13,7 @@ namespace diracstep {
 
 namespace {
 
+constexpr double longest_of_driven = 10.0;  // steps of the options: a step without error may pass a drive by
 constexpr double lowest_ratio = 0.8, highest_ratio = 1.25;  // of z to ω before the guard acts
 constexpr double size_tolerance = 1e-10;  // relative, of an equation in the step: below it is round-off
 constexpr int max_sizes = 30;             // tried for one step
@@ -110,6 +111,8 @@ AdaptiveIntegrator::AdaptiveIntegrator(const std::shared_ptr<const Scene>& scene
     whole_.emplace(std::make_shared<const Scene>(main_.scene()), registry, solvers, options_);
     local_.emplace(adaptive_.eps, main_.options().order, span(), adaptive_.smallest_step);
     if (adaptive_.end) instants_ = instants_on_the_way(main_.scene(), *adaptive_.end);
+    if (adaptive_.end && depends_on_time(main_.scene(), *adaptive_.end))
+      longest_ = longest_of_driven * std::abs(options_.step);
   } else {
     meter_.emplace(make_meter(main_.scene(), solvers, adaptive_, options_.step, report_.accelerations));
   }

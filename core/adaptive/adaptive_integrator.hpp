@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <diracstep/core/adaptive/local_error.hpp>
 #include <diracstep/core/adaptive/rate_monitor.hpp>
 #include <diracstep/core/integrator/integrator.hpp>
@@ -70,7 +71,8 @@ struct ControlReport {
 /// to that time, with the full order of the method, and leaves the main sequence untouched bit by bit.
 class AdaptiveIntegrator {
  public:
-  /// The sign of options.step is the direction; its size matters only for the survey without an end.  Throws
+  /// The sign of options.step is the direction; its size matters for the survey without an end, and for steps
+  /// by their local error where the scene depends on the time: those are at most ten times as long.  Throws
   /// Misuse as Integrator does, for a method that is neither self-adjoint (composed ones are) nor of the
   /// damping family, for a control that is not one of the method's, for a negative eps, and with a
   /// self-adjoint method for a monitor that is not positive or not even in v, and for a Lagrangian linear in
@@ -133,6 +135,7 @@ class AdaptiveIntegrator {
   std::vector<double> fractions_;  ///< of eps, where each part of a composition solves for its size
   Integrator main_, side_;
   std::optional<LocalErrorControl> local_;  ///< one of the two
+  double longest_ = HUGE_VAL;               ///< of steps by local error, without sign
   std::optional<RateMeter> meter_;
   std::optional<Integrator> whole_;  ///< the whole steps beside halves of them
   Work local_work_;                  ///< of these and of the main sequence

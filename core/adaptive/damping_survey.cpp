@@ -38,7 +38,7 @@ class LinearisedMotion {
   Rates rates(const Sample& at) {
     const Vector here = state(at);
     sizes_ = sizes_.cwiseMax(here.cwiseAbs());
-    if (max_norm(sizes_.head(n_)) == 0.0 || max_norm(sizes_.tail(n_)) == 0.0) return {};
+    if (max_norm(sizes_.head(n_)) == 0.0 || max_norm(sizes_.tail(n_)) == 0.0 || !damps(at)) return {};
     take_units();
     const Columns basis = tangent_space(at);
     Rates largest;
@@ -58,6 +58,15 @@ class LinearisedMotion {
   }
 
  private:
+  /// A force without velocities dissipates nothing, although a motion that it drives has rates with real
+  /// parts.
+  bool damps(const Sample& at) {
+    by_position_.setZero(scene_.force->pattern().nonzeros());
+    by_velocity_.setZero(by_position_.size());
+    scene_.force->derivatives(at.time, at.q, at.v, by_position_, by_velocity_);
+    return !(max_norm(by_velocity_) == 0.0);
+  }
+
   Vector state(const Sample& at) const {
     Vector both(2 * n_);
     both << at.q, at.v;
@@ -111,7 +120,7 @@ class LinearisedMotion {
   const Scene& scene_;
   Eigen::Index n_;
   PointwiseMotion motion_;
-  Vector sizes_, units_;
+  Vector sizes_, units_, by_position_, by_velocity_;
 };
 
 /// A motion without mass, whose velocity is a function v(t, q): linearised about its points, δq̇ = ∂v/∂q δq.

@@ -3,7 +3,9 @@
 #include <diracstep/core/adaptive/local_error.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/numerics/scales.hpp>
+#include <diracstep/core/system/constraint_distribution.hpp>
 #include <limits>
+#include <numbers>
 
 namespace diracstep {
 
@@ -36,6 +38,29 @@ std::vector<double> instants_on_the_way(const Scene& scene, double end) {
   if (all.size() > most_instants) all.clear();
   if (end < start) std::ranges::reverse(all);
   return all;
+}
+
+bool depends_on_time(const Scene& scene, double end) {
+  constexpr int times = 32;
+  const Start& start = scene.start;
+  const int n = scene.dimension();
+  ConstraintsAtPoint rows(scene.constraints, n);
+  const auto values = [&](double t) {
+    Vector lq(n), p(n), force = Vector::Zero(n), offsets(scene.rows());
+    scene.force_and_momentum(t, start.q, start.v, start.p, lq, p);
+    if (scene.force) scene.force->value(t, start.q, start.v, force);
+    if (scene.rows() > 0) rows.evaluate(t, start.q);
+    Vector all(3 * n + scene.rows());
+    all << lq, p, force, (scene.rows() > 0 ? Vector(rows.offsets()) : offsets);
+    return all;
+  };
+  const Vector first = values(start.time);
+  for (int k = 1; k <= times; ++k) {
+    const double part = std::fmod(k * std::numbers::phi, 1.0);  // no multiple of a period
+    const Vector then = values(start.time + part * (end - start.time));
+    if (!(then.array() == first.array()).all()) return true;
+  }
+  return false;
 }
 
 LocalErrorControl::LocalErrorControl(double eps, int order, double span, double smallest)

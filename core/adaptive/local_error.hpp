@@ -11,6 +11,9 @@ namespace diracstep {
 /// tried first.
 std::vector<double> instants_on_the_way(const Scene& scene, double end);
 
+/// Whether L, the force or the rows at the start depend on the time between it and `end`, at 32 times there.
+bool depends_on_time(const Scene& scene, double end);
+
 /// The size of ordinary variable steps, by their local error: for methods of the damping family, which are
 /// not reversible at any size.
 ///

@@ -39,8 +39,9 @@ void AdaptiveIntegrator::go_on_local_control() {
   next_size_ = up_to_instant(sign_ * std::min(std::abs(next_size_), local_->first_size()));
 }
 
-/// The size, or a part of what is left to the next instant.
+/// The size where it is none of the longest, or a part of what is left to the next instant.
 double AdaptiveIntegrator::up_to_instant(double size) const {
+  if (std::abs(size) > longest_) size = sign_ * longest_;
   if (instant_ == instants_.size()) return size;
   const double left = instants_[instant_] - main_.time();
   if (std::abs(size) < 0.5 * std::abs(left)) return size;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <diracstep/core/integrator/integrator.hpp>
 #include <diracstep/core/system/event.hpp>
 #include <functional>
@@ -42,6 +43,8 @@ class EventSearch {
   std::vector<EventHit>& met() { return met_; }
   /// The events whose functions vanish where the last of met() acts, whether their conditions hold or not.
   const std::vector<std::size_t>& at_zero() const { return at_zero_; }
+  /// Whether a value of the function of one of these is a zero to round-off.
+  bool is_zero(std::size_t event, double value) const { return std::abs(value) <= watches_[event].zero; }
 
   /// Where a run goes on after events that acted: `left` names a contact and the rate at which it was left.
   struct Left {

@@ -339,12 +339,15 @@ StepReport EventSteps<Stepper>::act(std::vector<EventHit> met) {
   return {};
 }
 
-/// Another event whose function of the configuration vanishes there as well.
+/// Another event whose function of the configuration vanishes there as well, and still does behind what
+/// acted.
 template <class Stepper>
 void EventSteps<Stepper>::add_left(std::size_t number, std::vector<EventSearch::Left>& left) const {
   constexpr double round_off = 1e-12;
   const Event& event = events()[number];
-  if (!event.contact || std::ranges::find(left, number, &EventSearch::Left::event) != left.end()) return;
+  if (!event.contact || !search_.is_zero(number, event.at(after_.point())) ||
+      std::ranges::find(left, number, &EventSearch::Left::event) != left.end())
+    return;
   const double rate = EventActions::contact_rate(event, after_);
   if (std::abs(rate) > round_off * after_.v.template lpNorm<Eigen::Infinity>())
     left.push_back({number, rate});

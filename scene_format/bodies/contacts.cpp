@@ -111,16 +111,18 @@ void Mechanics::add_contact_on_surface(const Contact& contact) {
   const std::string& name = contact.name;
   const std::string x = name + "_x", y = name + "_y", h = name + "_h", angle = name + "_around";
   made_.definitions.push_back({h, with_point(*contact.surface, x, y), contact.source});
-  const auto add_coordinate = [&](const std::string& coordinate, const char* unit, const Formula& start) {
+  const auto add_coordinate = [&](const std::string& coordinate, const char* unit, const Formula& start,
+                                  bool given) {
     made_.coordinates.push_back({coordinate, unit, "point of contact of " + name, contact.source});
     if (!start.is(0.0)) made_.start.push_back({coordinate, start.text(), contact.source});
-    guess(coordinate, false);
+    if (!given) guess(coordinate, false);
     guess(coordinate, true);
   };
+  const bool given = contact.start.has_value();
   const Touch at_start = touch_of(contact, of.start);
-  add_coordinate(x, "m", contact.start ? (*contact.start)[0] : at_start.centre[0]);
-  add_coordinate(y, "m", contact.start ? (*contact.start)[1] : at_start.centre[1]);
-  if (contact.start)
+  add_coordinate(x, "m", contact.start ? (*contact.start)[0] : at_start.centre[0], given);
+  add_coordinate(y, "m", contact.start ? (*contact.start)[1] : at_start.centre[1], given);
+  if (given)
     for (const char* axis : {"_x", "_y", "_z"}) guess(body(contact.body).name + axis, false);
 
   const Formula slope_x = Formula::name(fmt::format("diff({}, {})", h, x)),
@@ -135,7 +137,8 @@ void Mechanics::add_contact_on_surface(const Contact& contact) {
     const Formula low1 = at_start.e1[2], low2 = at_start.e2[2];
     add_coordinate(
         angle, "rad",
-        {fmt::format("atan2({}, {})", (-low2).text(), (-low1).text()), std::nan(""), Formula::Level::atom});
+        {fmt::format("atan2({}, {})", (-low2).text(), (-low1).text()), std::nan(""), Formula::Level::atom},
+        false);
     const Formula cosine = Formula::name("cos(" + angle + ')'), sine = Formula::name("sin(" + angle + ')');
     touch.e1 = define(name + "_e1", touch.e1, contact.source);
     touch.e2 = define(name + "_e2", touch.e2, contact.source);

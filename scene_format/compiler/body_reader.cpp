@@ -352,6 +352,26 @@ void BodyReader::read_inertia(const toml::table& table, Body& body, const std::s
           fmt::format("'inertia' of {}: {:g} is more than the sum of the others, {:g}, which no body has",
                       what, moment(k), others));
   }
+  // ∫ρ x xᵀ = tr/2 − J is not negative for any density, and J is above 0 where it is not 0.
+  const auto at = [&](std::size_t i, std::size_t k) { return body.inertia[i][k].value(); };
+  const double half_trace = 0.5 * (at(0, 0) + at(1, 1) + at(2, 2));
+  const auto spread = [&](std::size_t i, std::size_t k) { return (i == k ? half_trace : 0.0) - at(i, k); };
+  const auto least_minor = [](const auto& matrix) {
+    const auto minor = [&](std::size_t i, std::size_t k) {
+      return matrix(i, i) * matrix(k, k) - matrix(i, k) * matrix(i, k);
+    };
+    const double determinant = matrix(0, 0) * minor(1, 2) +
+                               matrix(0, 1) * (matrix(0, 2) * matrix(1, 2) - matrix(0, 1) * matrix(2, 2)) +
+                               matrix(0, 2) * (matrix(0, 1) * matrix(1, 2) - matrix(1, 1) * matrix(0, 2));
+    const double size = matrix(0, 0) + matrix(1, 1) + matrix(2, 2);
+    return std::min({minor(0, 1) / (size * size), minor(0, 2) / (size * size), minor(1, 2) / (size * size),
+                     determinant / (size * size * size)});
+  };
+  if (!(least_minor(at) > 0.0) || !(least_minor(spread) > -1e-12))
+    tables_.fail(place_of(node->source()),
+                 fmt::format("'inertia' of {}: the principal moments of these six are not above 0, or one is "
+                             "more than the sum of the others, which no body has",
+                             what));
 }
 
 void BodyReader::read_orientation(const toml::node& node, Body& body, const std::string& what) {

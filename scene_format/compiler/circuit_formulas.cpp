@@ -521,7 +521,7 @@ Node CircuitFormulas::drop(const Branch& branch, Node index, bool positions_only
     const Node size = resistance(branch, index);
     if (size != none) {
       own = graph_.multiply(size, current(branch, index));
-    } else {
+    } else if (branch.has("voltage")) {
       Context where = context(branch, index, "voltage", true);
       where.locals.emplace("i", current(branch, index));
       own = parser_.formula(branch.values.find("voltage")->second, where);

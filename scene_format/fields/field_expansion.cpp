@@ -81,6 +81,8 @@ class FieldExpansion {
         if (reference.is_table()) expand_entries(*reference.as_table(), true);
     add("sizes", "cells", cells());
     add("definitions", "dx", fmt::format("({})/cells", grid_.length));
+    if (!root_.contains("recommended"))
+      add("recommended", "method", "type1/gl:3");  // explicit ones have a limit
     root_.erase("field");
   }
 
@@ -99,6 +101,8 @@ class FieldExpansion {
     }
     grid_.from = text_of(stated(), "from", "0");
     grid_.length = required_formula(stated(), "length");
+    if (const auto length = stated()["length"].value<double>(); length && !(*length > 0.0))
+      fail(*stated().get("length"), "'length': expected a number above 0");
     grid_.periodic = stated().contains("boundary") && text_of(stated(), "boundary", "") == "periodic";
     for (const auto& [name, node] : entries_of(root_, "coordinates"))
       if (const auto* entry = node->as_table(); entry != nullptr && !entry->contains("for"))
