@@ -144,11 +144,12 @@ bool StepDivision::follow(const State& start, Work& work) {
       }
       changes_ = (after_ - before_).cwiseAbs();
       int number = first_change(), last = -1;
-      // Each function once: several vanish together, as those of v > 0 and v < 0.
+      // Each function once: several vanish together, as those of v > 0 and v < 0, and round-off lets each seem
+      // to come first.
       for (int k = 0; k < kinks_->count() && number >= 0 && std::abs(part.size) > finest_part * whole; ++k) {
         last = number;
         if (!shorten(number, part, from, work)) return give_up(number, part.start);
-        after_[number] = before_[number];  // crossed at the end; what else changed before it?
+        before_[number] = 0.0;  // crossed at the end; what else changed before it?
         number = first_change();
       }
       const bool returned = last >= 0 && last == crossed && std::abs(part.size) <= returned_within * whole;
