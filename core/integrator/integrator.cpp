@@ -138,7 +138,8 @@ StepReport Integrator::take(double h, Guess guess) {
   }
   if (!outcome.ok()) {
     const std::string& stuck = division_->stuck();
-    return failed(outcome.solve, step.start, outcome.failure + (stuck.empty() ? kink_ahead(h) : "; " + stuck));
+    return failed(outcome.solve, step.start,
+                  outcome.failure + (stuck.empty() ? kink_ahead(h) : "; " + stuck));
   }
   if (const std::string broken = left_out_ ? broken_left_out_row(sequence_->end().q) : std::string();
       !broken.empty())

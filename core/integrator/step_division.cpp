@@ -144,8 +144,8 @@ bool StepDivision::follow(const State& start, Work& work) {
       }
       changes_ = (after_ - before_).cwiseAbs();
       int number = first_change(), last = -1;
-      // Each function once: several vanish together, as those of v > 0 and v < 0, and round-off lets each seem
-      // to come first.
+      // Each function once: several vanish together, as those of v > 0 and v < 0, and round-off lets each
+      // seem to come first.
       for (int k = 0; k < kinks_->count() && number >= 0 && std::abs(part.size) > finest_part * whole; ++k) {
         last = number;
         if (!shorten(number, part, from, work)) return give_up(number, part.start);

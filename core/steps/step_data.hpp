@@ -6,7 +6,7 @@
 #include <diracstep/core/numerics/row_scales.hpp>
 #include <diracstep/core/steps/state.hpp>
 #include <diracstep/core/system/constraint_distribution.hpp>
-#include <diracstep/core/system/length_of_rows.hpp>
+#include <diracstep/core/steps/length_of_rows.hpp>
 #include <diracstep/core/system/scene.hpp>
 
 namespace diracstep {

@@ -203,8 +203,8 @@ step = 0.1
   }
 }
 
-/// Pushed by 2 g below y = 0 and by nothing above: three kinks beside each other, two of them at y = 0 and one
-/// 1e-9 before.
+/// Pushed by 2 g below y = 0 and by nothing above: three kinks beside each other, two of them at y = 0 and
+/// one 1e-9 before.
 TEST_F(Believed, EveryKinkOfACrowdIsStoppedAt) {
   const std::string file = scene("push", R"toml(
 lagrangian = "v_y^2/2 - y"

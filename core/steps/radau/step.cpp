@@ -12,7 +12,7 @@
 #include <diracstep/core/steps/radau/rows.hpp>
 #include <diracstep/core/steps/radau/step.hpp>
 #include <diracstep/core/system/first_order_motions.hpp>
-#include <diracstep/core/system/length_of_rows.hpp>
+#include <diracstep/core/steps/length_of_rows.hpp>
 
 namespace diracstep {
 
