@@ -14,9 +14,6 @@ namespace diracstep {
 namespace {
 
 constexpr double longest_of_driven = 10.0;  // steps of the options: a step without error may pass a drive by
-constexpr double lowest_ratio = 0.8, highest_ratio = 1.25;  // of z to ω before the guard acts
-constexpr double size_tolerance = 1e-10;  // relative, of an equation in the step: below it is round-off
-constexpr int max_sizes = 30;             // tried for one step
 constexpr long scale_survey_steps = 120;
 
 constexpr std::array<std::pair<const char*, StepControl>, 4> controls{
@@ -154,37 +151,6 @@ double AdaptiveIntegrator::largest_rate() const {
   return adaptive_.eps / smallest;
 }
 
-/// v, ω and, if asked for, d(ln ω)/dt at the current node.  ω is bounded from above, by a number that is even
-/// in v as ω is.
-bool AdaptiveIntegrator::measure(bool growth) {
-  const double t = main_.time();
-  const SolveReport report = meter_->motion().velocity(t, main_.position(), main_.momentum(), v_);
-  if (!report.ok())
-    rate_ = {0.0, 0.0, std::string("no velocity for the monitor: ") + describe(report.status)};
-  else
-    rate_ = growth ? meter_->rate_and_growth(t, main_.position(), v_, next_size_)
-                   : meter_->rate(t, main_.position(), v_, next_size_);
-  if (!rate_.ok()) return false;
-  if (const double largest = largest_rate(); rate_.rate > largest) rate_ = {largest, 0.0, {}};
-  report_.slowest = std::min(report_.slowest, rate_.rate);
-  report_.fastest = std::max(report_.fastest, rate_.rate);
-  return true;
-}
-
-bool AdaptiveIntegrator::start_control() {
-  const bool growth = adaptive_.control == StepControl::integrating;
-  // The width of the differences follows the step, which is not known yet: measure twice.
-  if (!measure(false)) return false;
-  next_size_ = sign_ * adaptive_.eps / rate_.rate;
-  if (!measure(growth)) return false;
-  z_ = rate_.rate + 0.5 * sign_ * adaptive_.eps * rate_.growth;
-  next_size_ = sign_ * adaptive_.eps / (growth && z_ > 0.0 ? z_ : rate_.rate);
-  last_sizes_.clear();
-  for (const double fraction : fractions_)
-    last_sizes_.push_back({fraction * next_size_, fraction * next_size_});
-  return true;
-}
-
 StepReport AdaptiveIntegrator::failed(const std::string& what) const {
   StepReport report;
   report.solve.status = SolveStatus::no_convergence;
@@ -225,52 +191,6 @@ StepReport AdaptiveIntegrator::step() {
   }
   report_.accelerations += meter_->motion().accelerations() - before;
   return report;
-}
-
-StepReport AdaptiveIntegrator::control_step(double size) {
-  StepReport report = main_.step(size);
-  if (!report.ok()) return report;
-  note(size);
-  const bool integrating = adaptive_.control == StepControl::integrating;
-  if (!measure(integrating)) return failed(rate_.failure);
-  if (!integrating) {
-    next_size_ = sign_ * adaptive_.eps / rate_.rate;
-    return report;
-  }
-  const double change = sign_ * adaptive_.eps * rate_.growth;
-  const double ratio = (z_ + 0.5 * change) / rate_.rate;
-  report_.lowest_ratio = std::min(report_.lowest_ratio, ratio);
-  report_.highest_ratio = std::max(report_.highest_ratio, ratio);
-  z_ += change;
-  if (!(ratio >= lowest_ratio && ratio <= highest_ratio) || !(z_ > 0.25 * rate_.rate)) {
-    z_ = std::max(rate_.rate + 0.5 * change, 0.5 * rate_.rate);
-    ++report_.resets;
-  }
-  next_size_ = sign_ * adaptive_.eps / z_;
-  return report;
-}
-
-/// Solves F(h) = h (ω(y_0) + ω(y_1(h)))/2 − eps = 0, by secants after a first correction with the slope
-/// ω(y_1).
-StepReport AdaptiveIntegrator::solve_size(double eps, double guess, double& size) {
-  const double rate0 = rate_.rate;
-  double h = guess, last_h = 0.0, last_f = 0.0;
-  StepReport report;
-  for (int tried = 0; tried < max_sizes; ++tried) {
-    report = tried == 0 ? main_.step(h) : main_.retry(h);
-    if (!report.ok()) return report;
-    if (!measure(false)) return failed(rate_.failure);
-    const double f = 0.5 * h * (rate0 + rate_.rate) - eps;
-    size = h;
-    if (std::abs(f) <= size_tolerance * std::abs(eps)) return report;
-    const bool first = tried == 0 || h == last_h;
-    const double slope = first ? rate_.rate : (f - last_f) / (h - last_h);
-    const double change = slope > 0.0 ? -f / slope : 0.5 * (eps / rate0 - h);
-    last_h = h;
-    last_f = f;
-    h *= 1.0 + std::clamp(change / h, -0.5, 1.0);
-  }
-  return failed("no size of the step satisfies the equation for it; take a smaller eps");
 }
 
 StepReport AdaptiveIntegrator::sample_at(double t, Momentum momentum, Sample& sample) {

@@ -14,14 +14,11 @@ namespace diracstep {
 namespace {
 
 constexpr const char* surveying_method = "damped/radau:3";
-constexpr double surveying_error = 1e-3;
-constexpr long damping_steps = 150;
-constexpr int most_coordinates = 60;
-constexpr double grown_by = 1.5;
+constexpr double surveying_error = 1e-3, smallest_error = 1e-9;
+constexpr int damping_steps = 150, most_coordinates = 60;
 constexpr double damping_probe = 1e-6;  // in units of the sizes
 constexpr double least_size = 1e-6;     // of the largest position or velocity
-constexpr double parts_of_the_motion = 50.0;
-constexpr double smallest_error = 1e-9;
+constexpr double grown_by = 1.5, parts_of_the_motion = 50.0;
 constexpr double hardly_damped = 1e-2;  // |Re λ| beside |Im λ|
 
 /// The motion linearised about its points.

@@ -136,7 +136,11 @@ StepReport Integrator::take(double h, Guess guess) {
     outcome = std::move(divided);
     pieces = pieces_.size();
   }
-  if (!outcome.ok()) return failed(outcome.solve, step.start, outcome.failure + kink_ahead(h));
+  if (!outcome.ok()) {
+    const std::string& stuck = division_->stuck();
+    return failed(outcome.solve, step.start,
+                  outcome.failure + (stuck.empty() ? kink_ahead(h) : "; " + stuck));
+  }
   if (const std::string broken = left_out_ ? broken_left_out_row(sequence_->end().q) : std::string();
       !broken.empty())
     return failed({.status = SolveStatus::refused}, step.start, broken);

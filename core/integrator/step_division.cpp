@@ -12,6 +12,7 @@ constexpr std::size_t most_parts_of_a_step = 40;
 constexpr int most_tries = 60, most_halvings = 12, most_returns = 2, most_hidden = 4;
 constexpr double finest_part = 1e-14, returned_within = 1e-6;  // of the step
 constexpr double reach_of_estimates = 2.0;                     // in changes within a step
+constexpr double reach_of_motion = 2.0;                        // in changes within the part before
 
 }  // namespace
 
@@ -37,6 +38,17 @@ void StepDivision::read(double t, const State& at, bool exactly, Vector& switche
 int StepDivision::first_change() const {
   for (Eigen::Index k = 0; k < after_.size(); ++k)
     if (kinks_->kinds()[static_cast<std::size_t>(k)] == Kinks::Kind::kink && before_[k] * after_[k] < 0.0)
+      return static_cast<int>(k);
+  return -1;
+}
+
+/// The number of a kink that the motion comes to, or comes from, by its change within the part solved last;
+/// -1 where none.
+int StepDivision::ahead() const {
+  if (changes_.size() != before_.size()) return -1;
+  for (Eigen::Index k = 0; k < before_.size(); ++k)
+    if (kinks_->kinds()[static_cast<std::size_t>(k)] == Kinks::Kind::kink &&
+        std::abs(before_[k]) <= reach_of_motion * changes_[k])
       return static_cast<int>(k);
   return -1;
 }
@@ -68,6 +80,7 @@ bool StepDivision::crosses(Interval step, const State& start, const State& end) 
   const double end_time = step.start + step.size;
   read(step.start, start, false, before_);
   read(end_time, end, false, after_);
+  changes_ = (after_ - before_).cwiseAbs();
   if (hidden_place(step, start, end) > 0.0) return true;
   const auto nearest = before_.cwiseAbs().cwiseMin(after_.cwiseAbs()).array();
   const auto change = (after_ - before_).cwiseAbs().array();
@@ -114,7 +127,10 @@ bool StepDivision::follow(const State& start, Work& work) {
       if (parts_.size() == most_parts_of_a_step) return give_up(crossed, part.start);
       read(part.start, from, true, before_);
       while (!sequence_->solve({&part, 1}, from, Guess::plain, work).ok()) {
-        if (++halvings > most_halvings) return crossed >= 0 && give_up(crossed, part.start);
+        if (++halvings > most_halvings) {
+          const int number = crossed >= 0 ? crossed : ahead();
+          return number >= 0 && give_up(number, part.start);
+        }
         part.size *= 0.5;
       }
       read(part.start + part.size, sequence_->end(), true, after_);
@@ -126,12 +142,14 @@ bool StepDivision::follow(const State& start, Work& work) {
         if (!sequence_->solve({&part, 1}, from, Guess::plain, work).ok()) return false;
         read(part.start + part.size, sequence_->end(), true, after_);
       }
+      changes_ = (after_ - before_).cwiseAbs();
       int number = first_change(), last = -1;
-      // Each function once: several vanish together, as those of v > 0 and v < 0.
+      // Each function once: several vanish together, as those of v > 0 and v < 0, and round-off lets each
+      // seem to come first.
       for (int k = 0; k < kinks_->count() && number >= 0 && std::abs(part.size) > finest_part * whole; ++k) {
         last = number;
         if (!shorten(number, part, from, work)) return give_up(number, part.start);
-        after_[number] = before_[number];  // crossed at the end; what else changed before it?
+        before_[number] = 0.0;  // crossed at the end; what else changed before it?
         number = first_change();
       }
       const bool returned = last >= 0 && last == crossed && std::abs(part.size) <= returned_within * whole;

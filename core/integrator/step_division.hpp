@@ -20,7 +20,8 @@ namespace diracstep {
 /// kink again and again, as at a force that jumps and points back from both sides, the step is solved
 /// undivided, and stuck() says so.
 ///
-/// What is done depends on the step and its start alone.
+/// What is done depends on the step and its start alone; what is said of a step that fails before a kink also
+/// on the one solved before.
 class StepDivision {
  public:
   /// The reader and the sequence outlive the division.
@@ -34,7 +35,7 @@ class StepDivision {
   const std::vector<Interval>& parts() const { return parts_; }
   bool divided() const { return divided_; }
   const std::vector<KinkPassed>& passed() const { return passed_; }
-  /// Empty, or why it is not divided although the motion crosses a kink.
+  /// Empty, or why it is not divided although the motion crosses a kink, or fails before one.
   const std::string& stuck() const { return stuck_; }
 
   /// The centres of the pulses and ramps of the time in a step.
@@ -45,6 +46,7 @@ class StepDivision {
   bool crosses(Interval step, const State& start, const State& end);
   double hidden_place(Interval step, const State& start, const State& end);
   int first_change() const;
+  int ahead() const;
   bool follow(const State& start, Work& work);
   bool shorten(int number, Interval& part, const State& from, Work& work);
   bool give_up(int number, double t);
@@ -58,6 +60,7 @@ class StepDivision {
   std::vector<KinkPassed> passed_;
   std::string stuck_;
   bool divided_ = false;
+  Vector changes_;  ///< of the kinks within the part solved last, for what stuck() says
   Vector before_, after_, between_, velocity_, speed_, speed_up_, position_;
 };
 

@@ -5,6 +5,7 @@
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/runs/event_actions.hpp>
 #include <diracstep/core/runs/event_search.hpp>
+#include <diracstep/core/runs/zeno_watch.hpp>
 #include <functional>
 #include <map>
 #include <memory>
@@ -42,31 +43,6 @@ struct Stepping<Integrator> {
     sample.time = t;
     return report;
   }
-};
-
-/// Watches one event: whether it comes ever faster, or again and again while no time passes.
-class ZenoWatch {
- public:
-  /// The event was met at t; `scale` is the time that has passed.
-  void meet(double t, double scale) {
-    const double gap = std::abs(t - last_);
-    at_once_ = gap <= round_off * std::max(std::abs(t), scale) ? at_once_ + 1 : 0;
-    shrinking_ = std::isfinite(gap) && gap < slowest * gap_ ? shrinking_ + 1 : 0;
-    const double ratio = gap / gap_, left = (t - last_) * ratio / (1.0 - ratio);
-    limit_ = shrinking_ >= 3 && gap < part * scale ? t + left : std::nan("");
-    last_ = t;
-    gap_ = gap;
-  }
-  /// The time at which it would be met infinitely often where that is about to happen, else NaN.
-  double limit() const { return limit_; }
-  /// Met so often at one time.
-  bool chatters() const { return at_once_ >= most_at_once; }
-
- private:
-  static constexpr double slowest = 0.9999, part = 1e-9, round_off = 1e-13;
-  static constexpr int most_at_once = 10;
-  double last_ = std::nan(""), gap_ = std::nan(""), limit_ = std::nan("");
-  int shrinking_ = 0, at_once_ = 0;
 };
 
 }  // namespace detail
@@ -181,20 +157,8 @@ class EventSteps {
   void add_left(std::size_t number, std::vector<EventSearch::Left>& left) const;
   void add_closing(const Sample& here, std::vector<EventHit>& due) const;
   std::vector<EventSearch::Left> at_rest_in_contact(const Sample& here) const;
-  StepReport failed(std::string failure) const {
-    StepReport report;
-    report.solve.status = SolveStatus::refused;
-    report.time = time();
-    report.failure = std::move(failure);
-    return report;
-  }
-
-  static std::string slides(const Event& event, double t) {
-    return "event '" + event.name + "' acts again and again at t = " + to_text(t, 10) +
-           ", and no time passes: what is set there turns the motion back to where it is set (sliding mode), "
-           "from both sides; leave a band between the events, make the force steep instead of a jump, as "
-           "tanh(g/width), or hold the motion there by a row that is switched on";
-  }
+  StepReport failed(std::string failure) const;
+  static std::string slides(const Event& event, double t);
 
   static constexpr int most_at_once = 100;         // events at one time
   static constexpr long most_in_a_step = 100'000;  // that act
@@ -212,32 +176,6 @@ class EventSteps {
   long steps_ = 0, acts_ = 0;
   Sample after_;  ///< the last event that acted
 };
-
-/// Clocks act at the start.
-template <class Stepper>
-StepReport EventSteps<Stepper>::begin() {
-  begun_ = true;
-  Sample here;
-  StepReport report;
-  report.solve = sample(here);
-  if (!report.ok()) return failed(std::string("reading the start: ") + describe(report.solve.status));
-  for (const Event& event : events())
-    if (event.restitution && event.direction == Event::Direction::falling)
-      if (const double gap = event.at(here.point()); gap < 0.0)
-        return failed("event '" + event.name + "': its function is " + to_text(gap) +
-                      " at the start, behind the contact; it is positive where there is none (direction)");
-  if (report = search_.see(here, {}); !report.ok()) return report;
-  (void)search_.go_on(here, at_rest_in_contact(here), actions_.awake());
-  std::vector<EventHit> due;
-  add_closing(here, due);
-  for (std::size_t k = 0; k < events().size(); ++k)
-    if (events()[k].every > 0.0 && (!events()[k].condition || events()[k].condition(here.point()) > 0.0))
-      due.push_back({k, here});
-  if (std::ranges::any_of(due, [&](const EventHit& hit) { return events()[hit.event].acts(); }))
-    return act(std::move(due));
-  hits_ = std::move(due);
-  return {};
-}
 
 template <class Stepper>
 StepReport EventSteps<Stepper>::step(double size) {
@@ -307,117 +245,6 @@ StepReport EventSteps<Stepper>::look(const detail::Node& from, const Sample& poi
   return {};
 }
 
-/// Makes events true that were met; those at the end are of one time.
-template <class Stepper>
-StepReport EventSteps<Stepper>::act(std::vector<EventHit> met) {
-  std::vector<EventSearch::Left> left;
-  int made = 0;
-  while (!met.empty()) {
-    for (EventHit& hit : met) {
-      const Event& event = events()[hit.event];
-      stopped_ = stopped_ || event.stop;
-      if (!event.acts()) {
-        hits_.push_back(std::move(hit));
-        continue;
-      }
-      if (++made > most_at_once)
-        return failed("more than 100 events act at t = " + to_text(hit.sample.time, 10) + ", the last '" +
-                      event.name + "': they call each other, and no time passes");
-      if (made > 1)  // at the same time: it sees what the others made
-        if (const SolveReport solve = sample(hit.sample); !solve.ok()) return failed(describe(solve.status));
-      if (StepReport report = make_true(std::move(hit), left); !report.ok()) return report;
-    }
-    met.clear();
-    const Sample& here = after_;
-    for (EventSearch::Left& contact : left)
-      contact.rate = EventActions::contact_rate(events()[contact.event], here);
-    for (const std::size_t k : search_.at_zero()) add_left(k, left);
-    for (const std::size_t k : search_.go_on(here, left, actions_.awake()))
-      if (!events()[k].condition || events()[k].condition(here.point()) > 0.0) met.push_back({k, here});
-    add_closing(here, met);
-  }
-  return {};
-}
-
-/// Another event whose function of the configuration vanishes there as well, and still does behind what
-/// acted.
-template <class Stepper>
-void EventSteps<Stepper>::add_left(std::size_t number, std::vector<EventSearch::Left>& left) const {
-  constexpr double round_off = 1e-12;
-  const Event& event = events()[number];
-  if (!event.contact || !search_.is_zero(number, event.at(after_.point())) ||
-      std::ranges::find(left, number, &EventSearch::Left::event) != left.end())
-    return;
-  const double rate = EventActions::contact_rate(event, after_);
-  if (std::abs(rate) > round_off * after_.v.template lpNorm<Eigen::Infinity>())
-    left.push_back({number, rate});
-}
-
-/// Contacts that are closed to the last bit and close further: they have no sign to change.
-template <class Stepper>
-void EventSteps<Stepper>::add_closing(const Sample& here, std::vector<EventHit>& due) const {
-  constexpr double round_off = 1e-12;
-  const std::vector<bool> awake = actions_.awake();
-  for (std::size_t k = 0; k < events().size(); ++k) {
-    const Event& event = events()[k];
-    if (!event.restitution || !awake[k] || event.at(here.point()) != 0.0) continue;
-    if (event.condition && !(event.condition(here.point()) > 0.0)) continue;
-    const double side = event.direction == Event::Direction::rising ? -1.0 : 1.0;
-    const double rate = side * EventActions::contact_rate(event, here);
-    if (rate < -round_off * here.v.template lpNorm<Eigen::Infinity>()) due.push_back({k, here});
-  }
-}
-
-/// Contacts that are closed and stay so for now: where they close without an impact, that is told.
-template <class Stepper>
-std::vector<EventSearch::Left> EventSteps<Stepper>::at_rest_in_contact(const Sample& here) const {
-  std::vector<EventSearch::Left> left;
-  for (std::size_t k = 0; k < events().size(); ++k)
-    if (events()[k].restitution && events()[k].at(here.point()) == 0.0)
-      left.push_back({k, EventActions::contact_rate(events()[k], here)});
-  return left;
-}
-
-template <class Stepper>
-StepReport EventSteps<Stepper>::make_true(EventHit hit, std::vector<EventSearch::Left>& left) {
-  const Event& event = events()[hit.event];
-  const double t = hit.sample.time;
-  stepper().restart(t, hit.sample.q, hit.sample.p, hit.sample.v);  // where the motion ends if it cannot act
-  detail::ZenoWatch& zeno = zeno_[hit.event];
-  zeno.meet(t, std::abs(t - began_at_));
-  if (zeno.chatters() && !event.restitution) return failed(slides(event, t));
-  if (std::isfinite(zeno.limit()))
-    return failed("event '" + event.name +
-                  "' is met ever faster and infinitely often before t = " + to_text(zeno.limit(), 10) +
-                  " (Zeno), which steps cannot pass; let a second event, with a condition on the speed, end "
-                  "it: set, or on = [a row that keeps the contact]");
-  EventActions::Outcome outcome = actions_.act(event, hit.sample, scene());
-  if (!outcome.failure.empty()) return failed(outcome.failure);
-  if (outcome.switched) {
-    const auto known = modes_.find(actions_.on());
-    if (known == modes_.end() || !known->second.stepper) try {
-        take(actions_.scene_from(t, outcome.q, outcome.v));
-      } catch (const Misuse& misuse) {
-        return failed("event '" + event.name + "' at t = " + to_text(t, 10) + ": " + misuse.what());
-      }
-    else
-      current_ = &known->second;
-  }
-  stepper().restart(t, outcome.q, outcome.p, outcome.v);
-  acted_ = true;
-  if (event.restitution && event.on.empty()) {
-    std::erase_if(left, [&](const EventSearch::Left& other) { return other.event == hit.event; });
-    left.push_back({hit.event, outcome.rate});
-  }
-  hit.impulse = outcome.impulse;
-  ++acts_;
-  if (const SolveReport solve = sample(after_); !solve.ok())
-    return failed("reading the state after event '" + event.name + "': " + describe(solve.status));
-  hit.after = after_;
-  hits_.push_back(std::move(hit));
-  return {};
-}
-
 template <class Stepper>
 Work EventSteps<Stepper>::work() const {
   Work work;
@@ -464,3 +291,5 @@ void EventSteps<Stepper>::restore(SnapshotReader& from) {
 }
 
 }  // namespace diracstep
+
+#include <diracstep/core/runs/event_steps_acting.hpp>  // the rest of the definitions

@@ -4,9 +4,9 @@
 #include <cmath>
 #include <diracstep/core/dirac/discrete_constraint.hpp>
 #include <diracstep/core/numerics/row_scales.hpp>
+#include <diracstep/core/steps/length_of_rows.hpp>
 #include <diracstep/core/steps/state.hpp>
 #include <diracstep/core/system/constraint_distribution.hpp>
-#include <diracstep/core/system/length_of_rows.hpp>
 #include <diracstep/core/system/scene.hpp>
 
 namespace diracstep {

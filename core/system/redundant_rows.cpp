@@ -12,8 +12,7 @@ namespace diracstep {
 
 namespace {
 
-/// Up to so many rows full matrices take less time.
-constexpr int max_rows_in_full = 100;
+constexpr int max_rows_in_full = 100;  // up to so many full matrices take less time
 
 Eigen::SparseMatrix<double> sparse_one_forms(const ConstraintsAtPoint& rows) {
   const SparsityPattern& pattern = rows.pattern();
@@ -113,8 +112,7 @@ std::vector<int> dependent_by_kind(const Columns& one_forms, const RowKinds& kin
   return dependent;
 }
 
-/// Poses around the start fulfil the rows to about 1e-10, and what depends on others there does so to as
-/// much.
+/// Poses around the start fulfil the rows to about 1e-10, and what depends on others there to as much.
 constexpr double pose_tolerance = 1e-7;
 
 /// Where motions cross at the start, poses around it are farther than this from being singular; where rows
@@ -182,8 +180,7 @@ double distance_from(const ConstraintBlocks& holonomic, double t, const Vector& 
   return largest;
 }
 
-/// Whether all poses found around the start that the other rows allow break the holonomic ones of these
-/// names.
+/// Whether all poses around the start that the other rows allow break the holonomic rows of these names.
 bool broken_by_the_others(const Scene& scene, const Start& start, const std::vector<std::string>& dependent) {
   constexpr double met = 1e-7;
   if (scene.space) return false;

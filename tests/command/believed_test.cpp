@@ -203,6 +203,28 @@ step = 0.1
   }
 }
 
+/// Pushed by 2 g below y = 0 and by nothing above: three kinks beside each other, two of them at y = 0 and
+/// one 1e-9 before.
+TEST_F(Believed, EveryKinkOfACrowdIsStoppedAt) {
+  const std::string file = scene("push", R"toml(
+lagrangian = "v_y^2/2 - y"
+[coordinates]
+y = {}
+[force]
+y = "1e-12*max(0, -y) + 2*min(1, max(0, -1e9*y))"
+[start]
+y = -0.1
+[span]
+end = 1
+step = 0.1
+)toml");
+  const double up = std::sqrt(0.2), flight = 1.0 - up;
+  for (const char* method : {"damped/radau:3", "type1/gl:3"}) {
+    const Outcome outcome = run("run " + file + " --json --step 0.1 --method " + method);
+    EXPECT_NEAR(at_end(outcome, "q", "y"), up * flight - flight * flight / 2.0, 1e-8) << method;
+  }
+}
+
 /// A light oscillator beside a heavy one: its momentum is nothing beside the other, its velocity is not.
 TEST_F(Believed, AnErrorIsOneOfVelocitiesToo) {
   const Outcome outcome = run("run " + scene("light", R"toml(

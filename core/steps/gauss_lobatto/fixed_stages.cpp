@@ -1,4 +1,5 @@
 #include <diracstep/core/steps/gauss_lobatto/fixed_stages.hpp>
+#include <diracstep/core/steps/gauss_lobatto/stage_matrices.hpp>
 #include <diracstep/core/steps/gauss_lobatto/stages_of_size.hpp>
 
 namespace diracstep {

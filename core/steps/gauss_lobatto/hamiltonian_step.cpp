@@ -7,7 +7,7 @@
 #include <diracstep/core/steps/gauss_lobatto/points.hpp>
 #include <diracstep/core/steps/gauss_lobatto/rows.hpp>
 #include <diracstep/core/steps/gauss_lobatto/step_sums.hpp>
-#include <diracstep/core/system/length_of_rows.hpp>
+#include <diracstep/core/steps/length_of_rows.hpp>
 
 namespace diracstep {
 

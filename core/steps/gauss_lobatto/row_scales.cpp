@@ -1,6 +1,6 @@
 #include <algorithm>
 #include <diracstep/core/steps/gauss_lobatto/row_scales.hpp>
-#include <diracstep/core/system/length_of_rows.hpp>
+#include <diracstep/core/steps/length_of_rows.hpp>
 
 namespace diracstep {
 

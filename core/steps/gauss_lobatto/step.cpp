@@ -12,8 +12,7 @@
 #include <diracstep/core/steps/gauss_lobatto/splitting.hpp>
 #include <diracstep/core/steps/gauss_lobatto/step.hpp>
 #include <diracstep/core/steps/gauss_lobatto/step_sums.hpp>
-#include <diracstep/core/system/length_of_rows.hpp>
-#include <functional>
+#include <diracstep/core/steps/length_of_rows.hpp>
 #include <optional>
 
 namespace diracstep {
@@ -22,9 +21,7 @@ namespace {
 
 /// Compensated sums are worth an iteration more: the residual must fall to this part of its usual bound.
 constexpr double last_bit = 0.01;
-
-/// The splitting takes full matrices.
-constexpr int largest_split = 40;
+constexpr int largest_split = 40;  // the splitting takes full matrices
 
 class GaussLobattoStep final : public StepProblem {
  public:

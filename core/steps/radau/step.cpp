@@ -9,10 +9,10 @@
 #include <diracstep/core/steps/gauss_lobatto/regular_two_form.hpp>
 #include <diracstep/core/steps/gauss_lobatto/sizes.hpp>
 #include <diracstep/core/steps/gauss_lobatto/tableau.hpp>
+#include <diracstep/core/steps/length_of_rows.hpp>
 #include <diracstep/core/steps/radau/rows.hpp>
 #include <diracstep/core/steps/radau/step.hpp>
 #include <diracstep/core/system/first_order_motions.hpp>
-#include <diracstep/core/system/length_of_rows.hpp>
 
 namespace diracstep {
 

@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <diracstep/core/numerics/scales.hpp>
-#include <diracstep/core/system/length_of_rows.hpp>
+#include <diracstep/core/steps/length_of_rows.hpp>
 
 namespace diracstep {
 
