@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/spaces/space.hpp>
 #include <diracstep/scene_format/position_names.hpp>
 #include <diracstep/scene_format/spaces/factor_texts.hpp>
@@ -50,6 +51,12 @@ std::vector<std::string> position_names(const Scene& scene) {
     names.insert(names.end(), texts.stored.begin(), texts.stored.end());
   }
   return names;
+}
+
+void require_flat(const Scene& scene, const std::string& what) {
+  if (scene.space)
+    throw Misuse(fmt::format("scene '{}' is on {}: {} knows scenes in R^n only", scene.name,
+                             scene.space->name(), what));
 }
 
 }  // namespace diracstep

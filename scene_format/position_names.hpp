@@ -11,4 +11,7 @@ namespace diracstep {
 /// not so named or a factor is a user's own, q_1, q_2, …
 std::vector<std::string> position_names(const Scene& scene);
 
+/// Throws Misuse where the scene is on groups or spheres; `what` is what knows R^n only: "a sweep".
+void require_flat(const Scene& scene, const std::string& what);
+
 }  // namespace diracstep

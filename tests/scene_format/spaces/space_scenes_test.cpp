@@ -6,9 +6,11 @@
 #include <diracstep/core/runs/run.hpp>
 #include <diracstep/core/spaces/space.hpp>
 #include <diracstep/scene_format/parametric_scene_file.hpp>
+#include <diracstep/scene_format/parts/scene_part.hpp>
 #include <diracstep/scene_format/position_names.hpp>
 #include <diracstep/scene_format/scene_file.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
+#include <diracstep/validation/laws/derivative_examination.hpp>
 #include <string>
 
 /// Scenes whose coordinates are groups and spheres, from text.
@@ -263,6 +265,29 @@ TEST(SpaceScenes, WhatIsNotKnownThereIsRefused) {
       EXPECT_NE(std::string(misuse.what()).find(one.expected), std::string::npos) << misuse.what();
     }
   }
+}
+
+/// As `diracstep check` does: all derivatives against differences along the space.
+TEST(SpaceScenes, DerivativesAreThoseAlongTheSpace) {
+  const CatalogueScene scene = made(
+      "(w_R[1]^2 + 2*w_R[2]^2 + 3*w_R[3]^2)/2 + w_R[1]*R[1,2]*cos(t) + v_S[1]^2 + 2*v_S[2]^2 + v_S[3]^2*(2 + "
+      "x[1]) "
+      "+ v_x[1]^2 + v_x[2]^2/2 - S[3]*R[3,3]",
+      "R = \"SO3\"\nS = \"S2\"\nx = \"R2\"",
+      "[[rows]]\nname = \"arm\"\nequation = \"R[1,3] + S[2]^2 - x[1] = 0\"\n"
+      "[[rows]]\nname = \"skate\"\nequation = \"w_R[3] - R[2,1]*v_x[2] = 0\"\n"
+      "[force]\nR_2 = \"-w_R[2]*R[1,1]\"\nS_1 = \"x[2]*w_S[1]\"\n"
+      "[start]\nR = { axis = [1, 0, 2], angle = 0 }\nS = [0, 0, 1]");
+  for (const Finding& finding : examine_derivatives(*scene.scene, {}))
+    EXPECT_TRUE(finding.passed) << finding.what << ": " << finding.detail;
+}
+
+TEST(SpaceScenes, TolerancesAndPartsAreOfFlatScenes) {
+  CatalogueScene top = made(heavy_top, "R = \"SO3\"", "");
+  EXPECT_THROW(set_tolerances(top, {{"R_1", 1e-12}}), Misuse);
+  EXPECT_THROW((void)ScenePart::read(
+                   "a.toml", scene_text("w_R[1]^2 + w_R[2]^2 + w_R[3]^2", "R = \"SO3\"", ""), {}, 0, 1),
+               Misuse);
 }
 
 TEST(SpaceScenes, ParametersAreNotDifferentiatedBy) {
