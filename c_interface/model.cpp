@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <diracstep/c_interface/handles.hpp>
 #include <diracstep/plugins/callback_scene.hpp>
+#include <diracstep/scene_format/position_names.hpp>
 #include <diracstep/scene_format/scene_file.hpp>
 
 using namespace diracstep;
@@ -115,6 +116,7 @@ int diracstep_open(unsigned version, const diracstep_source* source, diracstep_m
       made->changes = named_values(from.parameters, from.parameter, "parameter");
       if (from.drop_redundant != 0) drop_redundant_rows(made->entry);
       set_tolerances(made->entry, named_values(from.tolerances, from.tolerance, "tolerance"));
+      require_flat(*made->entry.scene, "the interface of C, and with it those of Python and Julia,");
       made->scene = completed(made->entry.scene);
     }
     *model = made.release();

@@ -5,6 +5,7 @@
 #include <diracstep/command/run_report.hpp>
 #include <diracstep/reports/json.hpp>
 #include <diracstep/reports/report.hpp>
+#include <diracstep/scene_format/position_names.hpp>
 #include <diracstep/validation/studies/convergence_study.hpp>
 #include <utility>
 
@@ -22,7 +23,7 @@ Json by_name(const std::vector<std::string>& names, const Vector& values) {
 Json end_json(const RunResult& result, const Scene& scene) {
   if (!result.has_end()) return nullptr;
   return {{"t", Json(result.end.time)},
-          {"q", by_name(scene.coordinates, result.end.q)},
+          {"q", by_name(position_names(scene), result.end.q)},
           {"v", by_name(scene.coordinates, result.end.v)},
           {"p", by_name(scene.coordinates, result.end.p)},
           {"lambda", by_name(scene.row_names(), result.end.lambda)},
@@ -42,19 +43,36 @@ void for_shown(int count, const Show& show, const LeaveOut& leave_out) {
   show(count - 1);
 }
 
+/// Of a group or a sphere there are more numbers of q than of v and p.
+std::string places_table(const Sample& end, const Scene& scene) {
+  const std::vector<std::string> names = position_names(scene);
+  std::vector<std::vector<std::string>> rows{{"", "q"}};
+  for_shown(
+      scene.storage_size(),
+      [&](int i) {
+        rows.push_back({names[static_cast<std::size_t>(i)], fmt::format("{:.15g}", end.q[i])});
+      },
+      [&](int) {
+        rows.push_back({"…", ""});
+      });
+  return aligned(rows);
+}
+
 std::string end_table(const Sample& end, const Scene& scene) {
-  std::vector<std::vector<std::string>> rows{{"", "q", "v", "p"}};
+  const bool together = !scene.space;
+  std::vector<std::vector<std::string>> rows{{"", together ? "q" : "", "v", "p"}};
   std::string left_out;
   const auto coordinate = [&](int i) {
-    rows.push_back({scene.coordinates[static_cast<std::size_t>(i)], fmt::format("{:.15g}", end.q[i]),
-                    fmt::format("{:.15g}", end.v[i]), fmt::format("{:.15g}", end.p[i])});
+    rows.push_back({scene.coordinates[static_cast<std::size_t>(i)],
+                    together ? fmt::format("{:.15g}", end.q[i]) : "", fmt::format("{:.15g}", end.v[i]),
+                    fmt::format("{:.15g}", end.p[i])});
   };
   for_shown(scene.dimension(), coordinate, [&](int count) {
     rows.push_back({"…", "", "", ""});
     left_out = fmt::format("{} of {} coordinates left out; --json and --out have them all\n", count,
                            scene.dimension());
   });
-  std::string text = aligned(rows) + left_out;
+  std::string text = (together ? "" : places_table(end, scene)) + aligned(rows) + left_out;
   const auto names = scene.row_names();
   for_shown(
       scene.rows(),
@@ -121,7 +139,7 @@ std::string sensitivities_text(const RunResult& result, const Scene& scene) {
 Json sensitivities_json(const RunResult& result, const Scene& scene) {
   Json json = Json::object();
   for (const SensitivityColumn& column : result.sensitivities) {
-    Json by{{"q", by_name(scene.coordinates, column.q)}, {"p", by_name(scene.coordinates, column.p)}};
+    Json by{{"q", by_name(position_names(scene), column.q)}, {"p", by_name(scene.coordinates, column.p)}};
     by["v"] = column.v.size() > 0 ? by_name(scene.coordinates, column.v) : Json(nullptr);
     add_member(json, column.by, by);
   }
@@ -145,10 +163,10 @@ Json events_json(const RunResult& result, const Scene& scene) {
   for (const EventHit& hit : result.hits) {
     json.push_back({{"name", result.events[hit.event].name},
                     {"t", Json(hit.sample.time)},
-                    {"q", by_name(scene.coordinates, hit.sample.q)},
+                    {"q", by_name(position_names(scene), hit.sample.q)},
                     {"v", by_name(scene.coordinates, hit.sample.v)}});
     if (hit.after)
-      json.back()["after"] = {{"q", by_name(scene.coordinates, hit.after->q)},
+      json.back()["after"] = {{"q", by_name(position_names(scene), hit.after->q)},
                               {"v", by_name(scene.coordinates, hit.after->v)}};
     if (result.events[hit.event].restitution) json.back()["impulse"] = Json(hit.impulse);
   }

@@ -2,6 +2,7 @@
 #include <cctype>
 #include <cmath>
 #include <diracstep/reports/motion.hpp>
+#include <diracstep/scene_format/position_names.hpp>
 #include <initializer_list>
 #include <map>
 #include <string_view>
@@ -23,7 +24,9 @@ SymbolNote note_of(const CatalogueScene& entry, const std::string& coordinate) {
 }
 
 Motion::Coordinate coordinate(const CatalogueScene& entry, int index) {
-  const std::string& name = entry.scene->coordinates[static_cast<std::size_t>(index)];
+  const auto place = static_cast<std::size_t>(index);
+  const Scene& scene = *entry.scene;
+  const std::string name = scene.space ? position_names(scene)[place] : scene.coordinates[place];
   return {index, name, note_of(entry, name).unit};
 }
 
@@ -38,7 +41,7 @@ void add_body(Motion& motion, const CatalogueScene& entry, const std::string& na
 
 /// The points whose coordinates are named x… and y…, of one unit.
 void find_bodies(Motion& motion, const CatalogueScene& entry) {
-  const std::vector<std::string>& names = entry.scene->coordinates;
+  const std::vector<std::string> names = position_names(*entry.scene);
   std::map<std::string_view, int> index;
   for (std::size_t i = 0; i < names.size(); ++i) index[names[i]] = static_cast<int>(i);
   for (std::size_t i = 0; i < names.size() && motion.bodies.size() < max_bodies; ++i) {
@@ -52,7 +55,7 @@ void find_bodies(Motion& motion, const CatalogueScene& entry) {
 }
 
 void find_heading(Motion& motion, const CatalogueScene& entry) {
-  const std::vector<std::string>& names = entry.scene->coordinates;
+  const std::vector<std::string> names = position_names(*entry.scene);
   for (std::size_t i = 0; i < names.size() && motion.bodies.size() == 1; ++i) {
     const SymbolNote note = note_of(entry, names[i]);
     if (note.unit != "rad" || note.meaning.find("heading") == std::string::npos) continue;
@@ -148,7 +151,7 @@ class Bars {
 
 /// The elements of a scene whose coordinates are one long family, some left out where there are too many.
 bool find_profile(Motion& motion, const CatalogueScene& entry) {
-  const std::vector<std::string>& names = entry.scene->coordinates;
+  const std::vector<std::string> names = position_names(*entry.scene);
   if (names.size() < fewest_elements) return false;
   for (const std::string& name : names)
     if (family(name) != family(names.front())) return false;
@@ -161,13 +164,13 @@ bool find_profile(Motion& motion, const CatalogueScene& entry) {
 
 bool find_plane(Motion& motion, const CatalogueScene& entry) {
   find_bodies(motion, entry);
-  if (motion.bodies.empty() && entry.scene->dimension() == 2) add_body(motion, entry, "", 0, 1);
+  if (motion.bodies.empty() && entry.scene->storage_size() == 2) add_body(motion, entry, "", 0, 1);
   if (motion.bodies.empty()) return false;
   motion.form = Motion::Form::plane;
   find_heading(motion, entry);
   Bars bars(motion, *entry.scene);
   for (const auto& rows : entry.scene->constraints)
-    if (rows->holonomic() && rows->rows() <= max_rows) bars.look_at(*rows);
+    if (!entry.scene->space && rows->holonomic() && rows->rows() <= max_rows) bars.look_at(*rows);
   return true;
 }
 
@@ -201,7 +204,7 @@ bool speaks_of(const std::string& unit, std::string_view symbol) {
 Motion motion_of(const CatalogueScene& entry) {
   Motion motion;
   if (find_solids(motion, entry) || find_plane(motion, entry) || find_profile(motion, entry)) return motion;
-  const std::size_t count = std::min(entry.scene->coordinates.size(), max_curves);
+  const std::size_t count = std::min(static_cast<std::size_t>(entry.scene->storage_size()), max_curves);
   for (std::size_t i = 0; i < count; ++i)
     motion.coordinates.push_back(coordinate(entry, static_cast<int>(i)));
   return motion;

@@ -9,6 +9,7 @@
 #include <diracstep/scene_format/compiler/size_limits.hpp>
 #include <diracstep/scene_format/loader/shipped_scenes.hpp>
 #include <diracstep/scene_format/parametric_scene_file.hpp>
+#include <diracstep/scene_format/position_names.hpp>
 #include <diracstep/scene_format/scene_catalogue.hpp>
 #include <diracstep/scene_format/scene_file.hpp>
 #include <diracstep/scene_format/scene_text.hpp>
@@ -43,6 +44,7 @@ void drop_redundant_rows(CatalogueScene& entry) {
 
 void set_tolerances(CatalogueScene& entry, const Parameters& tolerances) {
   if (tolerances.empty()) return;
+  require_flat(*entry.scene, "a tolerance of a coordinate");
   auto scene = std::make_shared<Scene>(*entry.scene);
   if (scene->tolerances.size() == 0) scene->tolerances.setZero(scene->dimension());
   for (const auto& [name, tolerance] : tolerances) {

@@ -5,6 +5,7 @@
 #include <diracstep/core/equilibrium/operating_point.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/system/consistent_start.hpp>
+#include <diracstep/core/system/on_space.hpp>
 #include <diracstep/core/system/row_subset.hpp>
 #include <diracstep/files/input_file.hpp>
 #include <diracstep/scene_format/compiler/circuit_reader.hpp>
@@ -18,6 +19,7 @@
 #include <diracstep/scene_format/loader/scene_kinks.hpp>
 #include <diracstep/scene_format/parametric_scene_file.hpp>
 #include <diracstep/scene_format/scene_file.hpp>
+#include <diracstep/scene_format/spaces/named_space.hpp>
 #include <diracstep/sensitivities/moved_start.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
 #include <limits>
@@ -35,18 +37,23 @@ constexpr double same_time = 1e-12;  // relative difference of times that are th
 StatedStart start_of(const LoadedScene& loaded) {
   const SceneProgram& program = *loaded.program;
   const auto n = static_cast<std::size_t>(loaded.layout.dimension());
-  StatedStart stated{{}, std::vector(n, StartOrigin::left_out), std::vector(n, StartOrigin::left_out)};
+  const std::size_t components = loaded.components().size();
+  StatedStart stated{
+      {}, std::vector(n, StartOrigin::left_out), std::vector(components, StartOrigin::left_out)};
   Evaluator time(program, loaded.parameters, {program.start_time});
   time.evaluate();
   Start start{static_cast<double>(time.value(0)), Vector::Zero(loaded.layout.dimension()), {}, {}};
-  Vector second = Vector::Zero(loaded.layout.dimension());
+  if (!program.document.spaces.kinds.empty())
+    start.q = named_space(program.document.spaces.kinds)->identity();
+  Vector second = Vector::Zero(static_cast<Eigen::Index>(components));
   for (const NamedValue& named : program.start)
     for_each_value(loaded, named, start.time, [&](int index, double value) {
+      const bool position = named.role == Role::position;
+      const auto& names = position ? loaded.layout.names() : loaded.components();
       if (!std::isfinite(value))
         throw SceneError(program.document.file, named.place,
                          fmt::format("the start of '{}' is {}; expected a finite number",
-                                     loaded.layout.names()[static_cast<std::size_t>(index)], value));
-      const bool position = named.role == Role::position;
+                                     names[static_cast<std::size_t>(index)], value));
       (position ? start.q : second)[index] = value;
       (position ? stated.q : stated.v)[static_cast<std::size_t>(index)] = StartOrigin::given;
     });
@@ -54,6 +61,24 @@ StatedStart start_of(const LoadedScene& loaded) {
   (by_momentum ? start.p : start.v) = second;
   stated.start = std::move(start);
   return stated;
+}
+
+/// Onto groups and spheres, from the digits that a file states.  Throws SceneError where it is far from them.
+void put_on_space(const LoadedScene& loaded, Start& start) {
+  constexpr double most = 1e-3;
+  const SceneDocument& document = loaded.program->document;
+  if (document.spaces.kinds.empty()) return;
+  const Vector on = named_space(document.spaces.kinds)->normalised(start.q);
+  for (Eigen::Index i = 0; i < on.size(); ++i)
+    if (!(std::abs(on[i] - start.q[i]) < most)) {
+      const auto& coordinate = document.coordinates[static_cast<std::size_t>(i)];
+      throw SceneError(
+          document.file, coordinate.place,
+          fmt::format("the start has {} = {:g} where a unit quaternion, or a cosine and its sine, "
+                      "has {:g}",
+                      coordinate.name, start.q[i], on[i]));
+    }
+  start.q = on;
 }
 
 /// Velocities of states are their rates.
@@ -130,7 +155,8 @@ class References {
       if (named.momentum) continue;  // not compared
       const bool velocity = named.role == Role::second;
       for_each_value(*loaded_, named, t, [&](int index, double value) {
-        const std::string& name = loaded_->layout.names()[static_cast<std::size_t>(index)];
+        const std::string& name =
+            (velocity ? loaded_->components() : loaded_->layout.names())[static_cast<std::size_t>(index)];
         state.components.push_back({velocity ? "v_" + name : name, index, velocity, value});
       });
     }
@@ -142,7 +168,8 @@ class References {
   std::optional<ReferencePoint> point(std::size_t i, double t) const {
     const auto n = loaded_->layout.dimension();
     ReferencePoint point{Vector::Constant(n, unknown),
-                         Vector::Constant(n, momentum_of_position_ ? 0.0 : unknown)};
+                         Vector::Constant(static_cast<Eigen::Index>(loaded_->components().size()),
+                                          momentum_of_position_ ? 0.0 : unknown)};
     for (const auto& component : state(i, t).components)
       (component.velocity ? point.v : point.q)[component.index] = component.value;
     if (!point.q.allFinite() || !point.v.allFinite()) return std::nullopt;
@@ -177,6 +204,17 @@ Vector tolerances_of(const LoadedScene& loaded) {
   return tolerances;
 }
 
+/// The functions of stored numbers as those on the space.  Kinks are looked for along the straight lines of
+/// R^n: of these nothing is known there.
+void put_functions_on_space(const LoadedScene& loaded, Scene& scene) {
+  scene.space = named_space(loaded.program->document.spaces.kinds);
+  scene.coordinates = loaded.components();
+  scene.lagrangian = on_space(scene.space, scene.lagrangian);
+  for (auto& rows : scene.constraints) rows = on_space(scene.space, rows);
+  if (scene.force) scene.force = on_space(scene.space, scene.force);
+  scene.kinks = nullptr;
+}
+
 Scene scene_of(const LoadedScenePtr& loaded, const Start& start) {
   Scene scene;
   scene.name = loaded->program->document.name;
@@ -188,6 +226,7 @@ Scene scene_of(const LoadedScenePtr& loaded, const Start& start) {
   scene.start = start;
   scene.kinks = file_kinks(loaded);
   scene.tolerances = tolerances_of(*loaded);
+  if (!loaded->program->document.spaces.kinds.empty()) put_functions_on_space(*loaded, scene);
   return scene;
 }
 
@@ -360,6 +399,7 @@ CatalogueScene load(const std::shared_ptr<const CompiledScene>& compiled, const 
   StatedStart stated = start_of(*loaded);
   require_inputs_over_span(*loaded->program, stated.start.time);
   set_rates_of_states(loaded, stated);
+  put_on_space(*loaded, stated.start);
   Scene scene = scene_of(loaded, stated.start);
   CatalogueScene entry;
   entry.changes = document.notes;

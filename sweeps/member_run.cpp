@@ -10,6 +10,7 @@
 #include <diracstep/core/runs/event_steps.hpp>
 #include <diracstep/core/runs/run.hpp>
 #include <diracstep/core/system/consistent_start.hpp>
+#include <diracstep/scene_format/position_names.hpp>
 #include <diracstep/sweeps/member_derivatives.hpp>
 #include <diracstep/sweeps/member_run.hpp>
 #include <limits>
@@ -143,6 +144,7 @@ CatalogueScene MemberRuns::scene_of(long number) const {
   const std::vector<std::string> names = sweep_.names();
   const std::vector<double> values = sweep_.member(number);
   CatalogueScene entry = make_scene_(parameters_of(number));
+  require_flat(*entry.scene, "a sweep");
   Start start = entry.scene->start;
   std::vector<std::string> given;
   for (std::size_t k = 0; k < names.size(); ++k) {

@@ -3,6 +3,7 @@
 #include <diracstep/command/files/trajectory_file.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/reports/report.hpp>
+#include <diracstep/scene_format/position_names.hpp>
 #include <exception>
 #include <iterator>
 
@@ -14,7 +15,8 @@ constexpr std::size_t max_waiting = 1 << 16;  // bytes gathered before they are 
 
 std::string header(const Scene& scene, const std::vector<Output>& further) {
   std::string line = "t";
-  for (const char* prefix : {"", "v_", "p_"})
+  for (const auto& name : position_names(scene)) line += ',' + csv_field(name);
+  for (const char* prefix : {"v_", "p_"})
     for (const auto& name : scene.coordinates) line += ',' + csv_field(prefix + name);
   for (const auto& name : scene.row_names()) line += ',' + csv_field("lambda_" + name);
   line += ",energy";

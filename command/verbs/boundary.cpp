@@ -13,6 +13,7 @@
 #include <diracstep/files/output_file.hpp>
 #include <diracstep/reports/json.hpp>
 #include <diracstep/reports/report.hpp>
+#include <diracstep/scene_format/position_names.hpp>
 #include <memory>
 #include <optional>
 
@@ -271,6 +272,7 @@ BoundaryConditions conditions_of(const BoundaryArguments& arguments, const Scene
 
 void run_boundary(BoundaryArguments arguments, Session& session) {
   const CatalogueScene entry = make_scene(session, arguments.scene, parameters(arguments.set));
+  require_flat(*entry.scene, "boundary");
   if (!entry.events.empty())
     throw Misuse("boundary does not go with the events of the scene: when one is met is not known before");
   take_recommendation(entry, arguments.method, arguments.step);

@@ -14,6 +14,7 @@
 #include <diracstep/reports/plot.hpp>
 #include <diracstep/reports/report.hpp>
 #include <diracstep/scene_format/parametric_scene_file.hpp>
+#include <diracstep/scene_format/position_names.hpp>
 #include <diracstep/sensitivities/fit.hpp>
 #include <memory>
 
@@ -203,6 +204,7 @@ void run_fit(FitArguments arguments, Session& session) {
     changes[name] = value;
   }
   const CatalogueScene entry = make_scene(session, arguments.scene, changes);
+  require_flat(*entry.scene, "fit");
   if (!entry.events.empty())
     throw Misuse("fit does not go with the events of the scene: when one is met is not differentiated");
   Vector begin(static_cast<Eigen::Index>(parameters_fitted.size()));

@@ -9,6 +9,7 @@
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/reports/json.hpp>
 #include <diracstep/reports/report.hpp>
+#include <diracstep/scene_format/position_names.hpp>
 #include <memory>
 
 namespace diracstep::command {
@@ -85,8 +86,16 @@ std::string start_text(const CatalogueScene& entry, const SolvedStart& solved) {
   std::vector<std::vector<std::string>> rows{{"coordinate", "q", "v", "p"}};
   if (accelerated) rows[0].emplace_back("dv/dt");
   const int shown = std::min(scene.dimension(), most_shown);
+  if (scene.space) {  // more numbers of q than of v and p
+    const std::vector<std::string> names = position_names(scene);
+    for (int i = 0; i < std::min(scene.storage_size(), most_shown); ++i) {
+      rows.push_back({names[static_cast<std::size_t>(i)], cell(solved.sample.q[i], stated, true, i), "", ""});
+      if (accelerated) rows.back().emplace_back();
+    }
+  }
   for (int i = 0; i < shown; ++i) {
-    rows.push_back({scene.coordinates[static_cast<std::size_t>(i)], cell(solved.sample.q[i], stated, true, i),
+    rows.push_back({scene.coordinates[static_cast<std::size_t>(i)],
+                    scene.space ? "" : cell(solved.sample.q[i], stated, true, i),
                     cell(solved.sample.v[i], stated, false, i), fmt::format("{:.15g}", solved.sample.p[i])});
     if (accelerated) rows.back().push_back(fmt::format("{:.15g}", solved.acceleration[i]));
   }
@@ -120,7 +129,7 @@ Json column_json(const std::vector<std::string>& names, const Vector& values) {
 std::string start_json(const CatalogueScene& entry, const SolvedStart& solved) {
   const Scene& scene = *solved.scene;
   Json json{{"scene", scene.name}, {"t", scene.start.time}};
-  json["q"] = column_json(scene.coordinates, solved.sample.q);
+  json["q"] = column_json(position_names(scene), solved.sample.q);
   json["v"] = column_json(scene.coordinates, solved.sample.v);
   json["p"] = column_json(scene.coordinates, solved.sample.p);
   json["acceleration"] =
@@ -129,10 +138,10 @@ std::string start_json(const CatalogueScene& entry, const SolvedStart& solved) {
   json["energy"] = solved.sample.energy;
   if (entry.stated_start) {
     const StatedStart& stated = *entry.stated_start;
-    json["given"] = {{"q", column_json(scene.coordinates, stated.start.q)},
+    json["given"] = {{"q", column_json(position_names(scene), stated.start.q)},
                      {"v", column_json(scene.coordinates, stated.start.v)},
                      {"p", column_json(scene.coordinates, stated.start.p)}};
-    json["origin"] = {{"q", origins_json(scene.coordinates, stated.q)},
+    json["origin"] = {{"q", origins_json(position_names(scene), stated.q)},
                       {"v", origins_json(scene.coordinates, stated.v)}};
     json["moved"] = {
         {"q", (solved.sample.q - stated.start.q).norm()},

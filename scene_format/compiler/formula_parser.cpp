@@ -163,6 +163,8 @@ class FormulaParser::Reader : FormulaScanner {
       return graph_.time();
     }
     if (const int id = symbols_.parameter(name); id != none) return parameter(place, id);
+    if (const auto found = symbols_.indexed.find(name); found != symbols_.indexed.end())
+      return entry(place, name, found->second);
     if (const auto found = symbols_.definitions.find(name); found != symbols_.definitions.end())
       return definition(place, found->first, found->second);
     if (const Node node = coordinate(place, name, Role::position); node != none) return node;
@@ -204,7 +206,7 @@ class FormulaParser::Reader : FormulaScanner {
 
   Node coordinate(std::size_t place, const std::string& name, Role role) {
     const std::string base = role == Role::position ? name : name.substr(2);
-    const int id = symbols_.family(base);
+    const int id = role == Role::position ? symbols_.family(base) : symbols_.velocity(base);
     if (id == none) return none;
     if (role == Role::position && !context_.positions)
       fail(place, "the coordinate '" + name + "' may not stand in " + context_.what);
@@ -216,6 +218,31 @@ class FormulaParser::Reader : FormulaScanner {
                                             : std::string()));
     const std::size_t loops = symbols_.families[static_cast<std::size_t>(id)].loops.size();
     return graph_.coordinate(id, subscript(place, name, loops), role);
+  }
+
+  /// R[1,2] or w_R[1].
+  Node entry(std::size_t place, const std::string& name, int indices) {
+    expect('[', indices == 1 ? "'[' and an index, for '" + name + "' is a vector"
+                             : "'[' and two indices, for '" + name + "' is a matrix");
+    std::string key = name;
+    for (int k = 0; k < indices; ++k) {
+      if (k > 0) expect(',', "',' and the second index");
+      key += (k == 0 ? '[' : ',') + std::to_string(whole_number(name));
+    }
+    expect(']', "']'");
+    const auto found = symbols_.entries.find(key + ']');
+    if (found == symbols_.entries.end()) fail(place, "there is no " + key + ']');
+    return definition(place, found->first, found->second);
+  }
+
+  long whole_number(const std::string& name) {
+    constexpr double most = 9.0;
+    peek();
+    const std::size_t here = at();
+    const double index = number_follows() ? number() : 0.0;
+    if (!(index >= 1.0 && index <= most && index == std::floor(index)))
+      fail(here, "an index of '" + name + "' is a number such as 1; a sum over it is written out");
+    return static_cast<long>(index);
   }
 
   Node subscript(std::size_t place, const std::string& name, std::size_t count) {
@@ -461,6 +488,7 @@ class FormulaParser::Reader : FormulaScanner {
       for (const auto& row : symbols_.rows) names.push_back("lambda_" + row);
     for (const auto& parameter : symbols_.parameters) names.push_back(parameter.name);
     for (const auto& [name, text] : symbols_.definitions) names.push_back(name);
+    for (const auto& [name, indices] : symbols_.indexed) names.push_back(name);
     for (const auto& [name, table] : symbols_.inputs) names.push_back(name);
     for (const int loop : context_.loops)
       names.push_back(symbols_.loops[static_cast<std::size_t>(loop)].variable);
@@ -517,7 +545,10 @@ Node FormulaParser::rate(Node f) {
   for (const Node node : graph_.reachable(std::span(&f, 1))) {
     const NodeData leaf = graph_[node];
     if (leaf.op != Op::coordinate || leaf.c != static_cast<int>(Role::position)) continue;
-    const Node velocity = graph_.coordinate(leaf.a, leaf.b, Role::second);
+    const Node velocity = symbols_.rates.empty()
+                              ? graph_.coordinate(leaf.a, leaf.b, Role::second)
+                              : formula(symbols_.rates[static_cast<std::size_t>(leaf.a)],
+                                        {.what = "a rate", .positions = true, .second = 'v'});
     rate = graph_.add(rate, graph_.multiply(graph_.derivative(f, node), velocity));
   }
   return rate;

@@ -40,6 +40,11 @@ struct Symbols {
   std::vector<std::string> rows;         ///< that are not repeated
   std::set<std::string> inputs_of_time;  ///< inputs that a formula reads at the time
   std::vector<std::string> forces;       ///< of these rows, as far as formulas read them
+  // On groups and spheres (SceneDocument::Spaces); empty in R^n.
+  std::map<std::string, int, std::less<>> components;       ///< of a velocity: the family that stands for it
+  std::map<std::string, FormulaText, std::less<>> entries;  ///< "R[1,2]", by the names in `indexed`
+  std::map<std::string, int, std::less<>> indexed;          ///< "R", "w_R": and the number of its indices
+  std::vector<FormulaText> rates;                           ///< of the families
 
   void add(Family family) {
     family_numbers.emplace(family.name, static_cast<int>(families.size()));
@@ -51,6 +56,12 @@ struct Symbols {
   }
   /// Their numbers; none for another name.
   int family(const std::string& name) const { return number(family_numbers, name); }
+  /// The family whose velocity is that of `name`.
+  int velocity(const std::string& name) const {
+    if (indexed.empty()) return family(name);
+    const auto found = components.find(name);
+    return found == components.end() ? none : found->second;
+  }
   int parameter(const std::string& name) const { return number(parameter_numbers, name); }
 
   using Numbers = std::unordered_map<std::string, int>;

@@ -93,6 +93,8 @@ void PieceBuilder::add_phase(SceneFunction& function, Piece piece) {
       if (varies(fxx[k][l]) || varies(fxy[k][l]) || varies(fyy[k][l])) function.quadratic = false;
     }
 
+  for (const Node slope : fx)
+    if (!zero(slope)) function.x_absent = false;
   if (has_kink(piece)) function.quadratic = function.y_hessian_constant = false;
 
   std::vector<Store> gradient, rate, position_rate;

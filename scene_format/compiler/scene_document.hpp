@@ -129,6 +129,16 @@ struct SceneDocument {
 
     std::string side(int number) const { return name + (number == 1 ? "_1" : "_2"); }
   };
+  /// Coordinates that are groups and spheres (scene_format/spaces); all empty in R^n.  Then the coordinates
+  /// above are the stored numbers in their order, and the first of them stand for the velocities as well: v
+  /// of number k is that of component k.
+  struct Spaces {
+    std::vector<std::string> kinds;                           ///< "SO3", "R1", …
+    std::map<std::string, std::string, std::less<>> kind_of;  ///< by the name in the file
+    std::vector<std::string> components;                      ///< names of those of a velocity
+    std::map<std::string, FormulaText, std::less<>> entries;  ///< "R[1,2]", "w_R[1]"
+    std::vector<FormulaText> rates;                           ///< of the stored numbers
+  };
   /// A body as a picture shows it.
   struct DrawnBody {
     std::string name, shape;        ///< "box", "sphere", "cylinder", "disc", "rod", "ellipsoid"
@@ -150,6 +160,7 @@ struct SceneDocument {
   std::string name, kind, description, source, needs;
   std::optional<FormulaText> lagrangian, hamiltonian, dissipation;
   std::vector<Coordinate> coordinates;
+  Spaces spaces;
   std::vector<Parameter> parameters;  ///< sizes first
   std::map<std::string, FormulaText, std::less<>> definitions;
   std::vector<Row> rows;

@@ -79,7 +79,23 @@ class SceneCompiler {
         fail(coordinate.place, "a coordinate is repeated over one or two loops, no more");
       symbols_.add(std::move(family));
     }
+    declare_spaces();
     for (const std::string& name : program_.differentiated) add_as_coordinate(name);
+  }
+
+  void declare_spaces() {
+    const SceneDocument::Spaces& spaces = document_.spaces;
+    if (spaces.kinds.empty()) return;
+    if (!program_.differentiated.empty())
+      throw Misuse(
+          fmt::format("scene '{}' is not in R^n: it is not differentiated by parameters", document_.name));
+    for (std::size_t k = 0; k < spaces.components.size(); ++k)
+      symbols_.components.emplace(spaces.components[k], static_cast<int>(k));
+    symbols_.entries = spaces.entries;
+    symbols_.rates = spaces.rates;
+    for (const auto& [entry, text] : spaces.entries)
+      symbols_.indexed.emplace(entry.substr(0, entry.find('[')),
+                               static_cast<int>(1 + std::ranges::count(entry, ',')));
   }
 
   void add_as_coordinate(const std::string& name) {
@@ -374,7 +390,7 @@ class SceneCompiler {
 
   void add_force(SceneFunction& function, Piece& single, const SceneDocument::Entry& entry) {
     const std::string& name = entry.key.text;
-    const int number = symbols_.family(name);
+    const int number = symbols_.velocity(name);
     if (number == none)
       fail(entry.key.start,
            fmt::format("[force]: there is no coordinate '{}'{}", name, suggestion(name, coordinates())));
@@ -418,7 +434,10 @@ class SceneCompiler {
 
   std::vector<std::string> coordinates() const {
     std::vector<std::string> names;
-    for (const auto& family : symbols_.families) names.push_back(family.name);
+    for (const auto& family : symbols_.families)
+      if (symbols_.velocity(family.name) != none) names.push_back(family.name);
+    for (const auto& [name, number] : symbols_.components)
+      if (symbols_.family(name) == none) names.push_back(name);
     return names;
   }
 
@@ -430,7 +449,7 @@ class SceneCompiler {
     const std::string bare = key.size() > 2 && (key.starts_with("v_") || momentum) ? key.substr(2) : key;
     NamedValue named{none, none, Role::position, momentum, {}, entry.key.start};
     for (const bool second : {false, true}) {
-      const int family = symbols_.family(second ? bare : key);
+      const int family = second ? (bare == key ? none : symbols_.velocity(bare)) : symbols_.family(key);
       if (named.family != none || family == none) continue;
       named.family = family;
       named.role = second ? Role::second : Role::position;

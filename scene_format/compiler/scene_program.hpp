@@ -60,6 +60,7 @@ struct SceneFunction {
   std::vector<RowGroup> groups = {};
   bool separable = true, y_hessian_constant = true, y_hessian_diagonal = true, quadratic = true,
        y_hessian_zero = true;
+  bool x_absent = true;    ///< coordinates do not enter
   bool autonomous = true;  ///< t does not enter
   bool workless = true;    ///< rows: and b = 0
 };

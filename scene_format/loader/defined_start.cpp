@@ -74,7 +74,7 @@ void require_outputs_defined(const LoadedScene& scene, const SceneFunction& func
 }
 
 bool finite(const PhaseFunction& f, double t, ConstVectorRef x, ConstVectorRef y) {
-  Vector fx(x.size()), fy(x.size()), fxx(f.pattern().nonzeros()), fxy = fxx, fyy = fxx;
+  Vector fx(f.dimension()), fy(fx), fxx(f.pattern().nonzeros()), fxy = fxx, fyy = fxx;
   f.gradient(t, x, y, fx, fy);
   f.hessian(t, x, y, fxx, fxy, fyy);
   return std::isfinite(f.value(t, x, y)) && fx.allFinite() && fy.allFinite() && fxx.allFinite() &&
@@ -115,7 +115,7 @@ void require_defined(const LoadedScene& scene, const Scene& functions, double t,
     fail_at_start(scene, "the rows", program.rows[k].groups.front().place);
   }
   if (!functions.force || v.size() == 0) return;
-  Vector f(q.size());
+  Vector f(v.size());
   functions.force->value(t, q, v, f);
   if (f.allFinite()) return;
   require_outputs_defined(scene, *program.force, "the force", start, v);

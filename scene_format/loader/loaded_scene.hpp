@@ -37,6 +37,12 @@ struct LoadedScene {
   scene_compiler::ParameterValues parameters;
   CoordinateLayout layout;
   std::vector<double> known;  ///< subexpressions of the parameters alone
+
+  /// Names of the components of a velocity: the coordinates in R^n, fewer than these on groups and spheres.
+  const std::vector<std::string>& components() const {
+    const auto& on_space = program->document.spaces.components;
+    return on_space.empty() ? layout.names() : on_space;
+  }
 };
 using LoadedScenePtr = std::shared_ptr<const LoadedScene>;
 

@@ -56,6 +56,7 @@ std::vector<std::pair<std::string, std::string>> scene_definition(const SceneDoc
   for (const auto& coordinate : document.coordinates)
     all.add("coordinate " + coordinate.name, (coordinate.loops ? formula(*coordinate.loops) : "single") +
                                                  (coordinate.cyclic ? ", cyclic" : ""));
+  for (const auto& [name, kind] : document.spaces.kind_of) all.add("space of " + name, kind);
   for (const auto& parameter : document.parameters)  // single values are known as they are used
     if (parameter.array)
       all.add("array " + parameter.name, fmt::format("{:.17g}", fmt::join(parameter.values, ", ")));

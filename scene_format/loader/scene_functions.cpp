@@ -128,7 +128,8 @@ class FilePhaseFunction : public Base {
   }
   static PhaseStructure structure_of(const SceneFunction& f) {
     return {f.separable, f.y_hessian_constant, f.y_hessian_diagonal,
-            f.quadratic, f.y_hessian_zero,     f.autonomous};
+            f.quadratic, f.y_hessian_zero,     f.autonomous,
+            f.x_absent};
   }
 
   LoadedFunction function_;

@@ -18,13 +18,14 @@ constexpr std::size_t value_kernel = 0, gradient_kernel = 1;
 
 void require_explicit(const SceneProgram& program) {
   const SceneFunction* lagrangian = program.lagrangian ? &*program.lagrangian : nullptr;
-  const char* reason = lagrangian == nullptr       ? "has no Lagrangian"
-                       : !program.rows.empty()     ? "has rows, with which steps are implicit"
-                       : program.force             ? "has forces"
-                       : !program.states.empty()   ? "has states"
-                       : !program.events.empty()   ? "has events"
-                       : program.start_by_momentum ? "starts with momenta"
-                       : !lagrangian->separable    ? "has no separable Lagrangian T(v) - V(q)"
+  const char* reason = lagrangian == nullptr                    ? "has no Lagrangian"
+                       : !program.document.spaces.kinds.empty() ? "is not in R^n"
+                       : !program.rows.empty()                  ? "has rows, with which steps are implicit"
+                       : program.force                          ? "has forces"
+                       : !program.states.empty()                ? "has states"
+                       : !program.events.empty()                ? "has events"
+                       : program.start_by_momentum              ? "starts with momenta"
+                       : !lagrangian->separable                 ? "has no separable Lagrangian T(v) - V(q)"
                        : !lagrangian->y_hessian_constant || !lagrangian->y_hessian_diagonal
                            ? "has no constant mass of each coordinate"
                            : nullptr;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <diracstep/core/spaces/space.hpp>
 #include <diracstep/validation/laws/derivative_examination.hpp>
 #include <numbers>
 #include <optional>
@@ -49,6 +50,10 @@ struct Line {
   double t;
   Vector x, y, dx, dy;
   double delta = 0.0;
+  const Space* space = nullptr;  ///< null in R^n
+
+  /// x + s dx, or x τ(s dx).
+  Vector position(double s) const { return space != nullptr ? space->moved(x, s * dx) : Vector(x + s * dx); }
 };
 
 Vector one(double value) { return Vector::Constant(1, value); }
@@ -64,14 +69,12 @@ Vector product(const SparsityPattern& pattern, const Vector& values, const Vecto
 }
 
 void examine_phase(const PhaseFunction& f, const Line& line, Deviation& gradient, Deviation& hessian) {
-  const Eigen::Index n = line.x.size();
+  const Eigen::Index n = line.dx.size();
   double noise = 0.0;
-  const auto value = [&](double s) {
-    return one(f.value(line.t, line.x + s * line.dx, line.y + s * line.dy));
-  };
+  const auto value = [&](double s) { return one(f.value(line.t, line.position(s), line.y + s * line.dy)); };
   const auto slopes = [&](double s, double shift) {
     Vector both(2 * n), fx(n), fy(n);
-    f.gradient(line.t + shift, line.x + s * line.dx, line.y + s * line.dy, fx, fy);
+    f.gradient(line.t + shift, line.position(s), line.y + s * line.dy, fx, fy);
     both << fx, fy;
     return both;
   };
@@ -109,7 +112,7 @@ void examine_rows(const ConstraintRows& rows, const Line& line, Deviation& first
   if (rows.holonomic()) {
     const auto phi = [&](double t, double s) {
       Vector values(m);
-      rows.position(t, line.x + s * line.dx, values);
+      rows.position(t, line.position(s), values);
       return values;
     };
     Vector differences = difference([&](double s) { return phi(line.t, s); }, line.delta, noise);
@@ -119,8 +122,8 @@ void examine_rows(const ConstraintRows& rows, const Line& line, Deviation& first
   }
   Vector d(rows.pattern().nonzeros()), rate(m), curvature(rows.curvature_pattern().nonzeros());
   rows.derivative(line.t, line.x, w, scale, d);
-  Vector differences = difference([&](double s) { return contracted(line.t, line.x + s * line.dx, scale); },
-                                  line.delta, noise);
+  Vector differences =
+      difference([&](double s) { return contracted(line.t, line.position(s), scale); }, line.delta, noise);
   second.add(product(rows.pattern(), d, line.dx), differences, noise);
   rows.time_derivative(line.t, line.x, w, rate);
   differences = difference([&](double s) { return contracted(line.t + s, line.x, 1.0); }, line.delta, noise);
@@ -128,7 +131,7 @@ void examine_rows(const ConstraintRows& rows, const Line& line, Deviation& first
   rows.annihilator_derivative(line.t, line.x, lambda, curvature);
   differences = difference(
       [&](double s) {
-        return product(rows.pattern(), coefficients(line.t, line.x + s * line.dx).first, lambda, true);
+        return product(rows.pattern(), coefficients(line.t, line.position(s)).first, lambda, true);
       },
       line.delta, noise);
   second.add(product(rows.curvature_pattern(), curvature, line.dx), differences, noise);
@@ -137,8 +140,8 @@ void examine_rows(const ConstraintRows& rows, const Line& line, Deviation& first
 void examine_force(const Force& force, const Line& line, Deviation& deviation) {
   double noise = 0.0;
   const auto value = [&](double s) {
-    Vector f(line.x.size());
-    force.value(line.t, line.x + s * line.dx, line.y + s * line.dy, f);
+    Vector f(line.dx.size());
+    force.value(line.t, line.position(s), line.y + s * line.dy, f);
     return f;
   };
   Vector fq(force.pattern().nonzeros()), fv = fq;
@@ -170,7 +173,7 @@ bool smooth_along(const Kinks& kinks, const Line& line) {
   constexpr double near = 10.0;  // in differences: powers such as max(0, y)^2.5 have none of high order there
   const auto at = [&](double s, double shift) {
     Vector g(kinks.count());
-    kinks.evaluate(line.t + shift, line.x + s * line.dx, line.y + s * line.dy, g);
+    kinks.evaluate(line.t + shift, line.position(s), line.y + s * line.dy, g);
     return g;
   };
   const Vector here = at(0.0, 0.0);
@@ -231,17 +234,20 @@ struct Place {
 };
 
 /// Lines through the points, through others near them, and through some farther off.
-std::vector<Place> places(const std::vector<ExaminedPoint>& points) {
+std::vector<Place> places(const Scene& scene, const std::vector<ExaminedPoint>& points) {
   std::vector<Place> all;
   for (const ExaminedPoint& point : points) {
-    const Eigen::Index n = point.q.size();
+    const Eigen::Index n = point.y.size();
     const double q_size = std::max(point.q.lpNorm<Eigen::Infinity>(), 1e-2);
     const double y_size = std::max(point.y.lpNorm<Eigen::Infinity>(), 1e-2);
     const Vector a = direction(n, 0.1), b = direction(n, 1.3);
     const auto add = [&](double q_off, double y_off, bool may_be_undefined) {
-      all.push_back(
-          {{point.t, point.q + q_off * q_size * b, point.y + y_off * y_size * a, q_size * a, y_size * b},
-           may_be_undefined});
+      const Line here{point.t, point.q,          point.y + y_off * y_size * a, q_size * b, y_size * b,
+                      0.0,     scene.space.get()};
+      Line line = here;
+      line.x = here.position(q_off);
+      line.dx = q_size * a;
+      all.push_back({line, may_be_undefined});
     };
     add(0.0, 0.1, false);
     add(1e-2, 0.11, false);
@@ -272,7 +278,7 @@ std::vector<ExaminedPoint> with_start(const Scene& scene, const std::vector<Exam
 
 std::vector<Finding> examine_derivatives(const Scene& scene, const std::vector<ExaminedPoint>& motion) {
   Deviations d;
-  for (const Place& place : places(with_start(scene, motion)))
+  for (const Place& place : places(scene, with_start(scene, motion)))
     examine_line(scene, place.line, place.may_be_undefined, d);
   std::vector<Finding> findings;
   if (scene.lagrangian) {
@@ -300,8 +306,8 @@ Finding examine_legendre_transform(const Scene& scene, const std::vector<Examine
     const double off = (a - b).lpNorm<Eigen::Infinity>();
     return off == 0.0 ? 0.0 : std::isfinite(off) ? off / size : HUGE_VAL;
   };
-  for (const Place& place : places(with_start(scene, motion))) {
-    const auto& [t, q, v, dx, dy, delta] = place.line;
+  for (const Place& place : places(scene, with_start(scene, motion))) {
+    const auto& [t, q, v, dx, dy, delta, space] = place.line;
     Vector lq(n), p(n), hq(n), hp(n);
     scene.lagrangian->gradient(t, q, v, lq, p);
     scene.hamiltonian->gradient(t, q, p, hq, hp);
