@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/sensitivities/detail/linearised_motion.hpp>
 #include <diracstep/sensitivities/sensitivities.hpp>
 #include <utility>

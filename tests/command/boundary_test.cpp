@@ -96,5 +96,22 @@ TEST_F(Boundary, AMotionThatDoesNotKeepItsEnergyIsDoubted) {
   EXPECT_NE(outcome.err.find("energy"), std::string::npos) << outcome.err;
 }
 
+/// Its steps are not divided where those of a run are.
+TEST_F(Boundary, AKinkOnTheWayIsDoubted) {
+  const std::string file = scene("valley", R"toml(
+lagrangian = "v_x^2/2 - abs(x)"
+[coordinates]
+x = {}
+[start]
+x = 1
+[span]
+end = 2
+step = 0.1
+)toml");
+  const Outcome outcome = run("boundary '" + file + "' --from x=1 --to x=-0.5 --end 2.7");
+  EXPECT_EQ(outcome.status, 3) << outcome.out;
+  EXPECT_NE(outcome.err.find("kink"), std::string::npos) << outcome.err;
+}
+
 }  // namespace
 }  // namespace diracstep::testing

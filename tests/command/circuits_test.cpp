@@ -493,5 +493,37 @@ TEST_F(Circuits, WhatANetlistDoesNotKnowIsRefusedByItsLine) {
   expect_refused(head, 1, {".tran"});
 }
 
+/// Between its pulses the current of the diode is 0 and so is the local error: steps could pass the next one
+/// by.
+TEST_F(Circuits, NoPulseOfARectifierIsPassedBy) {
+  const Json rectifier =
+      json(netlist("Half wave rectifier\nV1 a 0 SIN(0 10 50)\nD1 a k DMOD\nR1 k 0 1k\nC1 k 0 100u\n"
+                   ".model DMOD D(IS=1e-14 N=1)\n.tran 100u 100m\n.print V(k)\n.end\n"));
+  EXPECT_EQ(rectifier["method"], "damped/radau:3");
+  EXPECT_NEAR(value(rectifier["outputs"], "V(k)"), 8.0057829, 1e-4);  // fixed steps of 5 µs
+}
+
+/// u + u³/10 = V across a resistor whose current is u³/100, behind 10 Ω.
+TEST_F(Circuits, TheVoltageOfACurrentThatIsAFormulaHasAName) {
+  const Json cubic = json(scene("cubic", R"toml(
+[[source_voltage]]
+name = "V"
+nodes = ["ground", "a"]
+value = "2*sin(100*t)"
+[[resistor]]
+name = "R0"
+nodes = ["a", "b"]
+value = 10
+[[resistor]]
+name = "R"
+nodes = ["b", "ground"]
+current = "1e-2*u^3"
+capacitance = 0
+[outputs]
+b = "V(b)"
+)toml" + span(0.1, 1e-3)));
+  EXPECT_NEAR(value(cubic["outputs"], "b"), -0.990782161181258, 1e-6);
+}
+
 }  // namespace
 }  // namespace diracstep::testing

@@ -344,5 +344,33 @@ TEST_F(DampedCommand, VariableStepsNeedNothingButTheMethod) {
   expect_misuse("run knife_edge --method damped/radau:3 --rule left", {"no other rule"});
 }
 
+/// A motion that a torque drives has rates with real parts, but nothing damps it.
+TEST_F(DampedCommand, AForceWithoutVelocitiesDampsNothing) {
+  std::ofstream(path("drum.toml")) << R"toml(
+name = "drum"
+[[body]]
+name = "drum"
+mass = 2
+shape = "cylinder"
+radius = 0.1
+length = 0.5
+[[joint]]
+name = "shaft"
+kind = "revolute"
+between = ["ground", "drum"]
+point = [0, 0, 0]
+axis = [0, 0, 1]
+torque = 0.4
+[outputs]
+w = "shaft_rate"
+[span]
+end = 2
+step = 0.005
+)toml";
+  const Json drum = json("run '" + path("drum.toml") + "'");
+  EXPECT_EQ(drum["method"], "type1/gl:3");
+  EXPECT_NEAR(drum["outputs"]["w"].get<double>(), 0.4 * 2.0 / 0.01, 1e-5);
+}
+
 }  // namespace
 }  // namespace diracstep::testing

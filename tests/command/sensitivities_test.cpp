@@ -192,5 +192,21 @@ TEST_F(FitVerb, RefusesDataThatAreNone) {
   EXPECT_EQ(run("fit chaplygin_sleigh " + data_ + " --parameters a --sigma z=1").status, 2);
 }
 
+/// The time at which a jump of the force is crossed moves with the start; where the force has a kink alone,
+/// that changes nothing.
+TEST_F(SensitivitiesOfRuns, AJumpOfTheForceOnTheWayIsDoubted) {
+  const auto outcome_of = [&](const std::string& potential) {
+    std::ofstream(path("valley.toml"))
+        << "name = \"valley\"\nlagrangian = \"v_x^2/2 - " + potential +
+               "\"\n[coordinates]\nx = {}\n[parameters]\na = 1\n[start]\nx = 1\n"
+               "[span]\nend = 2.7\nstep = 0.1\n";
+    return run("run '" + path("valley.toml") + "' --sensitivities a,q0");
+  };
+  const Outcome jump = outcome_of("a*abs(x)");
+  EXPECT_EQ(jump.status, 3) << jump.out;
+  EXPECT_NE(jump.err.find("jump of the force"), std::string::npos) << jump.err;
+  EXPECT_EQ(outcome_of("a*(x^2 + max(0, -x)^2)/2").status, 0);
+}
+
 }  // namespace
 }  // namespace diracstep::testing

@@ -368,5 +368,30 @@ TEST_F(ActingEvents, ARowThatDoesNotFitIsTold) {
   EXPECT_NE(outcome.err.find("stop"), std::string::npos) << outcome.err;
 }
 
+/// A point that is set back a length: again and again within a step, whatever its size.
+TEST_F(ActingEvents, AreFoundBehindOneThatJumpsInTheSameStep) {
+  const std::string head = "name = \"t\"\n[coordinates]\nx = {}\n[states]\nn = {}\n";
+  const auto wraps = [&](const std::string& direction) {
+    return scene(
+        "lagrangian = \"v_x^2/2\"\n" + head +
+        "[start]\nv_x = 1\n[span]\nend = 5.5\nstep = 0.1\n[[events]]\nname = \"wrap\"\nwhen = \"x - 1\"\n" +
+        direction + "set = { x = \"x - 1\", n = \"n + 1\" }\n");
+  };
+  const auto expect = [](const Json& json, double x, double n) {
+    EXPECT_NEAR(json["end"]["q"][0].get<double>(), x, 1e-9);
+    EXPECT_NEAR(json["end"]["q"][1].get<double>(), n, 1e-9);
+  };
+  for (const char* steps : {"", " --step 1.7", " --adaptive"}) {
+    expect(result(wraps("direction = \"rising\"\n") + steps), 0.5, 5.0);
+    expect(result(wraps("") + steps), 0.5, 5.0);
+  }
+  // x = 1 + n/2 − 9.81 t²/2 lies in (1/2, 1].
+  expect(result(scene(
+             "lagrangian = \"v_x^2/2 - 9.81*x\"\n" + head +
+             "[start]\nx = 1\n[span]\nend = 2\nstep = 0.05\n[[events]]\nname = \"back\"\nwhen = \"x - 0.5\"\n"
+             "direction = \"falling\"\nset = { x = \"1\", n = \"n + 1\" }\n")),
+         1.0 - 19.62 + 19.5, 39.0);
+}
+
 }  // namespace
 }  // namespace diracstep::testing

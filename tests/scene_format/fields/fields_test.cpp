@@ -328,6 +328,11 @@ step = 0.1
   for (std::size_t i = 0; i < 11; ++i) EXPECT_NEAR(of_field[i], of_ladder[i], 2e-14);
 }
 
+/// Explicit steps, which large separable scenes get, have a limit that a file's step need not keep.
+TEST(Fields, TakeImplicitStepsWhereTheFileRecommendsNone) {
+  EXPECT_EQ(scene_from_text("f.toml", sine_gordon).recommended.method, "type1/gl:3");
+}
+
 TEST(Fields, AreRefusedWithThePlaceOfTheMistake) {
   const auto refused = [](const std::string& key, const std::string& value,
                           std::initializer_list<std::string> parts) {
@@ -338,6 +343,7 @@ TEST(Fields, AreRefusedWithThePlaceOfTheMistake) {
   refused("density", "3", {"f.toml:6", "formula in quotes"});
   refused("space", "\"gauss:9\"", {"f.toml:7", "lobatto:S"});
   refused("cells", "2", {"f.toml:8", "at least 3"});
+  refused("length", "-1", {"f.toml:10", "above 0"});
   refused("left", "\"periodic\"", {"boundary = \"periodic\" alone"});
   refused("left", "{ w = 1 }", {"f.toml:11", "unknown key 'w' in 'left'"});
   refused("motion", "\"motion + x\"", {"use themselves"});

@@ -373,6 +373,19 @@ TEST_F(Bodies, SizesFollowTheParameters) {
   EXPECT_EQ(bodies[0].coordinates, (std::vector<int>{0, 1, 2, 3, 4, 5, 6}));
 }
 
+/// The point of contact that the file gives stays, and the body is placed by the normal there.
+TEST_F(Bodies, WhatRollsOnASurfaceTouchesItWhereTheFileSays) {
+  const CatalogueScene bowl = scene(with_span(R"toml(gravity = 9.81
+body = [{ name = "ball", mass = 1.5, shape = "sphere", radius = 0.1 }]
+rolling = [{ body = "ball", kind = "ball", radius = 0.1, contact = [0.3, 0], surface = "0.4*(x^2 + y^2)/2" }]
+)toml"));
+  const Vector& q = bowl.scene->start.q;
+  const double slope = 0.12, length = std::sqrt(1.0 + slope * slope);
+  EXPECT_EQ(at(bowl, q, "ball_contact_x"), 0.3);
+  EXPECT_NEAR(at(bowl, q, "ball_x"), 0.3 - 0.1 * slope / length, 1e-12);
+  EXPECT_NEAR(at(bowl, q, "ball_z"), 0.018 + 0.1 / length, 1e-12);
+}
+
 // ------------------------------------------------------------------ what is refused
 
 std::string message_of(const std::string& text) {
@@ -408,6 +421,9 @@ TEST_F(Bodies, MistakesAreToldWithTheirPlace) {
            {"inertia = [0.1, 0.1, 0.05]", "shape = \"cube\"", {"scene.toml:6:9", "\"box\", \"cylinder\""}},
            {"inertia = [0.1, 0.1, 0.05]", "radius = 1", {"scene.toml:6:10", "needs a 'shape'"}},
            {"position = [0.6, 0, -0.8]", "position = [0.6, 0]", {"scene.toml:7:12", "list of three"}},
+           {"inertia = [0.1, 0.1, 0.05]",
+            "inertia = [0.1, 0.1, 0.1, 0.2, 0, 0]",
+            {"principal moments", "above 0"}},
            {"position = [0.6, 0, -0.8]",
             "orientation = [1, 1, 0, 0]",
             {"scene.toml:7:15", "of length 1.41421"}},
