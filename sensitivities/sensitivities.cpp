@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <diracstep/core/numerics/errors.hpp>
-#include <diracstep/core/numerics/scales.hpp>
+#include <diracstep/core/runs/jump_check.hpp>
 #include <diracstep/sensitivities/detail/linearised_motion.hpp>
 #include <diracstep/sensitivities/sensitivities.hpp>
 #include <utility>
@@ -22,33 +22,6 @@ Integrator& in_flat_space(Integrator& integrator) {
   if (integrator.scene().space)
     throw Misuse("sensitivities of scene '" + integrator.scene().name + "', which is not in R^n");
   return integrator;
-}
-
-}  // namespace
-
-namespace {
-
-/// Whether the force jumps where the motion crosses a kink, so that its values a little before and behind it
-/// do not come together.
-bool force_jumps(const Integrator& integrator, const KinkPassed& kink) {
-  constexpr double near = 1e-6, nearer = 1e-7;  // of a step
-  const Scene& scene = integrator.scene();
-  const Eigen::Index n = kink.at.q.size();
-  const double size = std::abs(integrator.options().step), left = integrator.time() - kink.time;
-  const Vector bend =
-      left != 0.0 ? Vector((integrator.velocity_estimate() - kink.at.v) / left) : Vector::Zero(n);
-  const auto force_at = [&](double away) {
-    const Vector q = kink.at.q + away * kink.at.v, v = kink.at.v + away * bend;
-    Vector force(n), momentum(n), more(n);
-    scene.force_and_momentum(kink.time, q, v, kink.at.p, force, momentum);
-    if (scene.force) {
-      scene.force->value(kink.time, q, v, more);
-      force += more;
-    }
-    return force;
-  };
-  const auto apart = [&](double part) { return max_norm(force_at(part * size) - force_at(-part * size)); };
-  return apart(nearer) > 0.5 * apart(near);
 }
 
 }  // namespace
@@ -90,7 +63,8 @@ struct Sensitivities::Parts {
   /// After a step: a crossing of a jump of the force is told.
   void note_kinks() {
     for (const KinkPassed& kink : integrator.kinks_passed())
-      if (doubt.empty() && force_jumps(integrator, kink))
+      if (doubt.empty() &&
+          force_jumps(integrator, kink, integrator.time() - kink.time, integrator.velocity_estimate()))
         doubt = "the motion crosses a jump of the force at t = " + to_text(kink.time) +
                 ", whose time moves with the start and the parameters: the derivatives leave that out";
   }

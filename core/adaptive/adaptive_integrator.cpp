@@ -13,7 +13,7 @@ namespace diracstep {
 
 namespace {
 
-constexpr double longest_of_driven = 10.0;  // steps of the options: a step without error may pass a drive by
+constexpr double longest_of_such = 5.0;  // steps of the options: see may_change_later()
 constexpr long scale_survey_steps = 120;
 
 constexpr std::array<std::pair<const char*, StepControl>, 4> controls{
@@ -108,8 +108,8 @@ AdaptiveIntegrator::AdaptiveIntegrator(const std::shared_ptr<const Scene>& scene
     whole_.emplace(std::make_shared<const Scene>(main_.scene()), registry, solvers, options_);
     local_.emplace(adaptive_.eps, main_.options().order, span(), adaptive_.smallest_step);
     if (adaptive_.end) instants_ = instants_on_the_way(main_.scene(), *adaptive_.end);
-    if (adaptive_.end && depends_on_time(main_.scene(), *adaptive_.end))
-      longest_ = longest_of_driven * std::abs(options_.step);
+    if (adaptive_.end && may_change_later(main_.scene(), *adaptive_.end))
+      longest_ = longest_of_such * std::abs(options_.step);
   } else {
     meter_.emplace(make_meter(main_.scene(), solvers, adaptive_, options_.step, report_.accelerations));
   }

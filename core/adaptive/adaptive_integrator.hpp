@@ -6,6 +6,7 @@
 #include <diracstep/core/integrator/integrator.hpp>
 #include <limits>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -72,7 +73,7 @@ struct ControlReport {
 class AdaptiveIntegrator {
  public:
   /// The sign of options.step is the direction; its size matters for the survey without an end, and for steps
-  /// by their local error where the scene depends on the time: those are at most ten times as long.  Throws
+  /// by their local error where it depends on the time or has kinks: those are at most five times it.  Throws
   /// Misuse as Integrator does, for a method that is neither self-adjoint (composed ones are) nor of the
   /// damping family, for a control that is not one of the method's, for a negative eps, and with a
   /// self-adjoint method for a monitor that is not positive or not even in v, and for a Lagrangian linear in
@@ -98,6 +99,8 @@ class AdaptiveIntegrator {
   const Work& work() const { return local_ ? local_work_ : main_.work(); }
   const Work& side_work() const { return side_.work(); }
   const ControlReport& control() const { return report_; }
+  /// Where the last step crossed kinks in q and v.
+  std::span<const KinkPassed> kinks_passed() const { return (whole_ ? *whole_ : main_).kinks_passed(); }
   const Integrator& integrator() const { return main_; }
   const IntegratorOptions& options() const { return options_; }
   const AdaptiveOptions& adaptive() const { return adaptive_; }

@@ -40,18 +40,19 @@ std::vector<double> instants_on_the_way(const Scene& scene, double end) {
   return all;
 }
 
-bool depends_on_time(const Scene& scene, double end) {
+bool may_change_later(const Scene& scene, double end) {
+  if (scene.kinks && scene.kinks->count() > 0) return true;
+  if (!scene.stepped_function().structure().autonomous) return true;
   constexpr int times = 32;
   const Start& start = scene.start;
   const int n = scene.dimension();
   ConstraintsAtPoint rows(scene.constraints, n);
   const auto values = [&](double t) {
-    Vector lq(n), p(n), force = Vector::Zero(n), offsets(scene.rows());
-    scene.force_and_momentum(t, start.q, start.v, start.p, lq, p);
+    Vector force = Vector::Zero(n), offsets(scene.rows());
     if (scene.force) scene.force->value(t, start.q, start.v, force);
     if (scene.rows() > 0) rows.evaluate(t, start.q);
-    Vector all(3 * n + scene.rows());
-    all << lq, p, force, (scene.rows() > 0 ? Vector(rows.offsets()) : offsets);
+    Vector all(n + scene.rows());
+    all << force, (scene.rows() > 0 ? Vector(rows.offsets()) : offsets);
     return all;
   };
   const Vector first = values(start.time);

@@ -11,8 +11,9 @@ namespace diracstep {
 /// tried first.
 std::vector<double> instants_on_the_way(const Scene& scene, double end);
 
-/// Whether L, the force or the rows at the start depend on the time between it and `end`, at 32 times there.
-bool depends_on_time(const Scene& scene, double end);
+/// Whether something may happen behind a while without any local error: L depends on the time, or the force
+/// or the rows at the start do at 32 times between it and `end`, or formulas have kinks in q and v.
+bool may_change_later(const Scene& scene, double end);
 
 /// The size of ordinary variable steps, by their local error: for methods of the damping family, which are
 /// not reversible at any size.

@@ -26,6 +26,7 @@ void VariableRunChecks::after_step() {
   // Steps by their local error resolve kinks.
   if (!integrator_.integrator().method().damped) kinks_.after(integrator_.integrator());
   work_.after(integrator_.integrator());
+  jumps_.after(integrator_.kinks_passed(), integrator_.integrator(), side_);
   if (!looking_) return;
   next_look_ += std::min(most_steps_for_a_look, std::max(steps_for_a_look, next_look_));
   if (!integrator_.sample(Momentum::projected, whole_).ok()) return;
@@ -35,8 +36,8 @@ void VariableRunChecks::after_step() {
 
 std::string VariableRunChecks::text() const {
   const Scene& scene = integrator_.integrator().scene();
-  return joined_doubts({energy_.text(), work_.text(), comparison_.text(), nodes_.text(), kinks_.text(),
-                        scene.doubt ? scene.doubt() : std::string()});
+  return joined_doubts({energy_.text(), work_.text(), comparison_.text(), nodes_.text(), jumps_.text(),
+                        kinks_.text(), scene.doubt ? scene.doubt() : std::string()});
 }
 
 }  // namespace diracstep

@@ -25,7 +25,8 @@ class VariableRunChecks {
         kinks_(integrator.integrator(),
                integrator.adaptive().end.value_or(integrator.time() +
                                                   100.0 * integrator.integrator().options().step)),
-        work_(integrator.integrator()) {}
+        work_(integrator.integrator()),
+        jumps_(integrator.integrator()) {}
 
   void before_step();
   void after_step();
@@ -47,6 +48,7 @@ class VariableRunChecks {
   StepComparison comparison_;
   KinkCheck kinks_;
   WorkCheck work_;
+  JumpCheck jumps_;
   long next_look_ = 1;
   bool looking_ = false;
   Sample node_, start_, whole_, parts_;

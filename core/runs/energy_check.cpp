@@ -56,7 +56,7 @@ void EnergyCheck::add_at_play(const Sample& point) {
                work = scene_.space ? max_norm(force_) * max_norm(point.q - start_position_)
                                    : std::abs(force_.dot(point.q - start_position_));
   double here = 0.0;
-  for (const double size : {kinetic, work})
+  for (const double size : {kinetic, damped_ ? 0.0 : work})
     if (std::isfinite(size)) here = std::max(here, size);
   at_play_ = std::max(at_play_, here);
   sum_at_play_ += here;

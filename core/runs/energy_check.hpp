@@ -16,7 +16,8 @@ bool keeps_energy(const Scene& scene);
 ///
 ///   |p·v|/2  and  |∂L/∂q·(q − q(start))|,
 ///
-/// where the start is the first point seen: neither depends on where coordinates or energies count from.
+/// of methods that damp the former alone, since forces that are large for a moment lose no energy of theirs;
+/// the start is the first point seen: neither depends on where coordinates or energies count from.
 /// They are measured by their mean over all points up to one, since a run that blows up has large ones at its
 /// end, from the 32nd point on; where fewer were seen, by the largest of all.  Methods of order 1 are off by
 /// 1/k of the kinetic energy k steps after a start from rest.

@@ -3,6 +3,7 @@
 #include <diracstep/core/runs/branch_check.hpp>
 #include <diracstep/core/runs/energy_check.hpp>
 #include <diracstep/core/runs/growth_check.hpp>
+#include <diracstep/core/runs/jump_check.hpp>
 #include <diracstep/core/runs/kink_check.hpp>
 #include <diracstep/core/runs/node_check.hpp>
 #include <diracstep/core/runs/step_size_check.hpp>
@@ -34,6 +35,7 @@ class RunChecks {
         branch_(integrator),
         growth_(integrator, steps),
         work_(integrator),
+        jumps_(integrator),
         kinks_(integrator, integrator.time() + static_cast<double>(steps) * integrator.options().step) {}
 
   void before_step(Integrator& integrator) {
@@ -46,6 +48,7 @@ class RunChecks {
     step_.after(integrator);
     branch_.after(integrator);
     kinks_.after(integrator);
+    jumps_.after(integrator.kinks_passed(), integrator, integrator);
     work_.after(integrator);
     growth_.at_node(integrator);
   }
@@ -60,7 +63,8 @@ class RunChecks {
   /// Empty, or the doubts, one after the other.
   std::string text() const {
     return joined_doubts({energy_.text(), work_.text(), step_.text(), nodes_.text(), branch_.text(),
-                          growth_.text(), kinks_.text(), scene_.doubt ? scene_.doubt() : std::string()});
+                          growth_.text(), jumps_.text(), kinks_.text(),
+                          scene_.doubt ? scene_.doubt() : std::string()});
   }
 
  private:
@@ -75,6 +79,7 @@ class RunChecks {
   BranchCheck branch_;
   GrowthCheck growth_;
   WorkCheck work_;
+  JumpCheck jumps_;
   KinkCheck kinks_;
   long step_number_ = 0;
   Sample node_;

@@ -316,5 +316,36 @@ step = 1e-5
   EXPECT_EQ(outcome.out.find("FAIL"), std::string::npos) << outcome.out;
 }
 
+/// 2 |x − sin t|: gl:3 is exact to its order between the jumps; x(10) by steps of 1e-3.
+TEST_F(Believed, AMethodWithNodesAtJumpsOfTheForceIsDoubted) {
+  const std::string file = scene("jumping", R"toml(
+lagrangian = "v_x^2/2 - 2*abs(x - sin(t)) + v_z^2/2 - z^2/2"
+[coordinates]
+x = {}
+z = {}
+[force]
+z = "-damping*v_z"
+[parameters]
+damping = 1e4
+[start]
+x = 1
+z = 0.1
+[span]
+end = 10
+step = 0.1
+)toml");
+  const auto expect_doubt = [&](const std::string& line) {
+    const Outcome outcome = run("run " + file + " " + line);
+    EXPECT_EQ(outcome.status, 3) << line << outcome.out;
+    EXPECT_NE(outcome.err.find("the force jumps at t = "), std::string::npos) << line << outcome.err;
+  };
+  expect_doubt("");  // damped/radau:3 by its local error
+  expect_doubt("--method damped/radau:2 --step 0.1");
+  expect_doubt("--method type1/trapezoidal --set damping=0");
+  const Outcome right = run("run " + file + " --method type1/gl:3 --set damping=0 --json");
+  ASSERT_EQ(right.status, 0) << right.err;
+  EXPECT_NEAR(Json::parse(right.out)["end"]["q"]["x"].get<double>(), 5.285903130916, 1e-8);
+}
+
 }  // namespace
 }  // namespace diracstep::testing

@@ -378,8 +378,8 @@ TEST_F(ActingEvents, AreFoundBehindOneThatJumpsInTheSameStep) {
         direction + "set = { x = \"x - 1\", n = \"n + 1\" }\n");
   };
   const auto expect = [](const Json& json, double x, double n) {
-    EXPECT_NEAR(json["end"]["q"][0].get<double>(), x, 1e-9);
-    EXPECT_NEAR(json["end"]["q"][1].get<double>(), n, 1e-9);
+    EXPECT_NEAR(json["end"]["q"]["x"].get<double>(), x, 1e-9);
+    EXPECT_NEAR(json["end"]["q"]["n"].get<double>(), n, 1e-9);
   };
   for (const char* steps : {"", " --step 1.7", " --adaptive"}) {
     expect(result(wraps("direction = \"rising\"\n") + steps), 0.5, 5.0);

@@ -178,6 +178,7 @@ nodes = ["a", "ground"]
 value = "1"
 [start]
 v_qA = 1
+v_qC = 0
 [span]
 end = 1
 step = 0.1
