@@ -88,7 +88,12 @@ def test_a_run_without_options_is_that_of_the_command(name):
 
 @pytest.mark.parametrize("file", SCENES, ids=lambda path: path.stem)
 def test_a_run_of_an_example_is_that_of_the_command(file):
-    assert_same(quietly(ds.load(file), every=7), of_command(file))
+    try:
+        scene = ds.load(file)
+    except ds.Misuse as refusal:  # a configuration space of its own
+        assert "in R^n only" in str(refusal)
+        return
+    assert_same(quietly(scene, every=7), of_command(file))
 
 
 @pytest.fixture
