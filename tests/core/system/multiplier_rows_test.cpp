@@ -62,8 +62,10 @@ TEST(MultipliersAsCoordinates, AreTheForcesOfTheRowsTheyStandFor) {
     const auto mine = samples_of(with_multipliers(), options, 60),
                rows = samples_of(with_rows(), options, 60);
     for (std::size_t k = 0; k < mine.size(); ++k) {
-      ASSERT_LT((mine[k].q.head(4) - rows[k].q).lpNorm<Eigen::Infinity>(), 1e-11) << options.method << " " << k;
-      ASSERT_LT((mine[k].v.head(4) - rows[k].v).lpNorm<Eigen::Infinity>(), 1e-10) << options.method << " " << k;
+      ASSERT_LT((mine[k].q.head(4) - rows[k].q).lpNorm<Eigen::Infinity>(), 1e-11)
+          << options.method << " " << k;
+      ASSERT_LT((mine[k].v.head(4) - rows[k].v).lpNorm<Eigen::Infinity>(), 1e-10)
+          << options.method << " " << k;
       ASSERT_NEAR(mine[k].q[4], -rows[k].lambda[0], 1e-9) << options.method << " " << k;
       ASSERT_NEAR(mine[k].q[5], -rows[k].lambda[1] / 3.0, 1e-9) << options.method << " " << k;
     }
