@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "fine_reference.hpp"
 #include "timing.hpp"
 
 namespace {
@@ -20,24 +21,10 @@ struct Tally {
   int runs = 0, refused = 0, met = 0, far_off = 0, warned = 0;
 };
 
-/// The scene's reference, or a run of GL(8) refined until round-off stops it.
-ReferenceEnd reference_of(const CatalogueScene& scene, const Registry& registry) {
-  if (scene.reference.at && scene.reference.at(scene.t_end)) return reference_end(scene, scene.t_end);
-  const ErrorControlReport fine = solve_to_error(
-      scene.scene, registry, kinsol(), scene.t_end,
-      {.error = 1e-16, .method = "type1/gl:8", .adaptive = false, .first_step = scene.natural_step});
-  return {.kind = "GL(8)",
-          .how = fine.refusal,
-          .self_error = fine.runs.back().difference,
-          .missing = {},
-          .q = fine.end.q,
-          .p = fine.end.p};
-}
-
 void examine(const std::string& name, Tally& tally) {
   const Registry registry = Registry::with_built_ins();
   const CatalogueScene scene = make_scene(name);
-  const ReferenceEnd reference = reference_of(scene, registry);
+  const ReferenceEnd reference = fine_reference(scene, registry);
   std::printf("\n%s, t = %g; reference %s, known to %.0e\n", name.c_str(), scene.t_end,
               reference.kind.c_str(), reference.self_error);
   for (int k = 3; k <= 11; ++k) {

@@ -14,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include "fine_reference.hpp"
 #include "timing.hpp"
 
 namespace {
@@ -21,20 +22,6 @@ namespace {
 using namespace diracstep;
 
 constexpr int decades[] = {3, 6, 9};
-
-/// The scene's reference, or a run of GL(8) refined until round-off stops it.
-ReferenceEnd truth_of(const CatalogueScene& scene, const Registry& registry) {
-  if (scene.reference.at && scene.reference.at(scene.t_end)) return reference_end(scene, scene.t_end);
-  const ErrorControlReport fine = solve_to_error(
-      scene.scene, registry, kinsol(), scene.t_end,
-      {.error = 1e-16, .method = "type1/gl:8", .adaptive = false, .first_step = scene.natural_step});
-  return {.kind = "GL(8)",
-          .how = fine.refusal,
-          .self_error = fine.runs.back().difference,
-          .missing = {},
-          .q = fine.end.q,
-          .p = fine.end.p};
-}
 
 double fewest_seconds(const std::function<void()>& work) {
   const double once = fewest_nanoseconds({work}, 1, 1).front() * 1e-9;
@@ -85,7 +72,7 @@ struct Ratios {
 void examine(const std::string& name, Ratios& ratios) {
   const Registry registry = Registry::with_built_ins();
   const CatalogueScene scene = make_scene(name);
-  const ReferenceEnd reference = truth_of(scene, registry);
+  const ReferenceEnd reference = fine_reference(scene, registry);
   std::vector<IntegratorOptions> methods;
   for (int s = 3; s <= 6; ++s) methods.push_back({.method = "type1/gl:" + std::to_string(s)});
   if (scene.scene->dimension() > 40 && scene.scene->rows() == 0)
