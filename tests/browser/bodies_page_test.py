@@ -5,7 +5,7 @@ import sys
 import time
 import unittest
 
-from headless import headless_browser
+from headless import BrowserTest
 from selenium.webdriver.common.action_chains import ActionChains
 
 REPORT, VIEW = pathlib.Path(sys.argv.pop(1)).resolve(), sys.argv.pop(1)
@@ -22,15 +22,7 @@ COLOURS = """
   return colours.size;"""
 
 
-class BodiesPage(unittest.TestCase):
-    @classmethod
-    def setUpClass(cls):
-        cls.browser = headless_browser()
-
-    @classmethod
-    def tearDownClass(cls):
-        cls.browser.quit()
-
+class BodiesPage(BrowserTest):
     def setUp(self):
         self.browser.set_window_size(1200, 1000)
         self.browser.execute_cdp_cmd("Emulation.setEmulatedMedia",
@@ -41,9 +33,6 @@ class BodiesPage(unittest.TestCase):
         self.browser.get(REPORT.as_uri())
         self.browser.execute_script(FIGURE + ".scrollIntoView()")
         time.sleep(0.5)
-
-    def script(self, text):
-        return self.browser.execute_script("return " + text)
 
     def canvas(self):
         return self.browser.find_element("css selector", "figure[data-plot=motion] canvas")

@@ -9,7 +9,7 @@ import sys
 import time
 import unittest
 
-from headless import headless_browser
+from headless import BrowserTest
 
 PHONE, DESKTOP, PAPER = 390, 1200, 680
 
@@ -137,16 +137,8 @@ return [...document.querySelectorAll('svg.picture')].flatMap(svg => {
   ['the CSV lacks rows']);"""
 
 
-class Report(unittest.TestCase):
+class Report(BrowserTest):
     page = None
-
-    @classmethod
-    def setUpClass(cls):
-        cls.browser = headless_browser()
-
-    @classmethod
-    def tearDownClass(cls):
-        cls.browser.quit()
 
     def open(self, width=DESKTOP, scheme="light", media="", motion="reduce"):
         command = self.browser.execute_cdp_cmd

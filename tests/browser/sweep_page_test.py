@@ -3,27 +3,16 @@ import pathlib
 import sys
 import unittest
 
-from headless import headless_browser
+from headless import BrowserTest
 from selenium.webdriver.support.ui import Select
 
 REPORT = pathlib.Path(sys.argv.pop(1)).resolve()
 
 
-class SweepPage(unittest.TestCase):
-    @classmethod
-    def setUpClass(cls):
-        cls.browser = headless_browser()
-
-    @classmethod
-    def tearDownClass(cls):
-        cls.browser.quit()
-
+class SweepPage(BrowserTest):
     def setUp(self):
         self.browser.set_window_size(1200, 1000)
         self.browser.get(REPORT.as_uri())
-
-    def script(self, text):
-        return self.browser.execute_script("return " + text)
 
     def choose(self, name, option):
         Select(self.browser.find_element("id", name)).select_by_visible_text(option)
