@@ -302,6 +302,14 @@ ScenePointer three_bodies() {
 }
 constexpr double figure_eight_period = 6.32591398;
 
+/// The guess of a run that began at t = 0.
+GuessedMotion through(const std::vector<Sample>& run, double step) {
+  return [&run, step](double t) {
+    const Sample& at = run[static_cast<std::size_t>(std::lround(t / step))];
+    return GuessedPoint{at.q, at.v};
+  };
+}
+
 TEST(BoundaryValues, TheFigureEightIsPeriodicWithItsMultipliers) {
   const ScenePointer scene = three_bodies();
   constexpr long count = 120;
@@ -313,13 +321,7 @@ TEST(BoundaryValues, TheFigureEightIsPeriodicWithItsMultipliers) {
     off.start.v[i] += 1e-3 * std::cos(2.0 * i);
   }
   const auto guess = samples_of(std::make_shared<const Scene>(off), options, count);
-  const BoundaryReport report = solved(
-      scene, options, periodic(6),
-      [&](double t) {
-        const auto& at = guess[static_cast<std::size_t>(std::lround(t / options.step))];
-        return GuessedPoint{at.q, at.v};
-      },
-      count);
+  const BoundaryReport report = solved(scene, options, periodic(6), through(guess, options.step), count);
   ASSERT_TRUE(report.converged) << report.ending;
   EXPECT_LE(report.iterations, 12);
   EXPECT_LT(distance(report.q.col(0), report.q.rightCols(1)), 1e-11);
@@ -346,13 +348,7 @@ TEST(BoundaryValues, PeriodicOrbitsOfALagrangianLinearInTheVelocity) {
   const IntegratorOptions options{.method = "type1/gl:3", .step = 0.1};
   const auto guess = samples_of(scene, options, 52);  // its own period is about 4.95
   for (const long count : {48L, 50L, 52L}) {
-    const BoundaryReport report = solved(
-        scene, options, periodic(2),
-        [&](double t) {
-          const Sample& at = guess[static_cast<std::size_t>(std::lround(t / options.step))];
-          return GuessedPoint{at.q, at.v};
-        },
-        count);
+    const BoundaryReport report = solved(scene, options, periodic(2), through(guess, options.step), count);
     ASSERT_TRUE(report.converged) << report.ending;
     EXPECT_EQ(report.free_directions, 1);
     EXPECT_GT((report.q.colwise() - report.q.col(0)).norm(), 1.0);  // no point at rest
@@ -374,13 +370,7 @@ TEST(BoundaryValues, PeriodicOrbitsOnHolonomicRows) {
   constexpr long count = 80;
   const IntegratorOptions options{.method = "type1/gl:5", .step = 7.0 / count};
   const auto guess = samples_of(pendulum, options, count);
-  const BoundaryReport report = solved(
-      pendulum, options, periodic(2),
-      [&](double t) {
-        const Sample& at = guess[static_cast<std::size_t>(std::lround(t / options.step))];
-        return GuessedPoint{at.q, at.v};
-      },
-      count);
+  const BoundaryReport report = solved(pendulum, options, periodic(2), through(guess, options.step), count);
   ASSERT_TRUE(report.converged) << report.ending;
   EXPECT_EQ(report.free_directions, 1);
   ASSERT_EQ(report.multipliers.size(), 2U);  // both 1, defective
