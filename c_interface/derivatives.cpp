@@ -57,12 +57,15 @@ int diracstep_differentiate(const diracstep_model* model, diracstep_integrator* 
     Integrator& stepper = stepper_of(of, given(integrator, "the integrator"), wanted.steps);
     Sensitivities sensitivities(stepper, of.registry, parametric(of, wanted));
     const int n = sensitivities.coordinates();
+    const auto note_doubt = [&] {  // an earlier one stays
+      if (!sensitivities.doubt().empty()) integrator->doubt = sensitivities.doubt();
+    };
     if (wanted.cotangent == nullptr) {
       Directions z(2 * n + wanted.parameters, 2 * n + wanted.parameters);
       z << sensitivities.by_position(), sensitivities.by_velocity(), sensitivities.by_parameters();
       const StepReport report = sensitivities.jvp(wanted.steps, z);
       if (!report.ok()) throw Failure(report.failure);
-      integrator->doubt = sensitivities.doubt();
+      note_doubt();
       const ReadDirections read = sensitivities.read(z);
       write(read.q, wanted.q, "q");
       write(read.v, wanted.v, "v");
@@ -75,7 +78,7 @@ int diracstep_differentiate(const diracstep_model* model, diracstep_integrator* 
       return read;
     });
     if (!gradient.report.ok()) throw Failure(gradient.report.failure);
-    integrator->doubt = sensitivities.doubt();
+    note_doubt();
     write(gradient.by_start.q0, wanted.q, "q");
     write(gradient.by_start.v0, wanted.v, "v");
     if (wanted.parameters > 0) write(gradient.by_start.parameters, wanted.by_parameters, "parameters");
