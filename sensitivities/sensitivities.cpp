@@ -62,11 +62,10 @@ struct Sensitivities::Parts {
 
   /// After a step: a crossing of a jump of the force is told.
   void note_kinks() {
-    for (const KinkPassed& kink : integrator.kinks_passed())
-      if (doubt.empty() &&
-          force_jumps(integrator, kink, integrator.time() - kink.time, integrator.velocity_estimate()))
-        doubt = "the motion crosses a jump of the force at t = " + to_text(kink.time) +
-                ", whose time moves with the start and the parameters: the derivatives leave that out";
+    if (!doubt.empty()) return;
+    if (const auto jump = jump_of_force(integrator.kinks_passed(), integrator, integrator))
+      doubt = "the motion crosses a jump of the force at t = " + to_text(*jump) +
+              ", whose time moves with the start and the parameters: the derivatives leave that out";
   }
 
   Integrator& integrator;

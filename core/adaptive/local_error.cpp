@@ -48,11 +48,11 @@ bool may_change_later(const Scene& scene, double end) {
   const int n = scene.dimension();
   ConstraintsAtPoint rows(scene.constraints, n);
   const auto values = [&](double t) {
-    Vector force = Vector::Zero(n), offsets(scene.rows());
-    if (scene.force) scene.force->value(t, start.q, start.v, force);
-    if (scene.rows() > 0) rows.evaluate(t, start.q);
-    Vector all(n + scene.rows());
-    all << force, (scene.rows() > 0 ? Vector(rows.offsets()) : offsets);
+    Vector all = Vector::Zero(n + scene.rows());
+    if (scene.force) scene.force->value(t, start.q, start.v, all.head(n));
+    if (scene.rows() == 0) return all;
+    rows.evaluate(t, start.q);
+    all.tail(scene.rows()) = rows.offsets();
     return all;
   };
   const Vector first = values(start.time);

@@ -2,19 +2,20 @@
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/core/runs/jump_check.hpp>
-#include <limits>
 
 namespace diracstep {
 
-bool force_jumps(Integrator& reader, const KinkPassed& kink, double later, const Vector& velocity) {
+namespace {
+
+bool jumps_at(const KinkPassed& kink, const Integrator& end, Integrator& reader) {
   constexpr double near = 1e-6, nearer = 1e-7;  // of a step
   const Scene& scene = reader.scene();
   const Eigen::Index n = scene.dimension();
   if (scene.space) return false;  // formulas on them show no kinks
   Sample at;
   if (!reader.sample(kink, Momentum::projected, at).ok()) return true;
-  const double size = std::abs(reader.options().step);
-  const Vector bend = later != 0.0 ? Vector((velocity - at.v) / later) : Vector::Zero(n);
+  const double size = std::abs(reader.options().step), later = end.time() - kink.time;
+  const Vector bend = later != 0.0 ? Vector((end.velocity_estimate() - at.v) / later) : Vector::Zero(n);
   const auto force_at = [&](double away) {
     Vector force(n), momentum(n), more(n);
     const Vector q = kink.at.q + away * at.v, v = at.v + away * bend;
@@ -27,22 +28,23 @@ bool force_jumps(Integrator& reader, const KinkPassed& kink, double later, const
   return apart(nearer) > 0.5 * apart(near);
 }
 
-JumpCheck::JumpCheck(const Integrator& integrator)
-    : method_(integrator.method().name), time_(std::numeric_limits<double>::quiet_NaN()) {
+}  // namespace
+
+std::optional<double> jump_of_force(std::span<const KinkPassed> kinks, const Integrator& end,
+                                    Integrator& reader) {
+  for (const KinkPassed& kink : kinks)
+    if (jumps_at(kink, end, reader)) return kink.time;
+  return std::nullopt;
+}
+
+JumpCheck::JumpCheck(const Integrator& integrator) : method_(integrator.method().name) {
   const MethodInfo& method = integrator.method();
   watched_ = method.damped || (method.stages == 0 && method.constraint_rule != StepRule::midpoint);
 }
 
-void JumpCheck::look(std::span<const KinkPassed> kinks, const Integrator& end, Integrator& reader) {
-  for (const KinkPassed& kink : kinks) {
-    if (!std::isnan(time_)) return;
-    if (force_jumps(reader, kink, end.time() - kink.time, end.velocity_estimate())) time_ = kink.time;
-  }
-}
-
 std::string JumpCheck::text() const {
-  if (std::isnan(time_)) return "";
-  return "the force jumps at t = " + to_text(time_) + " on the way, where " + method_ +
+  if (!first_) return "";
+  return "the force jumps at t = " + to_text(*first_) + " on the way, where " + method_ +
          " has a node and takes the force of one side for all of a part: its order is lost there; "
          "--method type1/gl:3 has none at such places";
 }
