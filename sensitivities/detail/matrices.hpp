@@ -48,7 +48,7 @@ class BlockSum<Sparse> {
   }
   Sparse result() {
     sum_.setFromTriplets(entries_.begin(), entries_.end());
-    return std::move(sum_);
+    return sum_;  // a sparse matrix of Eigen 3.4 cannot be moved
   }
 
  private:
