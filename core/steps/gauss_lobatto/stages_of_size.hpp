@@ -42,7 +42,7 @@ class Stages final : public FixedStages {
     for (int j = 0; j < s; ++j)
       for (int l = 0; l < s; ++l)
         for (int k = 0; k < s; ++k) mix_[j * s + l] += by_constraint_[j * s + k] * by_impulse_[k * s + l];
-    take_kernel(StageKernelSource::Effort::none);
+    take_kernel();
   }
 
   double evaluate(const double* x) override {
@@ -112,17 +112,16 @@ class Stages final : public FixedStages {
   void solve_splitting(double* f) override;
 
  private:
-  /// So many evaluations take as long as it takes to compile a kernel.
-  static constexpr long evaluations_worth_a_kernel = 1'000'000;
+  static constexpr long evaluations_told_at_once = 256;
 
   bool has_kernel() {
-    if (kernel_.run == nullptr && ++evaluations_ == evaluations_worth_a_kernel)
-      take_kernel(StageKernelSource::Effort::compile);
+    if (kernel_.run == nullptr && ++evaluations_ == evaluations_told_at_once) take_kernel();
     return kernel_.run != nullptr;
   }
-  void take_kernel(StageKernelSource::Effort effort) {
+  void take_kernel() {
     const auto* const source = dynamic_cast<const StageKernelSource*>(a_.lagrangian);
-    if (source != nullptr) kernel_ = source->stage_kernel(a_.rows, s, effort);
+    if (source != nullptr) kernel_ = source->stage_kernel(a_.rows, s, evaluations_);
+    evaluations_ = 0;
     if (kernel_.run != nullptr) call_ = call_of_kernel();
   }
 
@@ -257,7 +256,7 @@ class Stages final : public FixedStages {
 
   StageArrays a_;
   StageKernel kernel_{};
-  long evaluations_ = 0;  ///< without a kernel
+  long evaluations_ = 0;  ///< without a kernel, and not told its source yet
   const StageWeights& weights_;
   FullBlocks<n, n> second_;
   FullBlocks<rows, n> forms_pattern_;
