@@ -1,10 +1,15 @@
 /// A sweep over a parameter of a small scene: how much of its processor time the steps take, the memory it
-/// needs, and both processors at once.
+/// needs, and both processors at once.  Before that what a step by direct() takes in the first and in the
+/// last members of a sweep over a scene of one's own, whose stage kernel is compiled on the way.
 #include <sys/resource.h>
 
 #include <chrono>
+#include <cmath>
+#include <cstdlib>
 #include <diracstep/core/runs/run.hpp>
 #include <diracstep/scene_format/scene_file.hpp>
+#include <diracstep/scene_format/scene_text.hpp>
+#include <diracstep/solvers/direct_solver.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
 #include <diracstep/sweeps/sweep_folder.hpp>
 #include <filesystem>
@@ -46,11 +51,37 @@ double seconds_of_steps(const Sweep& sweep, const SceneFile& file, const Registr
   return seconds / samples * static_cast<double>(sweep.members());
 }
 
+void compare_members_of_own_scene(const Registry& registry) {
+  constexpr long members = 1000, compared = 50;
+  const auto cache = std::filesystem::temp_directory_path() / "diracstep_bench_sweeps_cache";
+  std::filesystem::remove_all(cache);
+  setenv("DIRACSTEP_CACHE", cache.c_str(), 1);
+  std::string text = scene_text("kepler_e06");
+  const std::string potential = "1/sqrt(x^2 + y^2)";
+  text.replace(text.find(potential), potential.size(), "1.0625/sqrt(x^2 + y^2)");  // not in the catalogue
+  const SceneFile file("own.toml", text);
+  double first = HUGE_VAL, last = HUGE_VAL;  // the fastest member of each end
+  for (long k = 0; k < members; ++k) {
+    const CatalogueScene entry = file.load({{"e", 0.6 + 1e-6 * static_cast<double>(k)}});
+    Integrator integrator(entry.scene, registry, direct(), {.method = "type1/gl:3", .step = 0.05});
+    const double before = processor_seconds();
+    for (long n = 0; n < steps; ++n)
+      if (!integrator.step().ok()) std::printf("a step failed\n");
+    const double ns = 1e9 * (processor_seconds() - before) / steps;
+    if (k < compared) first = std::min(first, ns);
+    if (k >= members - compared) last = std::min(last, ns);
+  }
+  std::printf("a scene of one's own, direct, ns a step: %.0f in the first members, %.0f in the last\n", first,
+              last);
+  std::filesystem::remove_all(cache);
+}
+
 }  // namespace
 
 int main(int count, char** arguments) {
   const long members = count > 1 ? std::stol(arguments[1]) : 20000;
   const Registry registry = Registry::with_built_ins();
+  compare_members_of_own_scene(registry);
   const SceneFile file = scene_source("kepler_e06");
   const auto folder = std::filesystem::temp_directory_path() / "diracstep_bench_sweeps";
   std::printf("kepler_e06, type1/gl:3, e varied, %ld steps a member\n", steps);

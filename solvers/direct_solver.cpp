@@ -101,9 +101,8 @@ class DirectSolver final : public NonlinearSolver {
 
   /// Newton's method from now on, where the fixed-point iteration has turned out to be slow.
   void judge(int iterations) {
-    if (!trial_.add(report_.ok() ? iterations : max_fixed_point)) return;
-    trial_.judge(quick_directly);
-    trial_.count_again();
+    trial_.add(report_.ok() ? iterations : max_fixed_point, quick_directly);
+    if (trial_.over()) trial_.count_again();
   }
 
   /// Newton's method with full steps, as KINSOL takes them: until F is below the tolerance, and where the

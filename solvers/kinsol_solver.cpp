@@ -111,7 +111,7 @@ class KinsolSolver final : public NonlinearSolver {
   /// Newton's method from now on, where the fixed-point iteration has turned out to be slow.
   void judge_fixed_point() {
     if (trial_.given_up() || trial_.over()) return;
-    if (trial_.add(report_.ok() ? report_.iterations : options_.max_iterations)) trial_.judge(quick);
+    trial_.add(report_.ok() ? report_.iterations : options_.max_iterations, quick);
   }
 
   /// From the guess to a status.

@@ -3,18 +3,18 @@
 
 #include <CLI/App.hpp>
 #include <algorithm>
-#include <chrono>
 #include <diracstep/command/arguments.hpp>
 #include <diracstep/command/files/written_file.hpp>
 #include <diracstep/command/interrupt.hpp>
 #include <diracstep/command/progress.hpp>
 #include <diracstep/command/scene_selection.hpp>
 #include <diracstep/command/verbs.hpp>
+#include <diracstep/command/verbs/study_arguments.hpp>
+#include <diracstep/command/verbs/study_output.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/files/input_file.hpp>
 #include <diracstep/files/paths.hpp>
 #include <diracstep/reports/build_facts.hpp>
-#include <diracstep/reports/plot.hpp>
 #include <diracstep/reports/report.hpp>
 #include <diracstep/reports/study_comparison.hpp>
 #include <diracstep/reports/study_page.hpp>
@@ -50,189 +50,10 @@ const std::vector<std::string> fair_selection{"knife_edge",
 /// … and with --full these as well.
 const std::vector<std::string> more_scenes{"vertical_rolling_disk", "car_axis",   "rigid_body_quat",
                                            "point_vortices_two",    "lc_circuit", "hanging_chain"};
-
-using Series = std::vector<std::pair<std::string, int>>;
-const Series quick_series{{"type1/gl:3", 6},
-                          {"type1/gl:4", 8},
-                          {"type1/gl:6", 12},
-                          {"type1/trapezoidal", 4},
-                          {"type1/trapezoidal", 8}};
-const Series full_series{{"type1/midpoint", 2},     {"type1/midpoint", 4},    {"type1/midpoint", 8},
-                         {"type1/trapezoidal", 4},  {"type1/trapezoidal", 6}, {"type1/trapezoidal", 8},
-                         {"type1/trapezoidal", 10}, {"type1/gl:2", 4},        {"type1/gl:3", 6},
-                         {"type1/gl:4", 8},         {"type1/gl:5", 10},       {"type1/gl:6", 12}};
-const std::vector<double> quick_rtols{1e-2, 1e-3, 1e-5, 1e-7, 1e-9, 1e-11, 1e-13};
-constexpr int quick_repeats = 3, full_repeats = 5;
-constexpr double quick_budget = 0.1, full_budget = 1.0;  // CPU seconds of a run
-constexpr double quick_time = 34.0;                      // CPU seconds for all scenes, pictures left out
-constexpr double quick_reference = 1.5, full_reference = 30.0;  // CPU seconds
-
-constexpr std::chrono::seconds between_pages(10);
-
-constexpr const char* best_formulation = "best";  // of IDA on a scene
-
-struct StudyArguments {
-  std::vector<std::string> scenes;
-  std::optional<std::string> methods;
-  std::optional<std::string> orders, steps, rtols;
-  std::string ida_formulation = best_formulation;
-  bool without_ida = false, without_erk = false;
-  bool adaptive = false, full = false;
-  std::optional<int> repeat;
-  std::optional<double> budget;
-  std::optional<double> end;
-  std::string momentum = "projected";
-  std::string out, compare, more_scenes, table;
-  std::vector<std::string> set;
-  bool json = false;
-};
+constexpr double quick_time = 34.0;  // CPU seconds for all scenes, pictures left out
 
 /// Where a study of no named scenes leaves its report.
 const std::string default_directory = "diracstep-study";
-
-constexpr const char* summary_explanation =
-    "# CPU time to an error\n\n"
-    "Written by `diracstep study SCENE... --methods A,B,... --table FILE`: the thread's CPU time at which "
-    "the relative\n"
-    "error (maximum norm, q and projected p) at the end of the motion reaches each level, read off the lower "
-    "envelope of\n"
-    "error against time by log-log interpolation. A dash: the method does not get there. Where the "
-    "coarsest run is\n"
-    "below the level already, its time stands, on every side. The fastest of ours is bold. One run on one "
-    "machine:\ncompare within a table.\n\n";
-
-std::string tables(const std::vector<Study>& studies) {
-  std::string text = summary_explanation + sundials_build() + ".\n\n";
-  for (const Study& study : studies) text += at_error_markdown(study);
-  return text;
-}
-
-/// The directory of --out: study.csv, study.json, summary.md, report.html, and of each scene its pictures and
-/// the run looked at, renewed after each scene; report.html, which holds them all, at the end and now and
-/// then.
-class OutputDirectory {
- public:
-  explicit OutputDirectory(const std::string& path) : path_(output_directory(path)) {
-    if (const auto failure = write_tables({}); !failure.empty()) throw Misuse("--out: " + failure);
-  }
-
-  /// Empty, or what could not be written.
-  std::string write(const std::vector<Study>& studies, const std::vector<PageEntry>& page,
-                    const PageFacts& options, bool last) {
-    draw(studies, page.back());
-    const std::string stem = (path_ / file_name(page.back().study.scene)).string();
-    std::string failure = write_tables(studies);
-    if (failure.empty()) failure = write_file(stem + ".txt", study_table(page.back().study));
-    const History& history = page.back().history;
-    if (failure.empty() && !history.time.empty())
-      failure = write_file(stem + "-history.csv", history_csv(history));
-    if (failure.empty() && !history.time.empty())
-      failure = write_file(stem + "-motion.csv", motion_csv(history));
-    const auto now = std::chrono::steady_clock::now();
-    if (failure.empty() && (last || now > next_page_)) {
-      failure = write_file(path_ / "report.html", study_page(page, options, path_));
-      next_page_ = now + between_pages;
-    }
-    return failure;
-  }
-
-  std::string report() const { return (path_ / "report.html").string(); }
-
- private:
-  void draw(const std::vector<Study>& studies, const PageEntry& entry) const {
-    tell(draw_work_precision(entry.study, entry.time_unit, series_styles(studies), path_));
-    if (!entry.history.time.empty())
-      tell(draw_history(entry.history, entry.study.scene, entry.time_unit, series_styles(studies), path_));
-    if (sundials_is_optimised()) tell(draw_summary(studies, path_));
-  }
-
-  static void tell(const std::string& failure) {
-    if (!failure.empty()) say(failure);
-  }
-
-  std::string write_tables(const std::vector<Study>& studies) const {
-    std::string failure = write_file(path_ / "study.csv", studies_csv(studies));
-    if (failure.empty()) failure = write_file(path_ / "study.json", studies_json(studies) + '\n');
-    if (failure.empty()) failure = write_file(path_ / "summary.md", summary_markdown(studies));
-    return failure;
-  }
-
-  std::filesystem::path path_;
-  std::chrono::steady_clock::time_point next_page_ = std::chrono::steady_clock::now();
-};
-
-std::optional<DaeFormulation> formulation(const std::string& given) {
-  if (given == best_formulation) return {};
-  std::string allowed = best_formulation;
-  for (const DaeFormulation known : all_formulations) {
-    if (given == name(known)) return known;
-    allowed += std::string(", ") + name(known);
-  }
-  throw Misuse(fmt::format("--ida-formulation '{}' is not known; allowed are {}", given, allowed));
-}
-
-/// Where the person said how far the ladders go, they go so far.
-bool limited(const StudyArguments& options) {
-  return !options.full && !options.steps && !options.rtols && !options.budget;
-}
-
-StudyOptions study_options(const StudyArguments& options) {
-  StudyOptions study;
-  if (options.methods)
-    study.methods = names("--methods", *options.methods);
-  else if (!options.orders)
-    study.series = options.full ? full_series : quick_series;
-  if (!options.full) study.rtols = quick_rtols;
-  if (options.orders) study.orders = whole_numbers("--orders", *options.orders);
-  if (options.steps) study.steps = numbers("--steps", *options.steps);
-  if (options.rtols) study.rtols = numbers("--rtols", *options.rtols);
-  if (options.without_ida) std::erase(study.baselines, ida_method);
-  if (options.without_erk) std::erase(study.baselines, erk_method);
-  study.ida_formulation = formulation(options.ida_formulation);
-  study.adaptive = options.adaptive;
-  study.repeats = options.repeat.value_or(options.full ? full_repeats : quick_repeats);
-  study.run_budget = options.budget.value_or(options.full ? full_budget : quick_budget);
-  if (limited(options)) study.smallest_error = 0.5 * compared_errors.back();
-  study.reference_budget = options.full ? full_reference : quick_reference;
-  study.t_end = options.end;
-  study.momentum = momentum(options.momentum);
-  return study;
-}
-
-constexpr const char* formulations =
-    "rates: multipliers as derivatives, φ = 0 beside A v + b = 0 (Gear, Gupta, Leimkuhler), index 1; "
-    "rates-loose: the same without a tolerance on the multipliers; index-2: the multipliers themselves, "
-    "without a tolerance; velocity: as rates with A v + b = 0 alone, so that φ drifts";
-
-/// What was asked for, as the report tells it.
-PageFacts facts_of(const StudyOptions& study) {
-  PageFacts facts;
-  if (study.series.empty()) {
-    facts.emplace_back("methods", fmt::format("{}", fmt::join(study.methods, ", ")));
-    facts.emplace_back(
-        "orders", study.orders.empty() ? "all that fit" : fmt::format("{}", fmt::join(study.orders, ", ")));
-  } else {
-    std::vector<std::string> names;
-    for (const auto& [method, order] : study.series)
-      names.push_back(fmt::format("{} order {}", method, order));
-    facts.emplace_back("methods", fmt::format("{}", fmt::join(names, ", ")));
-  }
-  facts.emplace_back("steps", study.steps.empty()
-                                  ? fmt::format("a ladder, up to {:g} s of CPU time a run", study.run_budget)
-                                  : fmt::format("{}", fmt::join(study.steps, ", ")));
-  if (!study.baselines.empty())
-    facts.emplace_back("tolerances of the baselines", fmt::format("{:g}", fmt::join(study.rtols, ", ")));
-  if (std::ranges::find(study.baselines, ida_method) != study.baselines.end()) {
-    facts.emplace_back("formulation of IDA",
-                       study.ida_formulation ? name(*study.ida_formulation)
-                                             : "on each scene those that are fastest to 1e-3, 1e-6 or 1e-9");
-    facts.emplace_back("formulations", formulations);
-  }
-  facts.emplace_back("CPU time", fmt::format("of the thread, output excluded, median of {}", study.repeats));
-  facts.emplace_back("time", "the ladders share the time of a quick study; --full has no limit");
-  facts.emplace_back("momentum", name(study.momentum));
-  return facts;
-}
 
 std::string label(const StudyRow& row) {
   if (row.is_baseline()) return fmt::format("{}, rtol {:g}", row.method, row.rtol);
@@ -262,10 +83,6 @@ bool tell_failures(const Study& study, const StudyArguments& options) {
     failure = counts(row, study, options) || failure;
   }
   return failure;
-}
-
-bool nothing_named(const StudyArguments& options) {
-  return options.scenes.empty() && options.more_scenes.empty();
 }
 
 std::vector<CatalogueScene> chosen_scenes(const StudyArguments& options, const Session& session) {

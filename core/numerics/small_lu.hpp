@@ -28,9 +28,7 @@ class SmallLu {
       int pivot = k;
       for (int i = k + 1; i < n; ++i)
         if (std::abs(pivot_column[i]) > std::abs(pivot_column[pivot])) pivot = i;
-      double largest = 0.0;
-      for (int i = 0; i < n; ++i) largest = std::max(largest, std::abs(values[i + k * n]));
-      if (!(std::abs(pivot_column[pivot]) > round_off * largest)) return false;
+      if (!(std::abs(pivot_column[pivot]) > round_off * largest(values + k * n))) return false;
       exchanges_[static_cast<std::size_t>(k)] = pivot;
       if (pivot != k)
         for (int j = 0; j < n; ++j) std::swap(column(j)[k], column(j)[pivot]);
@@ -58,6 +56,20 @@ class SmallLu {
 
   int size() const { return N > 0 ? N : size_; }
   double* column(int j) { return lu_.data() + static_cast<std::ptrdiff_t>(j) * size(); }
+
+  /// Of a column, in four strands: in a single one each entry waits for the last.
+  double largest(const double* values) const {
+    std::array<double, 4> most{};
+    const int n = size(), whole = n - n % 4;
+    const auto take = [&](int strand, int i) {
+      const double entry = std::abs(values[i]);
+      most[strand] = entry > most[strand] ? entry : most[strand];
+    };
+    for (int i = 0; i < whole; i += 4)
+      for (int strand = 0; strand < 4; ++strand) take(strand, i + strand);
+    for (int i = whole; i < n; ++i) take(0, i);
+    return std::max(std::max(most[0], most[1]), std::max(most[2], most[3]));
+  }
 
   /// Substitution with b in registers: each entry waits for the one before it, and where that goes through
   /// memory the waiting takes twice the time.

@@ -50,10 +50,14 @@ class StageKernelSource {
   StageKernelSource& operator=(const StageKernelSource&) = delete;
   virtual ~StageKernelSource() = default;
 
-  enum class Effort { none, compile };
+  /// Evaluations that take as long as it takes to compile a kernel, some tenths of a second.
+  static constexpr long evaluations_worth_a_kernel = 1'000'000;
   /// The function for L with these rows, which may be null, and no force.  It lives as long as the
-  /// Lagrangian.  Without effort only if it is there already: compiling takes some tenths of a second.
-  virtual StageKernel stage_kernel(const ConstraintRows* rows, int stages, Effort effort) const = 0;
+  /// Lagrangian.  `evaluations` have been done without it since the last call: those of all steps with so
+  /// many stages, in whatever run of the scene's file, are added up, and decide whether one is compiled that
+  /// is not there.  May be called from several threads at once; one that finds another compiling goes on
+  /// without.
+  virtual StageKernel stage_kernel(const ConstraintRows* rows, int stages, long evaluations) const = 0;
 };
 
 }  // namespace diracstep

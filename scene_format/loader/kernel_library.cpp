@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 #include <cstdlib>
+#include <diracstep/core/system/stage_kernel.hpp>
 #include <diracstep/files/output_file.hpp>
 #include <diracstep/files/sha256.hpp>
 #include <diracstep/files/shown_text.hpp>
@@ -177,12 +178,14 @@ KernelLibrary kernel_library(const SceneProgram& program) {
   return {static_cast<const CompiledKernel*>(table.address), std::move(table.handle), table.origin};
 }
 
-CompiledStageKernel StageKernelLibrary::kernel(int stages, bool compile) const {
+CompiledStageKernel StageKernelLibrary::kernel(int stages, long evaluations) const {
   if (kernels_.kernels == nullptr || !sources_.any() || stages > StageKernels::most_stages) return nullptr;
   const auto number = static_cast<std::size_t>(stages) - 1;
   if (kernels_.handle == nullptr) return kernels_.stages == nullptr ? nullptr : kernels_.stages[number];
-  const std::scoped_lock lock(mutex_);
   Compiled& compiled = compiled_[number];
+  const bool compile = (compiled.evaluations += evaluations) >= StageKernelSource::evaluations_worth_a_kernel;
+  const std::unique_lock lock(mutex_, std::try_to_lock);
+  if (!lock.owns_lock()) return nullptr;
   if (compiled.tried || (compiled.looked_for && !compile)) return compiled.kernel;
   compiled.looked_for = true;
   compiled.tried = compile;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <atomic>
 #include <diracstep/scene_format/compiler/scene_program.hpp>
 #include <diracstep/scene_format/compiler/stage_kernel.hpp>
 #include <memory>
@@ -32,11 +33,12 @@ class StageKernelLibrary {
   StageKernelLibrary(const scene_compiler::SceneProgram& program, const KernelLibrary& kernels)
       : program_(program), kernels_(kernels), sources_(program) {}
 
-  /// Null where there is none, or none yet and none is to be compiled.
-  scene_compiler::CompiledStageKernel kernel(int stages, bool compile) const;
+  /// Null where there is none, or none yet, as StageKernelSource::stage_kernel says.
+  scene_compiler::CompiledStageKernel kernel(int stages, long evaluations) const;
 
  private:
   struct Compiled {
+    std::atomic<long> evaluations = 0;       ///< without it, of all steps
     bool looked_for = false, tried = false;  ///< in the cache; and compiled
     scene_compiler::CompiledStageKernel kernel = nullptr;
     std::shared_ptr<void> handle = {};

@@ -248,12 +248,12 @@ class FileLagrangian final : public FilePhaseFunction<Lagrangian>, public StageK
  public:
   using FilePhaseFunction::FilePhaseFunction;
 
-  StageKernel stage_kernel(const ConstraintRows* rows, int stages, Effort effort) const override {
+  StageKernel stage_kernel(const ConstraintRows* rows, int stages, long evaluations) const override {
     const auto* const of_file = dynamic_cast<const FileRows*>(rows);
     const bool of_this_file =
         rows == nullptr ? scene().program->rows.empty() : of_file != nullptr && &of_file->scene() == &scene();
     if (!of_this_file) return {};
-    return {scene().stage_kernels.kernel(stages, effort == Effort::compile), scene().known.data()};
+    return {scene().stage_kernels.kernel(stages, evaluations), scene().known.data()};
   }
 };
 

@@ -16,18 +16,17 @@ class FixedPointTrial {
 
   bool given_up() const { return given_up_; }
   bool over() const { return solves_ >= solves_to_judge; }
-  /// Counts a solve; whether there are enough to judge by.
-  bool add(int iterations) {
+  /// Counts a solve.  The iteration is given up as soon as the solves to be judged take more than `quick`
+  /// iterations each, whatever those to come take.
+  void add(int iterations, int quick) {
     if (first_solves_ < solves_without_history) {
       ++first_solves_;
-      return false;
+      return;
     }
     iterations_ += iterations;
     ++solves_;
-    return over();
+    given_up_ = iterations_ > quick * solves_to_judge;
   }
-  /// Given up above so many iterations a solve.
-  void judge(int quick) { given_up_ = iterations_ > quick * solves_to_judge; }
   /// Counts from zero; what was judged stays.
   void count_again() { solves_ = iterations_ = 0; }
 

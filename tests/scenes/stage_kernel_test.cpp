@@ -21,7 +21,7 @@ StageKernel kernel(const Scene& scene, int s) {
   const auto* const source = dynamic_cast<const StageKernelSource*>(scene.lagrangian.get());
   if (source == nullptr || scene.force || scene.constraints.size() > 1) return {};
   const ConstraintRows* const rows = scene.constraints.empty() ? nullptr : scene.constraints.front().get();
-  return source->stage_kernel(rows, s, StageKernelSource::Effort::none);
+  return source->stage_kernel(rows, s, 0);
 }
 
 std::vector<std::string> scenes_with_kernels() {

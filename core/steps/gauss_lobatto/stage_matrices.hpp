@@ -42,7 +42,7 @@ void Stages<n, m, s>::take_splitting(const double* inverse_mass) {
             for (int r = 0; r < n; ++r) sum += constraint_forms_[j][a + m * r] * through_mass_[l][r + n * b];
             response[(m * l + b) * s * m + m * j + a] = mix_[j * s + l] * sum;
           }
-    regular_ = response_.factor(response.data());
+    response_.invert(response.data());
   }
 }
 
@@ -69,7 +69,7 @@ void Stages<n, m, s>::solve_splitting(double* f) {
       for (int a = 0; a < m; ++a)
         for (int r = 0; r < n; ++r)
           multipliers[m * j + a] -= constraint_forms_[j][a + m * r] * mixed[n * j + r];
-    solve_rows(multipliers);
+    response_.solve(multipliers);
     for (int l = 0; l < s; ++l)
       for (int r = 0; r < n; ++r) {
         double sum = 0.0;

@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <diracstep/core/numerics/contraction_loop.hpp>
 #include <diracstep/core/numerics/scales.hpp>
-#include <diracstep/core/numerics/small_lu.hpp>
+#include <diracstep/core/numerics/small_inverse.hpp>
 #include <diracstep/core/steps/gauss_lobatto/fixed_stages.hpp>
 #include <diracstep/core/steps/gauss_lobatto/full_blocks.hpp>
 #include <diracstep/core/steps/gauss_lobatto/stage_sums.hpp>
@@ -32,8 +32,7 @@ class Stages final : public FixedStages {
         curvature_pattern_(m > 0 ? arrays.rows->curvature_pattern() : SparsityPattern::dense(n, n)),
         separable_(arrays.lagrangian->structure().separable),
         diagonal_mass_(arrays.lagrangian->structure().y_hessian_diagonal),
-        holonomic_(m > 0 && arrays.rows->holonomic()),
-        response_(s * m) {
+        holonomic_(m > 0 && arrays.rows->holonomic()) {
     const GaussLobattoTableau& table = weights_.table;
     for (int j = 0; j < s; ++j)
       for (int k = 0; k < s; ++k) {
@@ -43,7 +42,7 @@ class Stages final : public FixedStages {
     for (int j = 0; j < s; ++j)
       for (int l = 0; l < s; ++l)
         for (int k = 0; k < s; ++k) mix_[j * s + l] += by_constraint_[j * s + k] * by_impulse_[k * s + l];
-    take_kernel(StageKernelSource::Effort::none);
+    take_kernel();
   }
 
   double evaluate(const double* x) override {
@@ -113,17 +112,16 @@ class Stages final : public FixedStages {
   void solve_splitting(double* f) override;
 
  private:
-  /// So many evaluations take as long as it takes to compile a kernel.
-  static constexpr long evaluations_worth_a_kernel = 1'000'000;
+  static constexpr long evaluations_told_at_once = 256;
 
   bool has_kernel() {
-    if (kernel_.run == nullptr && ++evaluations_ == evaluations_worth_a_kernel)
-      take_kernel(StageKernelSource::Effort::compile);
+    if (kernel_.run == nullptr && ++evaluations_ == evaluations_told_at_once) take_kernel();
     return kernel_.run != nullptr;
   }
-  void take_kernel(StageKernelSource::Effort effort) {
+  void take_kernel() {
     const auto* const source = dynamic_cast<const StageKernelSource*>(a_.lagrangian);
-    if (source != nullptr) kernel_ = source->stage_kernel(a_.rows, s, effort);
+    if (source != nullptr) kernel_ = source->stage_kernel(a_.rows, s, evaluations_);
+    evaluations_ = 0;
     if (kernel_.run != nullptr) call_ = call_of_kernel();
   }
 
@@ -228,19 +226,13 @@ class Stages final : public FixedStages {
     call.lq = a_.lq, call.lv = a_.lv;
     call.at_lobatto = a_.at_lobatto, call.at_gauss = a_.at_gauss, call.impulses = a_.impulses;
     call.solve_rows = [](void* owner, double* multipliers) {
-      static_cast<Course*>(owner)->stages.solve_rows(multipliers);
+      static_cast<Course*>(owner)->stages.response_.solve(multipliers);
     };
     call.inverse_mass = inverse_mass_.data();
     call.constraint_forms = constraint_forms_.front().data();
     call.through_mass = through_mass_.front().data();
     call.by_constraint = stage_weights_[4].data(), call.by_impulse = stage_weights_[5].data();
     return call;
-  }
-
-  /// NaN where the matrix is singular.
-  void solve_rows(double* multipliers) {
-    if (!regular_) multipliers[0] = std::nan("");
-    response_.solve(multipliers);
   }
 
   /// A where the impulses enter.
@@ -264,19 +256,19 @@ class Stages final : public FixedStages {
 
   StageArrays a_;
   StageKernel kernel_{};
-  long evaluations_ = 0;  ///< without a kernel
+  long evaluations_ = 0;  ///< without a kernel, and not told its source yet
   const StageWeights& weights_;
   FullBlocks<n, n> second_;
   FullBlocks<rows, n> forms_pattern_;
   FullBlocks<n, n> curvature_pattern_;
-  bool separable_, diagonal_mass_, holonomic_, regular_ = true;
+  bool separable_, diagonal_mass_, holonomic_;
   std::array<double, s * s> by_constraint_{}, by_impulse_{}, mix_{};  ///< C, e and C e, by rows
   std::array<Forms, s> lobatto_forms_{}, constraint_forms_now_{};     ///< at the last point
   std::array<Forms, s> constraint_forms_{};                           ///< of the splitting
   std::array<std::array<double, n * rows>, s> through_mass_{};        ///< M⁻¹ A(Q~_l)ᵀ
   Square inverse_mass_{};
   std::array<double, velocities * velocities> block_{};
-  SmallLu<s * m> response_;
+  SmallInverse<s * m> response_;  ///< of the multipliers: (C e)_jl A_j M⁻¹ A(Q~_l)ᵀ
   std::array<std::array<double, s * s>, 6> stage_weights_{};  ///< of the kernel
   double weights_step_ = 0.0;                                 ///< the step size that they are for
   StageKernelCall call_{};

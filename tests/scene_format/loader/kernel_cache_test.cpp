@@ -58,10 +58,10 @@ class Cache : public ::testing::Test {
                       "*x^4/7\"\n[coordinates]\nx = {}\n[start]\nx = 1\n[span]\nend = 1\nstep = 0.1\n");
   }
 
-  using Effort = StageKernelSource::Effort;
-  static bool has_stage_kernel(const CatalogueScene& entry, Effort effort) {
+  static constexpr long worth_it = StageKernelSource::evaluations_worth_a_kernel;
+  static bool has_stage_kernel(const CatalogueScene& entry, long evaluations = 0) {
     const auto* const source = dynamic_cast<const StageKernelSource*>(entry.scene->lagrangian.get());
-    return source != nullptr && source->stage_kernel(nullptr, 3, effort).run != nullptr;
+    return source != nullptr && source->stage_kernel(nullptr, 3, evaluations).run != nullptr;
   }
 
   std::vector<fs::path> kept() const {
@@ -88,14 +88,14 @@ class Cache : public ::testing::Test {
 /// A first short run does not wait for it.
 TEST_F(Cache, AStageKernelIsCompiledWhereItIsWorthIt) {
   const CatalogueScene entry = oscillator(3);
-  EXPECT_FALSE(has_stage_kernel(entry, Effort::none));
+  EXPECT_FALSE(has_stage_kernel(entry));
   EXPECT_EQ(kept().size(), 1u);
-  EXPECT_TRUE(has_stage_kernel(entry, Effort::compile));
+  EXPECT_TRUE(has_stage_kernel(entry, worth_it));
   EXPECT_EQ(kept().size(), 2u);
-  EXPECT_TRUE(has_stage_kernel(entry, Effort::none));
-  EXPECT_TRUE(has_stage_kernel(oscillator(3), Effort::none)) << "it is in the cache";
+  EXPECT_TRUE(has_stage_kernel(entry));
+  EXPECT_TRUE(has_stage_kernel(oscillator(3))) << "it is in the cache";
   set("DIRACSTEP_CC", "none");
-  EXPECT_FALSE(has_stage_kernel(oscillator(3), Effort::compile));
+  EXPECT_FALSE(has_stage_kernel(oscillator(3), worth_it));
 }
 
 TEST_F(Cache, ALongRunCompilesItsStageKernel) {
@@ -105,9 +105,26 @@ TEST_F(Cache, ALongRunCompilesItsStageKernel) {
     for (int k = 0; k < count; ++k) ASSERT_TRUE(steps.step().ok());
   };
   take(1000);
-  EXPECT_FALSE(has_stage_kernel(entry, Effort::none));
+  EXPECT_FALSE(has_stage_kernel(entry));
   take(1000000);
-  EXPECT_TRUE(has_stage_kernel(entry, Effort::none));
+  EXPECT_TRUE(has_stage_kernel(entry));
+}
+
+/// As the members of an ensemble or a sweep, which share the file and no step.
+TEST_F(Cache, ManyShortRunsCompileTheirStageKernel) {
+  const SceneFile file("s.toml",
+                       "name = \"s\"\nlagrangian = \"v_x^2/2 - a*x^4/7\"\n[coordinates]\nx = {}\n"
+                       "[parameters]\na = 5\n[start]\nx = 1\n[span]\nend = 1\nstep = 0.1\n");
+  const auto run = [&](int member) {
+    const CatalogueScene entry = file.load({{"a", 5.0 + 0.01 * member}});
+    Integrator steps(entry.scene, Registry::with_built_ins(), direct(),
+                     {.method = "type1/gl:3", .step = 0.01});
+    for (int k = 0; k < 1000; ++k) ASSERT_TRUE(steps.step().ok());
+  };
+  run(0);
+  EXPECT_FALSE(has_stage_kernel(file.load({})));
+  for (int member = 1; member < 500; ++member) run(member);
+  EXPECT_TRUE(has_stage_kernel(file.load({})));
 }
 
 TEST_F(Cache, ADamagedObjectIsCompiledAnewAndNeverLoaded) {
