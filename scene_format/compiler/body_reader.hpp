@@ -12,7 +12,10 @@
 namespace diracstep::scene_compiler {
 
 /// The tables that make bodies, and the key of their gravity.
-const std::vector<std::string>& body_tables();
+inline const std::vector<std::string>& body_tables() {
+  static const std::vector<std::string> keys{"gravity", "body", "joint", "wheel", "rolling", "spring"};
+  return keys;
+}
 
 /// What the tables of bodies are as parts of a plain scene, with their places in the file.
 struct BodyParts {

@@ -28,6 +28,23 @@ const std::map<std::string, Contact::Kind>& contact_kinds() {
 
 }  // namespace
 
+bool BodyReader::is_plane(int body) const {
+  return body != ground && mechanism_.bodies[static_cast<std::size_t>(body)].plane;
+}
+
+std::array<Vec, 2> BodyReader::two(const toml::table& table, const char* key, const std::string& what,
+                                   bool plane, bool directions) {
+  const toml::node& node = *table.get(key);
+  const toml::array* list = node.as_array();
+  const std::string of = fmt::format("'{}' of {}", key, what);
+  if (list == nullptr || list->size() != 2 || !(*list)[0].is_array())
+    tables_.fail(place_of(node.source()), of + ": expected two lists, one in the axes of each body");
+  const auto one = [&](std::size_t k) {
+    return directions ? direction((*list)[k], of, plane) : vector((*list)[k], of, plane);
+  };
+  return {one(0), one(1)};
+}
+
 int BodyReader::body_number(const toml::node& node, const std::string& what, bool or_ground) const {
   const Place place = place_of(node.source());
   if (!node.is_string()) tables_.fail(place, what + ": expected the name of a body in quotes");
