@@ -42,7 +42,8 @@ class VariantStep {
  private:
   struct Maps {
     Maps(const Space& space, const Vector& x) : adjoint(x.size(), x.size()), dtau(adjoint) {
-      space.maps(x, adjoint, dtau);
+      Columns unused(adjoint), back(adjoint);
+      space.maps(x, adjoint, unused, dtau, back);
     }
     Columns adjoint, dtau;
   };
