@@ -37,8 +37,8 @@ void GroupJacobian<D>::take_gauss(int i) {
   NodeParts& out = parts_[place(i)];
   point.derivatives(at_node_);
   curvature_ = std::max(curvature_, at_node_.curvature);
-  Square along(d, d), momentum_along(d, d), force_along(d, d), hessian(d, d), carried(d, d);
-  stages_.space.dtau_along(node.x, stages_.v.col(i), along);
+  const Square& along = node.along;
+  Square momentum_along(d, d), force_along(d, d), hessian(d, d), carried(d, d);
   stages_.space.dtau_transposed_along(node.x, point.momentum(), momentum_along);
   stages_.space.dtau_transposed_along(node.x, point.force(), force_along);
   stages_.space.pairing_hessian(node.x, stages_.v.col(i), point.momentum(), hessian);
@@ -132,9 +132,7 @@ void GroupJacobian<D>::add_rows(int l, ColumnsRef matrix) {
     if (stages_.has_nonholonomic()) {
       const GroupNode<D>& node = stages_.gauss[place(i)];
       const GroupRows<D>& rows = stages_.gauss_rows[place(i)];
-      Square rate(d, d);
-      stages_.space.dtau_along(node.x, stages_.v.col(i), rate);
-      rate *= node.alpha[l];
+      Square rate = node.alpha[l] * node.along;
       if (i == l) rate += node.dtau;
       rows.derivative(node.t, node.q, stages_.xi.col(i), derivative);
       add_row_columns(i, l, derivative * motion(node, parts_[place(i)].gauss_motion, l) + rows.forms() * rate,

@@ -112,16 +112,16 @@ template <int D>
 void GroupStages<D>::add_forces() {
   const Eigen::Index d = space.group_dimension();
   for (Stages* columns : {&xi, &phi, &forces}) columns->resize(d, s);
-  Square along(d, d);
   momentum_size = 0.0;
   for (int i = 0; i < s; ++i) {
     GroupNode<D>& node = gauss[at(i)];
     GroupPoint<D>& point = points[at(i)];
     xi.col(i).noalias() = node.dtau * v.col(i);
     point.evaluate(node.t, node.q, xi.col(i));
-    space.dtau_along(node.x, v.col(i), along);
+    node.along.resize(d, d);
+    space.dtau_along(node.x, v.col(i), node.along);
     forces.col(i) = point.force();
-    phi.col(i) = along.transpose() * point.momentum() + node.dtau.transpose() * point.force();
+    phi.col(i) = node.along.transpose() * point.momentum() + node.dtau.transpose() * point.force();
     node.carried = node.adjoint_back.transpose() * point.force();
     middle_momentum += step.size * table.b[i] * node.carried;
     momentum_size = std::max(momentum_size, max_norm(point.momentum()));

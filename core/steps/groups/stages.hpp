@@ -22,6 +22,7 @@ struct GroupNode {
   Column x;                                       ///< X
   Vector q;                                       ///< g_c τ(X)
   Square adjoint, adjoint_back, dtau, dtau_back;  ///< Ad_{τ(X)}, Ad_{τ(−X)}, dτ_X, dτ_{−X}
+  Square along;                                   ///< ∂(dτ_X V)/∂X, at a Gauss node
   Column carried;                                 ///< Ad_{τ(−X)}ᵀ of the force or the impulse there
 
   void place(const Space& space, const typename GroupSizes<D>::Stages& v);
