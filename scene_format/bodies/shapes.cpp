@@ -63,6 +63,23 @@ bool is_inertia(const Matrix& inertia) {
   return least_minor(at) > 0.0 && least_minor(spread) > -1e-12;
 }
 
+const Body* rod_that_turns_freely(const Mechanism& mechanism) {
+  for (std::size_t number = 0; number < mechanism.bodies.size(); ++number) {
+    const Body& body = mechanism.bodies[number];
+    if (body.plane || body.fixed || body.shape != Body::Shape::rod || body.inertia[2][2].value() != 0.0)
+      continue;
+    const int own = static_cast<int>(number);
+    const bool held = std::ranges::any_of(mechanism.joints, [&](const Joint& joint) {
+      return (joint.first == own || joint.second == own) && joint.kind != Joint::Kind::spherical &&
+             joint.kind != Joint::Kind::distance;
+    });
+    const bool touches =
+        std::ranges::any_of(mechanism.contacts, [&](const auto& one) { return one.body == own; });
+    if (!held && !touches) return &body;
+  }
+  return nullptr;
+}
+
 Vec ellipsoid_of(const Body& body) {
   const auto half = [&](std::size_t i, std::size_t j, std::size_t k) {
     const Formula rest = body.inertia[j][j] + body.inertia[k][k] - body.inertia[i][i];

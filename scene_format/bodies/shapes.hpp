@@ -23,6 +23,10 @@ Matrix inertia_of(Body::Shape shape, const Formula& mass, const Vec& size);
 /// Whether a body of positive density has this inertia, by its value.
 bool is_inertia(const Matrix& inertia);
 
+/// A thin rod in space, without a moment of inertia about itself, whose turn about itself no joint or contact
+/// holds, so that it is a motion without momentum; null where there is none.
+const Body* rod_that_turns_freely(const Mechanism& mechanism);
+
 /// Half axes of the ellipsoid with the same mass and moments of inertia.
 Vec ellipsoid_of(const Body& body);
 

@@ -37,6 +37,7 @@ BodyParts BodyReader::read(const toml::table& root) {
   for (const toml::table* table : tables_.tables(root, "joint")) read_joint(*table);
   for (const toml::table* table : tables_.tables(root, "rolling")) read_contact(*table);
   for (const toml::table* table : tables_.tables(root, "spring")) read_spring(*table);
+  require_momenta(root);
   parts_.expansion = expand(mechanism_);
   for (const Body& body : mechanism_.bodies) draw(body);
   join_formulas(root);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <diracstep/scene_format/bodies/shapes.hpp>
 #include <diracstep/scene_format/compiler/body_reader.hpp>
 
 /// The tables of BodyReader that hold bodies together, and those of contacts.
@@ -43,6 +44,18 @@ std::array<Vec, 2> BodyReader::two(const toml::table& table, const char* key, co
     return directions ? direction((*list)[k], of, plane) : vector((*list)[k], of, plane);
   };
   return {one(0), one(1)};
+}
+
+/// Unless the file's own Lagrangian or rows may give or hold what is missing.
+void BodyReader::require_momenta(const toml::table& root) const {
+  if (root.contains("lagrangian") || root.contains("rows")) return;
+  if (const Body* rod = rod_that_turns_freely(mechanism_))
+    tables_.fail(
+        parts_.place(rod->source),
+        fmt::format("body '{}' is a thin rod, which has no moment of inertia about itself, and no joint "
+                    "holds its turn about itself: give it an 'inertia' or the shape \"cylinder\", or join "
+                    "it otherwise",
+                    rod->name));
 }
 
 int BodyReader::body_number(const toml::node& node, const std::string& what, bool or_ground) const {

@@ -156,5 +156,23 @@ TEST_F(Bodies, MistakesAreToldWithTheirPlace) {
   }
 }
 
+/// Nothing gives its turn about itself a momentum; a cylinder, a moment of its own or a hinge does.
+TEST_F(Bodies, AThinRodThatMayTurnAboutItselfIsRefusedByName) {
+  const auto rod = [](const std::string& more, const std::string& joint) {
+    return message_of(with_span(
+        "gravity = 9.81\nbody = [{ name = \"bar\", mass = 1, from = [0, 0, 0], to = [1, 0, 0], " + more +
+        " }]\njoint = [{ name = \"pin\", between = [\"ground\", \"bar\"], " + joint + " }]\n"));
+  };
+  const std::string thin = "shape = \"rod\"", pin = "kind = \"spherical\", point = [0, 0, 0]";
+  for (const std::string& joint : {pin, std::string("kind = \"distance\", ends = [[0, 0, 1], [0, 0, 0]]")}) {
+    const std::string message = rod(thin, joint);
+    EXPECT_NE(message.find("body 'bar' is a thin rod"), std::string::npos) << message;
+    EXPECT_NE(message.find("\"cylinder\""), std::string::npos) << message;
+  }
+  EXPECT_EQ(rod("shape = \"cylinder\", radius = 0.01", pin), "");
+  EXPECT_EQ(rod(thin + ", inertia = [0.1, 0.1, 0.01]", pin), "");
+  EXPECT_EQ(rod(thin, "kind = \"revolute\", point = [0, 0, 0], axis = [0, 1, 0]"), "");
+}
+
 }  // namespace
 }  // namespace diracstep::body_tests
