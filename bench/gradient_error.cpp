@@ -21,6 +21,7 @@
 #include <diracstep/sensitivities/sensitivities.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
 #include <diracstep/validation/references/ida_reference.hpp>
+#include <diracstep/validation/references/implicit_lagrangian_dae.hpp>
 #include <limits>
 #include <string>
 #include <vector>

@@ -82,9 +82,11 @@ Numbers<T, 3> cross(const Numbers<T, 3>& a, const Numbers<T, 3>& b) {
   return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
 }
 
-template <class T>
-T dot(const Numbers<T, 3>& a, const Numbers<T, 3>& b) {
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+template <class T, std::size_t N>
+T dot(const Numbers<T, N>& a, const Numbers<T, N>& b) {
+  T sum = a[0] * b[0];
+  for (std::size_t i = 1; i < N; ++i) sum = sum + a[i] * b[i];
+  return sum;
 }
 
 /// Σ factors[k] columns[k]

@@ -11,10 +11,11 @@ namespace diracstep::spaces {
 /// is R v in space.
 template <class T>
 Numbers<Numbers<T, 3>, 3> rotation_matrix(const T& w, const T& x, const T& y, const T& z) {
-  const T two(2.0);
-  return {{{w * w + x * x - y * y - z * z, two * (x * y - w * z), two * (x * z + w * y)},
-           {two * (x * y + w * z), w * w - x * x + y * y - z * z, two * (y * z - w * x)},
-           {two * (x * z - w * y), two * (y * z + w * x), w * w - x * x - y * y + z * z}}};
+  const T two(2.0), ww = w * w, xx = x * x, yy = y * y, zz = z * z;
+  const T wx = w * x, wy = w * y, wz = w * z, xy = x * y, xz = x * z, yz = y * z;
+  return {{{ww + xx - yy - zz, two * (xy - wz), two * (xz + wy)},
+           {two * (xy + wz), ww - xx + yy - zz, two * (yz - wx)},
+           {two * (xz - wy), two * (yz + wx), ww - xx - yy + zz}}};
 }
 
 /// Rotations of space, by unit quaternions (w, x, y, z).

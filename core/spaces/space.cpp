@@ -1,5 +1,5 @@
-#include <Eigen/LU>
 #include <Eigen/QR>
+#include <array>
 #include <cmath>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/numerics/scales.hpp>
@@ -7,6 +7,25 @@
 #include <utility>
 
 namespace diracstep {
+
+namespace {
+
+/// Room for the numbers of one factor, on the stack for every group here.
+class Buffer {
+ public:
+  double* of(int count) {
+    const auto size = static_cast<std::size_t>(count);
+    if (size <= few_.size()) return few_.data();
+    many_.resize(size);
+    return many_.data();
+  }
+
+ private:
+  std::array<double, 216> few_;
+  std::vector<double> many_;
+};
+
+}  // namespace
 
 Space::Space(std::vector<std::shared_ptr<const SpaceFactor>> factors) {
   if (factors.empty()) throw Misuse("a configuration space has one factor or more");
@@ -91,18 +110,28 @@ double Space::part_of_chart(ConstVectorRef x) const {
   return part;
 }
 
-void Space::maps(ConstVectorRef x, ColumnsRef adjoint, ColumnsRef dtau) const {
-  adjoint.setIdentity();
-  dtau.setIdentity();
-  Columns of_adjoint, of_dtau;
+/// Whether such a matrix is one block, which lies in memory without gaps.
+bool Space::is_one_factor(ColumnsRef whole) const {
+  return factors_.size() == 1 && !factors_.front().space->flat() && whole.outerStride() == whole.rows();
+}
+
+void Space::maps(ConstVectorRef x, ColumnsRef adjoint, ColumnsRef adjoint_back, ColumnsRef dtau,
+                 ColumnsRef dtau_back) const {
+  if (is_one_factor(adjoint) && is_one_factor(adjoint_back) && is_one_factor(dtau) &&
+      is_one_factor(dtau_back)) {
+    factors_.front().space->maps(x.data(), adjoint.data(), adjoint_back.data(), dtau.data(),
+                                 dtau_back.data());
+    return;
+  }
+  const std::array<ColumnsRef*, 4> wholes{&adjoint, &adjoint_back, &dtau, &dtau_back};
+  for (ColumnsRef* whole : wholes) whole->setIdentity();
+  std::array<Columns, 4> own;
   for (const Factor& factor : factors_) {
     if (factor.space->flat()) continue;
     const int d = factor.sizes.group, at = factor.group;
-    of_adjoint.resize(d, d);
-    of_dtau.resize(d, d);
-    factor.space->maps(x.data() + at, of_adjoint.data(), of_dtau.data());
-    adjoint.block(at, at, d, d) = of_adjoint;
-    dtau.block(at, at, d, d) = of_dtau;
+    for (Columns& map : own) map.resize(d, d);
+    factor.space->maps(x.data() + at, own[0].data(), own[1].data(), own[2].data(), own[3].data());
+    for (std::size_t k = 0; k < own.size(); ++k) wholes[k]->block(at, at, d, d) = own[k];
   }
 }
 
@@ -113,62 +142,64 @@ Vector Space::bracket(ConstVectorRef v, ConstVectorRef w) const {
   return out;
 }
 
-void Space::coadjoint(ConstVectorRef p, ColumnsRef k) const {
-  k.setZero();
+/// A matrix with a block of each factor that is not flat, which visit(factor, block by columns) fills.
+template <class Visit>
+void Space::diagonal_blocks(ColumnsRef whole, Visit visit) const {
+  if (is_one_factor(whole)) {
+    visit(factors_.front(), whole.data());
+    return;
+  }
+  whole.setZero();
+  Columns own;
   for (const Factor& factor : factors_) {
     if (factor.space->flat()) continue;
-    const int d = factor.sizes.group, at = factor.group;
-    Vector image(d);
-    for (int j = 0; j < d; ++j)
-      for (int i = 0; i < d; ++i) {
-        factor.space->bracket(Vector::Unit(d, j).eval().data(), Vector::Unit(d, i).eval().data(),
-                              image.data());
-        k(at + i, at + j) = p.segment(at, d).dot(image);
-      }
+    own.resize(factor.sizes.group, factor.sizes.group);
+    visit(factor, own.data());
+    whole.block(factor.group, factor.group, own.rows(), own.cols()) = own;
   }
+}
+
+void Space::coadjoint(ConstVectorRef p, ColumnsRef k) const {
+  diagonal_blocks(
+      k, [&](const Factor& factor, double* out) { factor.space->coadjoint(p.data() + factor.group, out); });
 }
 
 /// Calls visit(first component, size, derivative of dτ) for the factors where it is not zero.
 template <class Visit>
 void Space::for_each_derivative(ConstVectorRef x, Visit visit) const {
-  Vector values;
+  Buffer buffer;
   for (const Factor& factor : factors_) {
     if (factor.space->flat()) continue;
     const int d = factor.sizes.group;
-    values.resize(static_cast<Eigen::Index>(d) * d * d);
-    factor.space->dtau_derivative(x.data() + factor.group, values.data());
-    visit(factor.group, d, values);
+    double* const values = buffer.of(d * d * d);
+    factor.space->dtau_derivative(x.data() + factor.group, values);
+    visit(factor.group, factor.sizes.group, values);
   }
 }
 
 void Space::dtau_along(ConstVectorRef x, ConstVectorRef v, ColumnsRef out) const {
   out.setZero();
-  for_each_derivative(x, [&](int at, int d, const Vector& values) {
+  for_each_derivative(x, [&](int at, int d, const double* value) {
     for (int k = 0; k < d; ++k)
-      out.block(at, at + k, d, 1) =
-          Eigen::Map<const Columns>(values.data() + k * d * d, d, d) * v.segment(at, d);
+      for (int j = 0; j < d; ++j)
+        for (int i = 0; i < d; ++i) out(at + i, at + k) += *value++ * v[at + j];
   });
 }
 
 void Space::dtau_transposed_along(ConstVectorRef x, ConstVectorRef p, ColumnsRef out) const {
   out.setZero();
-  for_each_derivative(x, [&](int at, int d, const Vector& values) {
+  for_each_derivative(x, [&](int at, int d, const double* value) {
     for (int k = 0; k < d; ++k)
-      out.block(at, at + k, d, 1) =
-          Eigen::Map<const Columns>(values.data() + k * d * d, d, d).transpose() * p.segment(at, d);
+      for (int j = 0; j < d; ++j)
+        for (int i = 0; i < d; ++i) out(at + j, at + k) += *value++ * p[at + i];
   });
 }
 
 void Space::pairing_hessian(ConstVectorRef x, ConstVectorRef v, ConstVectorRef p, ColumnsRef h) const {
-  h.setZero();
-  Columns own;
-  for (const Factor& factor : factors_) {
-    if (factor.space->flat()) continue;
-    const int d = factor.sizes.group, at = factor.group;
-    own.resize(d, d);
-    factor.space->pairing_hessian(x.data() + at, v.data() + at, p.data() + at, own.data());
-    h.block(at, at, d, d) = own;
-  }
+  diagonal_blocks(h, [&](const Factor& factor, double* out) {
+    factor.space->pairing_hessian(x.data() + factor.group, v.data() + factor.group, p.data() + factor.group,
+                                  out);
+  });
 }
 
 Columns Space::storage_derivative(ConstVectorRef q, ConstVectorRef x) const {
@@ -182,27 +213,38 @@ Columns Space::storage_derivative(ConstVectorRef q, ConstVectorRef x) const {
 }
 
 Columns Space::tangent_basis(ConstVectorRef q) const {
-  return storage_derivative(q, Vector::Zero(sizes_.group))(Eigen::all, tangent_);
+  Columns whole = Columns::Zero(sizes_.storage, sizes_.dimension), own;
+  for (const Factor& factor : factors_) {
+    const auto [storage, d, n] = factor.sizes;
+    own.resize(storage, d);
+    factor.space->basis(q.data() + factor.storage, own.data());
+    whole.block(factor.storage, factor.tangent, storage, n) = own.leftCols(n);
+  }
+  return whole;
 }
 
-/// e_j B_i = ∂²(q τ(x))/∂x_i∂x_j + B [e_j, e_i]/2, by the formula of Baker, Campbell and Hausdorff.
+void Space::pull_back(ConstVectorRef q, ConstVectorRef w, VectorRef out) const {
+  Buffer buffer;
+  for (const Factor& factor : factors_) {
+    const auto [storage, d, n] = factor.sizes;
+    double* entry = buffer.of(storage * d);
+    factor.space->basis(q.data() + factor.storage, entry);
+    for (int j = 0; j < n; ++j) {
+      double sum = 0.0;
+      for (int k = 0; k < storage; ++k) sum += *entry++ * w[factor.storage + k];
+      out[factor.tangent + j] = sum;
+    }
+  }
+}
+
 Columns Space::basis_curvature(ConstVectorRef q, ConstVectorRef w) const {
-  Columns whole = Columns::Zero(sizes_.dimension, sizes_.dimension);
+  Columns whole = Columns::Zero(sizes_.dimension, sizes_.dimension), own;
   for (const Factor& factor : factors_) {
     if (factor.space->flat()) continue;
     const auto [storage, d, n] = factor.sizes;
-    Columns curvature(storage, d * d), basis(storage, d);
-    const Vector zero = Vector::Zero(d), weights = w.segment(factor.storage, storage);
-    factor.space->storage_curvature(q.data() + factor.storage, curvature.data());
-    factor.space->storage_derivative(q.data() + factor.storage, zero.data(), basis.data());
-    const Vector first = basis.transpose() * weights, second = curvature.transpose() * weights;
-    Vector image(d);
-    for (int j = 0; j < n; ++j)
-      for (int i = 0; i < n; ++i) {
-        factor.space->bracket(Vector::Unit(d, j).eval().data(), Vector::Unit(d, i).eval().data(),
-                              image.data());
-        whole(factor.tangent + i, factor.tangent + j) = second[i + d * j] + 0.5 * first.dot(image);
-      }
+    own.resize(d, d);
+    factor.space->basis_curvature(q.data() + factor.storage, w.data() + factor.storage, own.data());
+    whole.block(factor.tangent, factor.tangent, n, n) = own.topLeftCorner(n, n);
   }
   return whole;
 }

@@ -3,6 +3,7 @@
 #include <array>
 #include <diracstep/core/numerics/jet.hpp>
 #include <diracstep/core/numerics/types.hpp>
+#include <diracstep/core/spaces/derivatives.hpp>
 #include <diracstep/core/spaces/groups.hpp>
 #include <memory>
 #include <string>
@@ -31,17 +32,21 @@ class SpaceFactor {
   virtual double part_of_chart(const double* x) const = 0;
   /// q ← g τ(x)
   virtual void move(const double* g, const double* x, double* q) const = 0;
-  /// Ad_{τ(x)} and dτ_x.
-  virtual void maps(const double* x, double* adjoint, double* dtau) const = 0;
+  /// Ad_{τ(x)}, Ad_{τ(−x)}, dτ_x and dτ_{−x}.
+  virtual void maps(const double* x, double* adjoint, double* adjoint_back, double* dtau,
+                    double* dtau_back) const = 0;
   virtual void bracket(const double* v, const double* w, double* out) const = 0;
+  /// K with ⟨K w, u⟩ = ⟨p, ad_w u⟩.
+  virtual void coadjoint(const double* p, double* out) const = 0;
   /// ∂(dτ_x)_{ij}/∂x_k at i + d j + d² k.
   virtual void dtau_derivative(const double* x, double* out) const = 0;
   /// ∂²⟨p, dτ_x v⟩/∂x_i∂x_j.
   virtual void pairing_hessian(const double* x, const double* v, const double* p, double* out) const = 0;
-  /// ∂(g τ(x))/∂x, storage×group, at any x.
+  /// ∂(g τ(x))/∂x, storage×group, at any x, and at 0.
   virtual void storage_derivative(const double* g, const double* x, double* out) const = 0;
-  /// The symmetric ∂²(g τ(x))/∂x_i∂x_j at x = 0, storage×group×group.
-  virtual void storage_curvature(const double* g, double* out) const = 0;
+  virtual void basis(const double* g, double* out) const = 0;
+  /// Σ_k w_k (derivative of the basis' entry (k, i) along e_j) at (i, j).
+  virtual void basis_curvature(const double* g, const double* w, double* out) const = 0;
 };
 
 /// A configuration space: a product of Lie groups, spheres and R^n (groups.hpp).
@@ -80,8 +85,9 @@ class Space {
   /// |x| in parts of what τ is injective up to; the factor where it is largest.
   double part_of_chart(ConstVectorRef x) const;
 
-  /// Ad_{τ(x)} and dτ_x.
-  void maps(ConstVectorRef x, ColumnsRef adjoint, ColumnsRef dtau) const;
+  /// Ad_{τ(x)}, Ad_{τ(−x)}, dτ_x and dτ_{−x}.
+  void maps(ConstVectorRef x, ColumnsRef adjoint, ColumnsRef adjoint_back, ColumnsRef dtau,
+            ColumnsRef dtau_back) const;
   /// ad_v w
   Vector bracket(ConstVectorRef v, ConstVectorRef w) const;
   /// K with K w = ad_wᵀ p, that is ⟨K w, u⟩ = ⟨p, ad_w u⟩.
@@ -93,6 +99,8 @@ class Space {
 
   /// How stored numbers change along the tangent space: B, storage×dimension, is d/dε q τ(ε e_j) in column j.
   Columns tangent_basis(ConstVectorRef q) const;
+  /// Bᵀ w: the derivative along the space of a function of stored numbers with these derivatives w.
+  void pull_back(ConstVectorRef q, ConstVectorRef w, VectorRef out) const;
   /// ∂(q τ(x))/∂x at any x, storage×group.
   Columns storage_derivative(ConstVectorRef q, ConstVectorRef x) const;
   /// Σ_k w_k (derivative of B_ki along e_j), dimension×dimension at (i, j): for functions of stored numbers
@@ -105,6 +113,9 @@ class Space {
     SpaceSizes sizes;
     int storage, group, tangent;  ///< where its parts begin
   };
+  bool is_one_factor(ColumnsRef whole) const;
+  template <class Visit>
+  void diagonal_blocks(ColumnsRef whole, Visit visit) const;
   template <class Visit>
   void for_each_derivative(ConstVectorRef x, Visit visit) const;
 
@@ -117,12 +128,9 @@ namespace detail {
 
 template <class G>
 class FactorOf final : public SpaceFactor {
-  static constexpr int d = G::group;
-  static constexpr std::size_t size = static_cast<std::size_t>(G::group);
-  template <class T>
-  using Element = std::array<T, static_cast<std::size_t>(G::storage)>;
-  template <class T>
-  using Algebra = std::array<T, size>;
+  static constexpr std::size_t d = static_cast<std::size_t>(G::group),
+                               numbers_stored = static_cast<std::size_t>(G::storage);
+  using Derivatives = spaces::FactorDerivatives<G>;
 
   template <std::size_t N>
   static std::array<double, N> numbers(const double* from) {
@@ -130,31 +138,19 @@ class FactorOf final : public SpaceFactor {
     for (std::size_t i = 0; i < N; ++i) to[i] = from[i];
     return to;
   }
-  template <class T, std::size_t N>
-  static std::array<T, N> constants(const double* from) {
-    std::array<T, N> to;
-    for (std::size_t i = 0; i < N; ++i) to[i] = T(from[i]);
-    return to;
-  }
-  template <class T>
-  static Algebra<T> variables(const double* x) {
-    Algebra<T> to;
-    for (std::size_t i = 0; i < size; ++i)
-      to[i] = T::variable(x == nullptr ? 0.0 : x[i], static_cast<int>(i));
-    return to;
-  }
-  template <class T>
-  static Algebra<T> unit(std::size_t i) {
-    Algebra<T> e;
-    e.fill(T(0.0));
-    e[i] = T(1.0);
+  static auto element(const double* g) { return numbers<numbers_stored>(g); }
+  static auto algebra(const double* x) { return numbers<d>(x); }
+  static std::array<double, d> unit(std::size_t i) {
+    std::array<double, d> e{};
+    e[i] = 1.0;
     return e;
   }
-  static Element<double> element(const double* g) { return numbers<static_cast<std::size_t>(G::storage)>(g); }
 
  public:
   SpaceSizes sizes() const override { return {G::storage, G::group, G::dimension}; }
-  std::string name() const override { return flat() ? G::name + std::to_string(d) : std::string(G::name); }
+  std::string name() const override {
+    return flat() ? G::name + std::to_string(G::group) : std::string(G::name);
+  }
   bool flat() const override { return std::string(G::name) == "R"; }
   void identity(double* g) const override {
     for (const double entry : G::template identity<double>()) *g++ = entry;
@@ -164,55 +160,43 @@ class FactorOf final : public SpaceFactor {
     G::normalise(element_of);
     for (const double entry : element_of) *g++ = entry;
   }
-  double part_of_chart(const double* x) const override { return G::part_of_chart(numbers<size>(x)); }
+  double part_of_chart(const double* x) const override { return G::part_of_chart(algebra(x)); }
   void move(const double* g, const double* x, double* q) const override {
-    auto moved = G::product(element(g), G::retract(numbers<size>(x)));
+    auto moved = G::product(element(g), G::retract(algebra(x)));
     G::normalise(moved);
     for (const double entry : moved) *q++ = entry;
   }
-  void maps(const double* x, double* adjoint, double* dtau) const override {
-    const auto at = numbers<size>(x);
-    const auto g = G::retract(at);
-    for (std::size_t j = 0; j < size; ++j) {
-      for (const double entry : G::adjoint(g, unit<double>(j))) *adjoint++ = entry;
-      for (const double entry : G::dtau(at, unit<double>(j))) *dtau++ = entry;
-    }
+  void maps(const double* x, double* adjoint, double* adjoint_back, double* dtau,
+            double* dtau_back) const override {
+    Derivatives::maps(algebra(x), adjoint, adjoint_back, dtau, dtau_back);
   }
   void bracket(const double* v, const double* w, double* out) const override {
-    for (const double entry : G::bracket(numbers<size>(v), numbers<size>(w))) *out++ = entry;
+    for (const double entry : G::bracket(algebra(v), algebra(w))) *out++ = entry;
+  }
+  void coadjoint(const double* p, double* out) const override {
+    for (std::size_t j = 0; j < d; ++j)
+      for (std::size_t i = 0; i < d; ++i)
+        *out++ = spaces::detail::dot(algebra(p), G::bracket(unit(j), unit(i)));
   }
   void dtau_derivative(const double* x, double* out) const override {
-    using T = Jet<d, 1>;
-    const auto at = variables<T>(x);
-    for (int j = 0; j < d; ++j) {
-      const auto column = G::dtau(at, unit<T>(static_cast<std::size_t>(j)));
-      for (int k = 0; k < d; ++k)
-        for (int i = 0; i < d; ++i)
-          out[i + d * (j + d * k)] = column[static_cast<std::size_t>(i)].gradient(k);
-    }
+    Derivatives::dtau_derivative(algebra(x), out);
   }
   void pairing_hessian(const double* x, const double* v, const double* p, double* out) const override {
-    using T = Jet<d, 2>;
-    const auto image = G::dtau(variables<T>(x), constants<T, size>(v));
-    T sum(0.0);
-    for (std::size_t i = 0; i < size; ++i) sum += image[i] * p[i];
-    for (int j = 0; j < d; ++j)
-      for (int i = 0; i < d; ++i) *out++ = sum.hessian(i, j);
+    Derivatives::pairing_hessian(algebra(x), algebra(v), algebra(p), out);
   }
   void storage_derivative(const double* g, const double* x, double* out) const override {
-    using T = Jet<d, 1>;
-    const auto moved =
-        G::product(constants<T, static_cast<std::size_t>(G::storage)>(g), G::retract(variables<T>(x)));
-    for (int j = 0; j < d; ++j)
+    using T = Jet<G::group, 1>;
+    std::array<T, numbers_stored> at;
+    std::array<T, d> along;
+    for (std::size_t i = 0; i < numbers_stored; ++i) at[i] = T(g[i]);
+    for (std::size_t i = 0; i < d; ++i) along[i] = T::variable(x[i], static_cast<int>(i));
+    const auto moved = G::product(at, G::retract(along));
+    for (int j = 0; j < G::group; ++j)
       for (const T& entry : moved) *out++ = entry.gradient(j);
   }
-  void storage_curvature(const double* g, double* out) const override {
-    using T = Jet<d, 2>;
-    const auto moved =
-        G::product(constants<T, static_cast<std::size_t>(G::storage)>(g), G::retract(variables<T>(nullptr)));
-    for (int j = 0; j < d; ++j)
-      for (int i = 0; i < d; ++i)
-        for (const T& entry : moved) *out++ = entry.hessian(i, j);
+  void basis(const double* g, double* out) const override { Derivatives::basis(element(g), out); }
+  void basis_curvature(const double* g, const double* w, double* out) const override {
+    Derivatives::basis_curvature(element(g), element(w), out);
   }
 };
 

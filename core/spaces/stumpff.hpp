@@ -1,18 +1,29 @@
 #pragma once
 
+#include <array>
 #include <cmath>
 #include <complex>
+#include <cstddef>
 #include <diracstep/core/numerics/jet.hpp>
 
 namespace diracstep {
 
 namespace detail {
 
+/// 1/(i (i − 1)) for i from 2 on: what a term of the series is multiplied by.
+inline constexpr std::array<double, 50> stumpff_ratios = [] {
+  std::array<double, 50> ratios{};
+  for (std::size_t i = 2; i < ratios.size(); ++i)
+    ratios[i] = 1.0 / (static_cast<double>(i) * (static_cast<double>(i) - 1.0));
+  return ratios;
+}();
+
 /// Σ_j (−s)^j/(2j+k)!, `terms` of them, from the last to the first.
 template <class T>
 T stumpff_series(int k, const T& s, int terms) {
   T sum(1.0);
-  for (int j = terms; j > 0; --j) sum = T(1.0) - s * sum * T(1.0 / ((2.0 * j + k) * (2.0 * j + k - 1.0)));
+  for (int j = terms; j > 0; --j)
+    sum = T(1.0) - s * sum * T(stumpff_ratios[static_cast<std::size_t>(2 * j + k)]);
   double factorial = 1.0;
   for (int i = 2; i <= k; ++i) factorial *= i;
   return sum * T(1.0 / factorial);
@@ -50,7 +61,26 @@ T stumpff(int k, const T& s) {
   return value;
 }
 
-/// The same with first and second derivatives.
+/// c_0 … c_7 at once: the last two by their series, the others by c_k = 1/k! − s c_{k+2}.
+inline std::array<double, 8> stumpff_values(double s) {
+  std::array<double, 8> c;
+  if (!(std::abs(s) < 16.0)) {
+    for (int k = 0; k < 8; ++k) c[static_cast<std::size_t>(k)] = stumpff(k, s);
+    return c;
+  }
+  const int terms = std::abs(s) < 1.0 ? 7 : 16;
+  c[7] = detail::stumpff_series(7, s, terms);
+  c[6] = detail::stumpff_series(6, s, terms);
+  c[5] = 1.0 / 120.0 - s * c[7];
+  c[4] = 1.0 / 24.0 - s * c[6];
+  c[3] = 1.0 / 6.0 - s * c[5];
+  c[2] = 0.5 - s * c[4];
+  c[1] = 1.0 - s * c[3];
+  c[0] = 1.0 - s * c[2];
+  return c;
+}
+
+/// c_k with first and second derivatives.
 template <int N, int Order>
 Jet<N, Order> stumpff(int k, const Jet<N, Order>& s) {
   const double x = s.value(), c2 = stumpff(k + 2, x);

@@ -36,33 +36,40 @@ class LagrangianOnSpace final : public Lagrangian {
   }
 
   void gradient(double t, ConstVectorRef x, ConstVectorRef y, VectorRef fx, VectorRef fy) const override {
-    Vector by_numbers(space_->storage_size()), by_velocity(by_numbers);
+    const int numbers = space_->storage_size();
+    Vector work(2 * numbers);
+    auto by_numbers = work.head(numbers), by_velocity = work.tail(numbers);
     inner_->gradient(t, x, padded(*space_, y), by_numbers, by_velocity);
     if (structure().x_absent)
       fx.setZero();
     else
-      fx = space_->tangent_basis(x).transpose() * by_numbers;
+      space_->pull_back(x, by_numbers, fx);
     fy = by_velocity.head(fy.size());
   }
 
   void hessian(double t, ConstVectorRef x, ConstVectorRef y, VectorRef fxx, VectorRef fxy,
                VectorRef fyy) const override {
-    const int n = dimension();
+    const int n = dimension(), numbers = space_->storage_size(), nonzeros = inner_->pattern().nonzeros();
     const Vector whole = padded(*space_, y);
-    Vector xx(inner_->pattern().nonzeros()), xy(xx), yy(xx), by_numbers(space_->storage_size()),
-        unused(by_numbers);
+    Vector work(3 * nonzeros + 2 * numbers);
+    auto xx = work.head(nonzeros), xy = work.segment(nonzeros, nonzeros),
+         yy = work.segment(2 * nonzeros, nonzeros);
     inner_->hessian(t, x, whole, xx, xy, yy);
-    fyy.reshaped(n, n) = inner_->pattern().full(yy).topLeftCorner(n, n);
+    with_full(yy, [&](const auto& full) { fyy.reshaped(n, n) = full.topLeftCorner(n, n); });
     if (structure().x_absent) {
       fxx.setZero();
       fxy.setZero();
       return;
     }
-    inner_->gradient(t, x, whole, by_numbers, unused);
+    auto by_numbers = work.segment(3 * nonzeros, numbers);
+    inner_->gradient(t, x, whole, by_numbers, work.tail(numbers));
     const Columns basis = space_->tangent_basis(x);
-    fxx.reshaped(n, n) =
-        basis.transpose() * inner_->pattern().full(xx) * basis + space_->basis_curvature(x, by_numbers);
-    fxy.reshaped(n, n) = basis.transpose() * inner_->pattern().full(xy).leftCols(n);
+    with_full(xx, [&](const auto& full) {
+      fxx.reshaped(n, n) =
+          basis.transpose() * full.lazyProduct(basis) + space_->basis_curvature(x, by_numbers);
+    });
+    with_full(
+        xy, [&](const auto& full) { fxy.reshaped(n, n) = basis.transpose().lazyProduct(full.leftCols(n)); });
   }
 
   void gradient_rate(double t, ConstVectorRef x, ConstVectorRef y, VectorRef fyt) const override {
@@ -78,6 +85,16 @@ class LagrangianOnSpace final : public Lagrangian {
   }
 
  private:
+  /// Calls use(the matrix of values on the pattern of the inner function), without a copy where that is full.
+  template <class Use>
+  void with_full(ConstVectorRef values, Use use) const {
+    const int numbers = space_->storage_size();
+    if (values.size() == static_cast<Eigen::Index>(numbers) * numbers)
+      use(Eigen::Map<const Columns>(values.data(), numbers, numbers));
+    else
+      use(inner_->pattern().full(values));
+  }
+
   std::shared_ptr<const Space> space_;
   std::shared_ptr<const Lagrangian> inner_;
 };

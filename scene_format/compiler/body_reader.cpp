@@ -18,33 +18,7 @@ bodies::Formula as_formula(const FormulaText& text, double value) {
   return {text.text, value, is_name(text.text) ? bodies::Formula::Level::atom : bodies::Formula::Level::sum};
 }
 
-struct ShapeKeys {
-  Body::Shape shape;
-  std::vector<const char*> sizes;  ///< keys; "size" is a list of three
-};
-
-const std::map<std::string, ShapeKeys>& shapes() {
-  static const std::map<std::string, ShapeKeys> all{
-      {"box", {Body::Shape::box, {"size"}}},
-      {"sphere", {Body::Shape::ball, {"radius"}}},
-      {"cylinder", {Body::Shape::cylinder, {"radius", "length"}}},
-      {"disc", {Body::Shape::disc, {"radius"}}},
-      {"rod", {Body::Shape::rod, {"length"}}}};
-  return all;
-}
-
-const char* shape_name(Body::Shape shape) {
-  for (const auto& [name, keys] : shapes())
-    if (keys.shape == shape) return name.c_str();
-  return "ellipsoid";
-}
-
 }  // namespace
-
-const std::vector<std::string>& body_tables() {
-  static const std::vector<std::string> keys{"gravity", "body", "joint", "wheel", "rolling", "spring"};
-  return keys;
-}
 
 BodyReader::BodyReader(const TableReader& tables, const std::string& file, const SceneDocument& document)
     : tables_(tables), file_(file), document_(document), parser_(file_, graph_, symbols_) {}
@@ -63,6 +37,7 @@ BodyParts BodyReader::read(const toml::table& root) {
   for (const toml::table* table : tables_.tables(root, "joint")) read_joint(*table);
   for (const toml::table* table : tables_.tables(root, "rolling")) read_contact(*table);
   for (const toml::table* table : tables_.tables(root, "spring")) read_spring(*table);
+  require_momenta(root);
   parts_.expansion = expand(mechanism_);
   for (const Body& body : mechanism_.bodies) draw(body);
   join_formulas(root);
@@ -164,19 +139,6 @@ Vec BodyReader::direction(const toml::node& node, const std::string& what, bool 
   return length.value() == 1.0 ? result : unit(result);
 }
 
-std::array<Vec, 2> BodyReader::two(const toml::table& table, const char* key, const std::string& what,
-                                   bool plane, bool directions) {
-  const toml::node& node = *table.get(key);
-  const toml::array* list = node.as_array();
-  const std::string of = fmt::format("'{}' of {}", key, what);
-  if (list == nullptr || list->size() != 2 || !(*list)[0].is_array())
-    tables_.fail(place_of(node.source()), of + ": expected two lists, one in the axes of each body");
-  const auto one = [&](std::size_t k) {
-    return directions ? direction((*list)[k], of, plane) : vector((*list)[k], of, plane);
-  };
-  return {one(0), one(1)};
-}
-
 std::string BodyReader::name(const toml::table& table, const std::string& what) {
   std::string name = tables_.required_string(table, "name", what);
   const Place place = place_of(table.get("name")->source());
@@ -192,10 +154,6 @@ std::string BodyReader::name(const toml::table& table, const std::string& what) 
 int BodyReader::source(const toml::table& table) {
   parts_.places.push_back(place_of(table.source()));
   return static_cast<int>(parts_.places.size()) - 1;
-}
-
-bool BodyReader::is_plane(int body) const {
-  return body != ground && mechanism_.bodies[static_cast<std::size_t>(body)].plane;
 }
 
 // ------------------------------------------------------------------ bodies
@@ -352,22 +310,7 @@ void BodyReader::read_inertia(const toml::table& table, Body& body, const std::s
           fmt::format("'inertia' of {}: {:g} is more than the sum of the others, {:g}, which no body has",
                       what, moment(k), others));
   }
-  // ∫ρ x xᵀ = tr/2 − J is not negative for any density, and J is above 0 where it is not 0.
-  const auto at = [&](std::size_t i, std::size_t k) { return body.inertia[i][k].value(); };
-  const double half_trace = 0.5 * (at(0, 0) + at(1, 1) + at(2, 2));
-  const auto spread = [&](std::size_t i, std::size_t k) { return (i == k ? half_trace : 0.0) - at(i, k); };
-  const auto least_minor = [](const auto& matrix) {
-    const auto minor = [&](std::size_t i, std::size_t k) {
-      return matrix(i, i) * matrix(k, k) - matrix(i, k) * matrix(i, k);
-    };
-    const double determinant = matrix(0, 0) * minor(1, 2) +
-                               matrix(0, 1) * (matrix(0, 2) * matrix(1, 2) - matrix(0, 1) * matrix(2, 2)) +
-                               matrix(0, 2) * (matrix(0, 1) * matrix(1, 2) - matrix(1, 1) * matrix(0, 2));
-    const double size = matrix(0, 0) + matrix(1, 1) + matrix(2, 2);
-    return std::min({minor(0, 1) / (size * size), minor(0, 2) / (size * size), minor(1, 2) / (size * size),
-                     determinant / (size * size * size)});
-  };
-  if (!(least_minor(at) > 0.0) || !(least_minor(spread) > -1e-12))
+  if (!is_inertia(body.inertia))
     tables_.fail(place_of(node->source()),
                  fmt::format("'inertia' of {}: the principal moments of these six are not above 0, or one is "
                              "more than the sum of the others, which no body has",

@@ -12,7 +12,10 @@
 namespace diracstep::scene_compiler {
 
 /// The tables that make bodies, and the key of their gravity.
-const std::vector<std::string>& body_tables();
+inline const std::vector<std::string>& body_tables() {
+  static const std::vector<std::string> keys{"gravity", "body", "joint", "wheel", "rolling", "spring"};
+  return keys;
+}
 
 /// What the tables of bodies are as parts of a plain scene, with their places in the file.
 struct BodyParts {
@@ -90,6 +93,7 @@ class BodyReader {
   void read_orientation(const toml::node& node, bodies::Body& body, const std::string& what);
   bodies::Rotation::Quaternion axis_and_angle(const toml::table& table, const std::string& what);
   bodies::Rotation::Quaternion of_matrix(const toml::array& rows, const std::string& what);
+  void require_momenta(const toml::table& root) const;
   void read_joint(const toml::table& table);
   void read_joint_axis(const toml::table& table, bodies::Joint& joint, const std::string& what, bool plane);
   void read_spring(const toml::table& table);

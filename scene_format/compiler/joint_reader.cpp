@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <diracstep/scene_format/bodies/shapes.hpp>
 #include <diracstep/scene_format/compiler/body_reader.hpp>
 
 /// The tables of BodyReader that hold bodies together, and those of contacts.
@@ -27,6 +28,35 @@ const std::map<std::string, Contact::Kind>& contact_kinds() {
 }
 
 }  // namespace
+
+bool BodyReader::is_plane(int body) const {
+  return body != ground && mechanism_.bodies[static_cast<std::size_t>(body)].plane;
+}
+
+std::array<Vec, 2> BodyReader::two(const toml::table& table, const char* key, const std::string& what,
+                                   bool plane, bool directions) {
+  const toml::node& node = *table.get(key);
+  const toml::array* list = node.as_array();
+  const std::string of = fmt::format("'{}' of {}", key, what);
+  if (list == nullptr || list->size() != 2 || !(*list)[0].is_array())
+    tables_.fail(place_of(node.source()), of + ": expected two lists, one in the axes of each body");
+  const auto one = [&](std::size_t k) {
+    return directions ? direction((*list)[k], of, plane) : vector((*list)[k], of, plane);
+  };
+  return {one(0), one(1)};
+}
+
+/// Unless the file's own Lagrangian or rows may give or hold what is missing.
+void BodyReader::require_momenta(const toml::table& root) const {
+  if (root.contains("lagrangian") || root.contains("rows")) return;
+  if (const Body* rod = rod_that_turns_freely(mechanism_))
+    tables_.fail(
+        parts_.place(rod->source),
+        fmt::format("body '{}' is a thin rod, which has no moment of inertia about itself, and no joint "
+                    "holds its turn about itself: give it an 'inertia' or the shape \"cylinder\", or join "
+                    "it otherwise",
+                    rod->name));
+}
 
 int BodyReader::body_number(const toml::node& node, const std::string& what, bool or_ground) const {
   const Place place = place_of(node.source());

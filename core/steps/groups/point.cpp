@@ -5,13 +5,6 @@ namespace diracstep {
 
 namespace {
 
-/// A matrix over components of velocities as one over group columns, others zero.
-Columns embedded(const Space& space, const Columns& of_velocities) {
-  Columns whole = Columns::Zero(space.group_dimension(), space.group_dimension());
-  whole(space.tangent(), space.tangent()) = of_velocities;
-  return whole;
-}
-
 Vector unit(const Space& space, int a) { return Vector::Unit(space.group_dimension(), a); }
 
 /// ad*_{e_a} c
@@ -21,15 +14,28 @@ Vector coadjoint_unit(const Space& space, int a, const Vector& c) {
   return k.col(a);
 }
 
-}  // namespace
-
-GroupPoint::GroupPoint(const Scene& scene)
-    : scene_(scene), space_(*scene.space), v_(Vector::Zero(scene.dimension())) {
-  own_force_ = lq_ = lv_ = v_;
-  momentum_ = force_ = Vector::Zero(space_.group_dimension());
+/// Values on a pattern over the components of velocities, as a matrix over group columns.
+template <class Square>
+void embed_values(const Space& space, const SparsityPattern& pattern, const Vector& values, Square& whole) {
+  const Eigen::Index n = pattern.rows();
+  if (values.size() == n * n && whole.rows() == n)  // full, and no turns
+    whole = values.reshaped(n, n);
+  else
+    embed_block(space, pattern.full(values), whole);
 }
 
-void GroupPoint::evaluate(double t, ConstVectorRef q, ConstVectorRef xi) {
+}  // namespace
+
+template <int D>
+GroupPoint<D>::GroupPoint(const Scene& scene)
+    : scene_(scene), space_(*scene.space), v_(Vector::Zero(scene.dimension())) {
+  own_force_ = lq_ = lv_ = v_;
+  qq_ = qv_ = vv_ = Vector::Zero(scene.lagrangian->pattern().nonzeros());
+  momentum_ = force_ = xi_ = Column::Zero(space_.group_dimension());
+}
+
+template <int D>
+void GroupPoint<D>::evaluate(double t, ConstVectorRef q, const Column& xi) {
   t_ = t;
   q_ = q;
   xi_ = xi;
@@ -44,24 +50,33 @@ void GroupPoint::evaluate(double t, ConstVectorRef q, ConstVectorRef xi) {
   for (const int a : space_.turns()) force_[a] = momentum_.dot(space_.bracket(unit(space_, a), xi_));
 }
 
-void GroupPoint::derivatives(Derivatives& out) const {
-  const Lagrangian& lagrangian = *scene_.lagrangian;
-  const SparsityPattern& pattern = lagrangian.pattern();
-  Vector qq(pattern.nonzeros()), qv(qq), vv(qq);
-  lagrangian.hessian(t_, q_, v_, qq, qv, vv);
-  out.curvature = max_norm(qq);
-  const Columns by_qv = embedded(space_, pattern.full(qv));
-  out.momentum_xi = embedded(space_, pattern.full(vv));
-  out.momentum_g = by_qv.transpose();
-  out.force_g = embedded(space_, pattern.full(qq));
-  out.force_xi = by_qv;
+template <int D>
+void GroupPoint<D>::derivatives(Derivatives& out) const {
+  const Eigen::Index d = space_.group_dimension();
+  for (Square* matrix : {&out.momentum_g, &out.momentum_xi, &out.force_g, &out.force_xi})
+    matrix->resize(d, d);
+  const SparsityPattern& pattern = scene_.lagrangian->pattern();
+  scene_.lagrangian->hessian(t_, q_, v_, qq_, qv_, vv_);
+  out.curvature = max_norm(qq_);
+  embed_values(space_, pattern, qq_, out.force_g);
+  embed_values(space_, pattern, qv_, out.force_xi);
+  embed_values(space_, pattern, vv_, out.momentum_xi);
+  out.momentum_g = out.force_xi.transpose();
   if (scene_.force) {
     const SparsityPattern& own = scene_.force->pattern();
     Vector by_q(own.nonzeros()), by_v(by_q);
     scene_.force->derivatives(t_, q_, v_, by_q, by_v);
-    out.force_g += embedded(space_, own.full(by_q));
-    out.force_xi += embedded(space_, own.full(by_v));
+    Square added(d, d);
+    embed_values(space_, own, by_q, added);
+    out.force_g += added;
+    embed_values(space_, own, by_v, added);
+    out.force_xi += added;
   }
+  if (!space_.turns().empty()) add_turns(out);
+}
+
+template <int D>
+void GroupPoint<D>::add_turns(Derivatives& out) const {
   for (const int a : space_.turns()) {
     const Vector turned = space_.bracket(unit(space_, a), xi_);
     out.force_g.row(a) = turned.transpose() * out.momentum_g;
@@ -76,16 +91,18 @@ void GroupPoint::derivatives(Derivatives& out) const {
   }
 }
 
-GroupRows::GroupRows(const Scene& scene)
+template <int D>
+GroupRows<D>::GroupRows(const Scene& scene)
     : scene_(scene),
       space_(*scene.space),
-      a_(Columns::Zero(scene.rows(), space_.group_dimension())),
+      a_(Rows::Zero(scene.rows(), space_.group_dimension())),
       b_(Vector::Zero(scene.rows())) {
   for (const auto& block : scene.constraints)
     holonomic_.insert(holonomic_.end(), static_cast<std::size_t>(block->rows()), block->holonomic());
 }
 
-void GroupRows::evaluate(double t, ConstVectorRef q) {
+template <int D>
+void GroupRows<D>::evaluate(double t, ConstVectorRef q) {
   int row = 0;
   for (const auto& block : scene_.constraints) {
     const int m = block->rows();
@@ -96,7 +113,8 @@ void GroupRows::evaluate(double t, ConstVectorRef q) {
   }
 }
 
-void GroupRows::positions(double t, ConstVectorRef q, VectorRef phi) const {
+template <int D>
+void GroupRows<D>::positions(double t, ConstVectorRef q, VectorRef phi) const {
   phi.setZero();
   int row = 0;
   for (const auto& block : scene_.constraints) {
@@ -105,7 +123,8 @@ void GroupRows::positions(double t, ConstVectorRef q, VectorRef phi) const {
   }
 }
 
-void GroupRows::derivative(double t, ConstVectorRef q, ConstVectorRef xi, ColumnsRef out) const {
+template <int D>
+void GroupRows<D>::derivative(double t, ConstVectorRef q, const Column& xi, Rows& out) const {
   Vector v(scene_.dimension());
   space_.restrict(xi, v);
   out.setZero();
@@ -120,7 +139,8 @@ void GroupRows::derivative(double t, ConstVectorRef q, ConstVectorRef xi, Column
   for (const int a : space_.turns()) out.col(a) = a_ * space_.bracket(unit(space_, a), xi);
 }
 
-void GroupRows::impulse_derivative(double t, ConstVectorRef q, ConstVectorRef lambda, ColumnsRef out) const {
+template <int D>
+void GroupRows<D>::impulse_derivative(double t, ConstVectorRef q, ConstVectorRef lambda, Square& out) const {
   const int n = scene_.dimension();
   Columns sum = Columns::Zero(n, n);
   int row = 0;
@@ -130,8 +150,15 @@ void GroupRows::impulse_derivative(double t, ConstVectorRef q, ConstVectorRef la
     sum += block->curvature_pattern().full(values);
     row += block->rows();
   }
-  out = embedded(space_, sum);
+  embed_block(space_, sum, out);
   for (const int a : space_.turns()) out.col(a) = coadjoint_unit(space_, a, impulse(lambda));
 }
+
+template class GroupPoint<3>;
+template class GroupPoint<6>;
+template class GroupPoint<Eigen::Dynamic>;
+template class GroupRows<3>;
+template class GroupRows<6>;
+template class GroupRows<Eigen::Dynamic>;
 
 }  // namespace diracstep

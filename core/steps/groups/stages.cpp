@@ -5,18 +5,21 @@
 
 namespace diracstep {
 
-void GroupNode::place(const Space& space, const Columns& v) {
-  const Eigen::Index d = space.group_dimension();
-  x = v * alpha;
-  Columns forth(d, d);
-  adjoint_back.resize(d, d);
-  dtau.resize(d, d);
-  dtau_back.resize(d, d);
-  space.maps(x, forth, dtau);
-  space.maps(-x, adjoint_back, dtau_back);
+template <int D>
+void GroupNode<D>::place(const Space& space, const typename GroupSizes<D>::Stages& v) {
+  x.noalias() = v * alpha;
+  take_maps(space);
 }
 
-GroupStages::GroupStages(int stages, const Scene& of)
+template <int D>
+void GroupNode<D>::take_maps(const Space& space) {
+  const Eigen::Index d = space.group_dimension();
+  for (Square* matrix : {&adjoint, &adjoint_back, &dtau, &dtau_back}) matrix->resize(d, d);
+  space.maps(x, adjoint, adjoint_back, dtau, dtau_back);
+}
+
+template <int D>
+GroupStages<D>::GroupStages(int stages, const Scene& of)
     : scene(of),
       space(*of.space),
       s(stages),
@@ -32,7 +35,8 @@ GroupStages::GroupStages(int stages, const Scene& of)
   for (int i = 0; i < s; ++i) gauss_rows.emplace_back(of);
 }
 
-void GroupStages::begin(Interval of, const State& start) {
+template <int D>
+void GroupStages<D>::begin(Interval of, const State& start) {
   if (of.start != step.start) failure.clear();
   step = of;
   q0 = start.q;
@@ -48,20 +52,22 @@ void GroupStages::begin(Interval of, const State& start) {
   evaluated_ = false;
 }
 
-void GroupStages::set_node(GroupNode& node, double c, const Vector& a) {
+template <int D>
+void GroupStages<D>::set_node(GroupNode<D>& node, double c, const Vector& a) {
   node.t = step.start + c * step.size;
   node.alpha = step.size * (a - 0.5 * table.b);
 }
 
 /// Everything the residual is made of, at x, unless x is where it was last taken.
-bool GroupStages::evaluate(ConstVectorRef x) {
+template <int D>
+bool GroupStages<D>::evaluate(ConstVectorRef x) {
   if (evaluated_ && last_x_ == x) return inside_;
   evaluated_ = true;
   last_x_ = x;
   const Eigen::Index d = space.group_dimension();
   v.resize(d, s);
   for (int i = 0; i < s; ++i) space.embed(x.segment(n * i, n), v.col(i));
-  y = 0.5 * step.size * (v * table.b);
+  centre.x.noalias() = 0.5 * step.size * (v * table.b);
   place_nodes();
   if (!inside_) return false;
   middle_momentum = centre.adjoint.transpose() * p0;
@@ -71,16 +77,13 @@ bool GroupStages::evaluate(ConstVectorRef x) {
   return true;
 }
 
-void GroupStages::place_nodes() {
-  const Eigen::Index d = space.group_dimension();
-  for (Columns* matrix : {&centre.adjoint, &centre.dtau, &centre.dtau_back}) matrix->resize(d, d);
-  Columns unused(d, d);
-  space.maps(y, centre.adjoint, centre.dtau);
-  space.maps(-y, unused, centre.dtau_back);
+template <int D>
+void GroupStages<D>::place_nodes() {
+  centre.take_maps(space);
   g_c.resize(space.storage_size());
-  if (!reduced) space.move(q0, y, g_c);
-  double part = space.part_of_chart(y);
-  for (GroupNode& node : gauss) {
+  if (!reduced) space.move(q0, centre.x, g_c);
+  double part = space.part_of_chart(centre.x);
+  for (GroupNode<D>& node : gauss) {
     node.place(space, v);
     part = std::max(part, space.part_of_chart(node.x));
     move_to(node);
@@ -99,24 +102,26 @@ void GroupStages::place_nodes() {
             std::to_string(part) + " of that; take a smaller one";
 }
 
-void GroupStages::move_to(GroupNode& node) {
+template <int D>
+void GroupStages<D>::move_to(GroupNode<D>& node) {
   node.q = q0;
   if (!reduced) space.move(g_c, node.x, node.q);
 }
 
-void GroupStages::add_forces() {
+template <int D>
+void GroupStages<D>::add_forces() {
   const Eigen::Index d = space.group_dimension();
-  for (Columns* columns : {&xi, &phi, &forces}) columns->resize(d, s);
-  Columns along(d, d);
+  for (Stages* columns : {&xi, &phi, &forces}) columns->resize(d, s);
   momentum_size = 0.0;
   for (int i = 0; i < s; ++i) {
-    GroupNode& node = gauss[at(i)];
-    GroupPoint& point = points[at(i)];
-    xi.col(i) = node.dtau * v.col(i);
+    GroupNode<D>& node = gauss[at(i)];
+    GroupPoint<D>& point = points[at(i)];
+    xi.col(i).noalias() = node.dtau * v.col(i);
     point.evaluate(node.t, node.q, xi.col(i));
-    space.dtau_along(node.x, v.col(i), along);
+    node.along.resize(d, d);
+    space.dtau_along(node.x, v.col(i), node.along);
     forces.col(i) = point.force();
-    phi.col(i) = along.transpose() * point.momentum() + node.dtau.transpose() * point.force();
+    phi.col(i) = node.along.transpose() * point.momentum() + node.dtau.transpose() * point.force();
     node.carried = node.adjoint_back.transpose() * point.force();
     middle_momentum += step.size * table.b[i] * node.carried;
     momentum_size = std::max(momentum_size, max_norm(point.momentum()));
@@ -124,10 +129,11 @@ void GroupStages::add_forces() {
   force_size = std::max(force_size, max_norm(forces));
 }
 
-void GroupStages::add_rows(ConstVectorRef x) {
+template <int D>
+void GroupStages<D>::add_rows(ConstVectorRef x) {
   impulses.resize(space.group_dimension(), s);
   for (int j = 0; j < s; ++j) {
-    GroupNode& node = lobatto[at(j)];
+    GroupNode<D>& node = lobatto[at(j)];
     rows[at(j)].evaluate(node.t, node.q);
     impulses.col(j) = rows[at(j)].impulse(multipliers(x, j));
     node.carried = node.adjoint_back.transpose() * impulses.col(j);
@@ -139,6 +145,13 @@ void GroupStages::add_rows(ConstVectorRef x) {
     form_size = std::max(form_size, max_norm(gauss_rows[at(k)].forms()));
   }
 }
+
+template struct GroupNode<3>;
+template struct GroupNode<6>;
+template struct GroupNode<Eigen::Dynamic>;
+template class GroupStages<3>;
+template class GroupStages<6>;
+template class GroupStages<Eigen::Dynamic>;
 
 bool reduced_on_group(const Scene& scene) {
   return scene.lagrangian->structure().x_absent && !scene.force &&

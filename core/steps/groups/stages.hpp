@@ -12,19 +12,32 @@
 namespace diracstep {
 
 /// A node of a step in the chart around its middle: X = Σ_l α_l V_l.
+template <int D>
 struct GroupNode {
-  double t = 0.0;
-  Vector alpha;                           ///< s
-  Vector x, q;                            ///< X, and g_c τ(X)
-  Columns adjoint_back, dtau, dtau_back;  ///< Ad_{τ(−X)}, dτ_X, dτ_{−X}
-  Vector carried;                         ///< Ad_{τ(−X)}ᵀ of the force or the impulse there
+  using Column = typename GroupSizes<D>::Column;
+  using Square = typename GroupSizes<D>::Square;
 
-  void place(const Space& space, const Columns& v);
+  double t = 0.0;
+  Vector alpha;                                   ///< s
+  Column x;                                       ///< X
+  Vector q;                                       ///< g_c τ(X)
+  Square adjoint, adjoint_back, dtau, dtau_back;  ///< Ad_{τ(X)}, Ad_{τ(−X)}, dτ_X, dτ_{−X}
+  Square along;                                   ///< ∂(dτ_X V)/∂X, at a Gauss node
+  Column carried;                                 ///< Ad_{τ(−X)}ᵀ of the force or the impulse there
+
+  void place(const Space& space, const typename GroupSizes<D>::Stages& v);
+  /// The maps above at x.
+  void take_maps(const Space& space);
 };
 
 /// What the equations of a step GL(s) on a space are made of (step.hpp), at the unknowns x last evaluated.
+template <int D>
 class GroupStages {
  public:
+  using Column = typename GroupSizes<D>::Column;
+  using Square = typename GroupSizes<D>::Square;
+  using Stages = typename GroupSizes<D>::Stages;
+
   GroupStages(int s, const Scene& scene);
 
   void begin(Interval of, const State& start);
@@ -52,18 +65,16 @@ class GroupStages {
   const int s, n, m;
   const GaussLobattoTableau table;
   const bool reduced;  ///< nothing depends on the configuration
-  GroupRows rows_at_start;
-  std::vector<GroupNode> gauss, lobatto;
-  std::vector<GroupPoint> points;           ///< at the Gauss nodes
-  std::vector<GroupRows> rows, gauss_rows;  ///< at the Lobatto and at the Gauss nodes
+  GroupRows<D> rows_at_start;
+  std::vector<GroupNode<D>> gauss, lobatto;
+  std::vector<GroupPoint<D>> points;           ///< at the Gauss nodes
+  std::vector<GroupRows<D>> rows, gauss_rows;  ///< at the Lobatto and at the Gauss nodes
   Interval step{};
-  Vector q0, p0, g_c, y, middle_momentum;  ///< the last one is M
-  /// Ad_{τ(y)}, dτ_y, dτ_{−y}.
-  struct {
-    Columns adjoint, dtau, dtau_back;
-  } centre;
-  Columns v, xi, phi, forces, impulses;  ///< a column for each node
-  std::string failure;                   ///< of any evaluation since another start was given
+  Vector q0, g_c;
+  Column p0, middle_momentum;           ///< the last one is M
+  GroupNode<D> centre;                  ///< its x is y
+  Stages v, xi, phi, forces, impulses;  ///< a column for each node
+  std::string failure;                  ///< of any evaluation since another start was given
   /// Sizes of terms, at least those of the step before where it was told them.
   double force_size = 0.0, impulse_size = 0.0, momentum_size = 0.0, velocity_size = 0.0, form_size = 0.0;
 
@@ -71,9 +82,9 @@ class GroupStages {
   bool has(bool holonomic_ones) const {
     return std::ranges::find(rows_at_start.holonomic(), holonomic_ones) != rows_at_start.holonomic().end();
   }
-  void set_node(GroupNode& node, double c, const Vector& a);
+  void set_node(GroupNode<D>& node, double c, const Vector& a);
   void place_nodes();
-  void move_to(GroupNode& node);
+  void move_to(GroupNode<D>& node);
   void add_forces();
   void add_rows(ConstVectorRef x);
 

@@ -12,7 +12,10 @@ namespace diracstep {
 
 namespace {
 
+template <int D>
 class GroupStep final : public StepProblem {
+  using Column = typename GroupSizes<D>::Column;
+
  public:
   GroupStep(int s, const Scene& scene)
       : g_(s, scene),
@@ -58,9 +61,9 @@ class GroupStep final : public StepProblem {
       return;
     }
     set_scales();
-    const Vector ends = 0.5 * g_.centre.dtau_back.transpose() * (g_.p0 + g_.middle_momentum);
+    const Column ends = 0.5 * g_.centre.dtau_back.transpose() * (g_.p0 + g_.middle_momentum);
     for (int k = 0; k < g_.s; ++k) {
-      Vector row = g_.gauss[at(k)].dtau.transpose() * g_.points[at(k)].momentum() - ends;
+      Column row = g_.gauss[at(k)].dtau.transpose() * g_.points[at(k)].momentum() - ends;
       for (int i = 0; i < g_.s; ++i) row += g_.gauss_weight(i, k) * g_.phi.col(i);
       for (int j = 0; g_.m > 0 && j < g_.s; ++j)
         row += g_.lobatto_weight(j, k) * (g_.lobatto[at(j)].dtau.transpose() * g_.impulses.col(j));
@@ -85,10 +88,10 @@ class GroupStep final : public StepProblem {
     for (Vector* column : {&end.at.p, &end.at.v}) column->setConstant(g_.n, std::nan(""));
     end.at.q.setConstant(g_.space.storage_size(), std::nan(""));
     if (!inside) return;
-    g_.space.move(g_.q0, g_.y, g_.g_c);
-    g_.space.move(g_.g_c, g_.y, end.at.q);
+    g_.space.move(g_.q0, g_.centre.x, g_.g_c);
+    g_.space.move(g_.g_c, g_.centre.x, end.at.q);
     g_.space.restrict(g_.centre.adjoint.transpose() * g_.middle_momentum, end.at.p);
-    g_.space.restrict(2.0 / g_.step.size * g_.y, end.at.v);
+    g_.space.restrict(2.0 / g_.step.size * g_.centre.x, end.at.v);
     end.impulse = g_.table.lobatto_b[0] * x.segment(g_.n * g_.s, g_.m);
     end.memory.known = true;
     end.memory.scales.resize(3);
@@ -97,11 +100,11 @@ class GroupStep final : public StepProblem {
   }
 
  private:
-  static std::size_t at(int i) { return GroupStages::at(i); }
+  static std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
   void constraint_rows(int k, VectorRef out) {
-    const GroupRows& inside = g_.gauss_rows[at(k)];
-    const GroupNode& node = g_.lobatto[at(k) + 1];
+    const GroupRows<D>& inside = g_.gauss_rows[at(k)];
+    const GroupNode<D>& node = g_.lobatto[at(k) + 1];
     const Vector rates = inside.forms() * g_.xi.col(k) + inside.offsets();
     Vector positions = Vector::Zero(g_.m);
     if (g_.has_holonomic()) g_.rows[at(k) + 1].positions(node.t, node.q, positions);
@@ -118,8 +121,8 @@ class GroupStep final : public StepProblem {
     if (g_.m > 0) blocks_[1].scale = scale_of(g_.form_size * speed);
   }
 
-  GroupStages g_;
-  GroupJacobian jacobian_;
+  GroupStages<D> g_;
+  GroupJacobian<D> jacobian_;
   SparsityPattern pattern_;
   std::array<ResidualBlock, 2> blocks_;
   double curvature_ = 0.0;
@@ -128,7 +131,14 @@ class GroupStep final : public StepProblem {
 }  // namespace
 
 std::unique_ptr<StepProblem> group_step(int s, const Scene& scene) {
-  return std::make_unique<GroupStep>(s, scene);
+  switch (scene.space->group_dimension()) {
+    case 3:
+      return std::make_unique<GroupStep<3>>(s, scene);
+    case 6:
+      return std::make_unique<GroupStep<6>>(s, scene);
+    default:
+      return std::make_unique<GroupStep<Eigen::Dynamic>>(s, scene);
+  }
 }
 
 }  // namespace diracstep

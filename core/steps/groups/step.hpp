@@ -26,9 +26,9 @@ namespace diracstep {
 ///
 /// They follow from the stationarity of h Σ b_i ℓ(G_i, Ξ_i) with the virtual work of forces and impulses
 /// under variations of g0 and of all V_k with g1 fixed; that the centre varies with them makes the step
-/// symplectic. The Jacobian is exact: second derivatives of dτ by jets, all others from those of L, force and
-/// rows. Where neither L nor the rows depend on the configuration and there is no force, these are equations
-/// in V and λ alone and the configuration is reconstructed at the end (Euler-Poincaré,
+/// symplectic. The Jacobian is exact: derivatives of dτ in closed form or by jets, all others from those of
+/// L, force and rows. Where neither L nor the rows depend on the configuration and there is no force, these
+/// are equations in V and λ alone and the configuration is reconstructed at the end (Euler-Poincaré,
 /// Euler-Poincaré-Suslov). A step that leaves what τ is injective on has no residual: the solve fails and
 /// failure() says why.
 std::unique_ptr<StepProblem> group_step(int s, const Scene& scene);

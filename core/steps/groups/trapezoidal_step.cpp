@@ -76,7 +76,7 @@ class GroupTrapezoidalStep final : public StepProblem {
     }
     const double h = step_.size;
     const Eigen::Index d = space_.group_dimension();
-    GroupPoint::Derivatives at_first, at_last;
+    GroupPoint<Eigen::Dynamic>::Derivatives at_first, at_last;
     first_.derivatives(at_first);
     last_.derivatives(at_last);
     Columns along(d, d);
@@ -138,8 +138,7 @@ class GroupTrapezoidalStep final : public StepProblem {
     }
     for (Columns* matrix : {&adjoint_, &dtau_, &back_}) matrix->resize(d, d);
     Columns unused(d, d);
-    space_.maps(-h * v_, unused, back_);
-    space_.maps(h * v_, adjoint_, dtau_);
+    space_.maps(h * v_, adjoint_, unused, dtau_, back_);
     first_.evaluate(step_.start, q0_, v_);
     last_.evaluate(step_.end(), q1_, v_);
     carried_ = p0_ + 0.5 * h * first_.force();
@@ -163,8 +162,8 @@ class GroupTrapezoidalStep final : public StepProblem {
 
   const Space& space_;
   int n_, m_;
-  GroupPoint first_, last_;
-  GroupRows first_rows_, last_rows_;
+  GroupPoint<Eigen::Dynamic> first_, last_;
+  GroupRows<Eigen::Dynamic> first_rows_, last_rows_;
   SparsityPattern pattern_;
   std::array<ResidualBlock, 2> blocks_;
   Interval step_{};

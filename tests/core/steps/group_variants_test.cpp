@@ -42,7 +42,8 @@ class VariantStep {
  private:
   struct Maps {
     Maps(const Space& space, const Vector& x) : adjoint(x.size(), x.size()), dtau(adjoint) {
-      space.maps(x, adjoint, dtau);
+      Columns unused(adjoint), back(adjoint);
+      space.maps(x, adjoint, unused, dtau, back);
     }
     Columns adjoint, dtau;
   };
@@ -53,7 +54,7 @@ class VariantStep {
     const bool centred = variant_ != Variant::chart_at_start;
     const Vector y = 0.5 * h * (v * table_.b), shift = centred ? y : Vector(Vector::Zero(n));
     const Vector middle = centred ? space_.moved(from.q, y) : from.q;
-    GroupPoint point(scene_);
+    GroupPoint<Eigen::Dynamic> point(scene_);
     Columns momenta(n, s_), phi(n, s_), carried(n, s_);
     for (int i = 0; i < s_; ++i) {
       const Vector at = h * (v * table_.a.row(i).transpose()) - shift;

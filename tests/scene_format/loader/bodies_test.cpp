@@ -1,66 +1,14 @@
+#include "bodies.hpp"
+
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cmath>
-#include <cstdlib>
-#include <diracstep/core/runs/run.hpp>
-#include <diracstep/scene_format/compiler/plain_scene.hpp>
-#include <diracstep/scene_format/scene_file.hpp>
 #include <numbers>
+#include <vector>
 
-#include "misuse.hpp"
-#include "stepping.hpp"
-
-/// Bodies, joints and contacts as text (docs/bodies.md): what they expand into, how it moves, what is
-/// refused.
+/// Bodies, joints and contacts as text (docs/bodies.md): how what they expand into moves.
 namespace diracstep::body_tests {
 namespace {
-
-using diracstep::testing::end_of;
-
-class Bodies : public ::testing::Test {
- protected:
-  void SetUp() override { setenv("DIRACSTEP_CC", "none", 1); }  // each is run a few steps
-  void TearDown() override { unsetenv("DIRACSTEP_CC"); }
-};
-
-CatalogueScene scene(const std::string& text) { return scene_from_text("scene.toml", text); }
-
-const std::string span = "[span]\nend = 1\nstep = 0.02\n";
-
-std::string with_span(const std::string& bodies) { return "name = \"s\"\n" + bodies + span; }
-
-double at(const CatalogueScene& entry, const Vector& values, const std::string& coordinate) {
-  const auto& names = entry.scene->coordinates;
-  const auto found = std::ranges::find(names, coordinate);
-  if (found == names.end()) throw std::logic_error("no coordinate " + coordinate);
-  return values[found - names.begin()];
-}
-
-double output(const CatalogueScene& entry, const Sample& sample, const std::string& name) {
-  const auto found = std::ranges::find(entry.outputs, name, &Output::name);
-  if (found == entry.outputs.end()) throw std::logic_error("no output " + name);
-  return found->at(sample.point());
-}
-
-double change_of_energy(const CatalogueScene& entry, long steps, double step, const std::string& method) {
-  const auto samples = testing::samples_of(entry.scene, {.method = method, .step = step}, steps);
-  return std::abs(samples.back().energy - samples.front().energy);
-}
-
-const std::string pendulum = R"toml(gravity = 9.81
-[[body]]
-name = "bob"
-mass = 2
-inertia = [0.1, 0.1, 0.05]
-position = [0.6, 0, -0.8]
-[[joint]]
-name = "pin"
-kind = "revolute"
-between = ["ground", "bob"]
-point = [0, 0, 0]
-axis = [0, 1, 0]
-)toml";
 
 TEST_F(Bodies, APhysicalPendulumSwingsAsItsEquationSays) {
   const CatalogueScene bob = scene(with_span(pendulum));
@@ -202,23 +150,6 @@ joint = [{ name = "rail", kind = "prismatic", between = ["ground", "car"], point
   EXPECT_NEAR(at(slide, moved.q, "car_z"), 0.8 * 1.25, 1e-10);
 }
 
-const std::string ball_on = R"toml(gravity = 9.81
-body = [{ name = "ball", mass = 1, inertia = [0.02, 0.03, 0.025], orientation = { axis = [1, 1, 0], angle = 0.5 }, rate = [2, -1, 0.5] }]
-rolling = [{ body = "ball", kind = "ball", radius = 0.25, centre = [0.01, 0.02, 0], contact = [0.1, 0.2]SURFACE }]
-)toml";
-const std::string disc_on = R"toml(gravity = 9.81
-body = [{ name = "disc", mass = 1, shape = "disc", radius = 0.4, orientation = { axis = [0, 1, 0], angle = 1.3 }, rate = [-0.6, 0, 4] }]
-rolling = [{ body = "disc", kind = "disc", radius = 0.4, contact = [0, 0]SURFACE }]
-)toml";
-const std::string skate_on = R"toml(gravity = 9.81
-body = [{ name = "skate", mass = 1, inertia = [0.05, 0.06, 0.04], orientation = { axis = [0, 1, 0], angle = 0.2 }, rate = [0.3, 0, 1] }]
-rolling = [{ body = "skate", kind = "knife edge", point = [0.1, 0, -0.3], direction = [1, 0, 0], contact = [0, 0]SURFACE }]
-)toml";
-
-std::string on_surface(std::string text, const std::string& surface) {
-  return text.replace(text.find("SURFACE"), 7, surface);
-}
-
 /// The plane has rows of its own; as a surface it is one with coordinates for the point of contact.
 TEST_F(Bodies, ASurfaceThatIsFlatIsThePlane) {
   for (const auto& [text, name] : {std::pair{ball_on, "ball"}, {disc_on, "disc"}, {skate_on, "skate"}}) {
@@ -294,85 +225,6 @@ TEST_F(Bodies, OrientationsMayBeGivenInThreeWays) {
             1e-15);
 }
 
-TEST_F(Bodies, TheFilesOwnFormulasJoinThoseOfTheBodies) {
-  const std::string both = R"toml(lagrangian = "v_s^2/2 - s*b_x"
-dissipation = "0.1*v_b_x^2"
-coordinates = { s = { unit = "m" } }
-force = { b_y = "0.5" }
-start = { b_y = 0.25, s = 1 }
-body = [
-  { name = "b", plane = true, mass = 2, inertia = 1, velocity = [0.5, 0] },
-  { name = "d", plane = true, mass = 1, inertia = 1, position = [1, 0] },
-]
-joint = [{ name = "slider", kind = "prismatic", between = ["b", "d"], point = [1, 0], axis = [0, 1], force = "2*cos(t)" }]
-spring = [{ name = "k", between = ["b", "d"], points = [[0, 0], [0, 0]], stiffness = 3, damping = 0.2, length = 1 }]
-)toml";
-  const std::string text = "name = \"both\"\n" + both + span;
-  const CatalogueScene entry = scene(text);
-  EXPECT_EQ(at(entry, entry.scene->start.q, "b_y"), 0.25);  // the file's own start
-  const std::string plain = scene_compiler::plain_scene("scene.toml", text);
-  for (const char* part :
-       {"+ bodies_lagrangian\"", "+ bodies_dissipation\"", "+ bodies_force_b_y\"", "b_y = 0.25"})
-    EXPECT_NE(plain.find(part), std::string::npos) << part << " not in\n" << plain;
-}
-
-void expect_same_bits(const std::string& text) {
-  const std::string plain = scene_compiler::plain_scene("scene.toml", text);
-  EXPECT_EQ(plain.find("[[body]]"), std::string::npos);
-  const CatalogueScene with = scene(text), without = scene(plain);
-  EXPECT_TRUE(without.bodies.empty());
-  ASSERT_EQ(with.scene->coordinates, without.scene->coordinates);
-  ASSERT_EQ(with.scene->row_names(), without.scene->row_names());
-  EXPECT_EQ(with.scene->start.q, without.scene->start.q);
-  const Sample a = end_of(with.scene, 0.1, 0.02, "type1/gl:2"),
-               b = end_of(without.scene, 0.1, 0.02, "type1/gl:2");
-  EXPECT_EQ(a.q, b.q);
-  EXPECT_EQ(a.v, b.v);
-  ASSERT_EQ(with.outputs.size(), without.outputs.size());
-  for (std::size_t k = 0; k < with.outputs.size(); ++k)
-    EXPECT_EQ(with.outputs[k].at(a.point()), without.outputs[k].at(b.point()));
-}
-
-TEST_F(Bodies, TheExpandedSceneRunsToTheSameBits) {
-  expect_same_bits(with_span(pendulum));
-  for (const std::string& text : {ball_on, disc_on, skate_on})
-    expect_same_bits(with_span(on_surface(text, ", surface = \"0.2*x^2\"")));
-  expect_same_bits(R"toml(name = "mixed"
-lagrangian = "v_s^2/2"
-force = { b_y = "0.5*b_x" }
-states = { e = { rate = "b_x - e" } }
-inputs = { u = { times = [0, 1, 2], values = [0, 1, 0] } }
-parameters = { m = { value = 2, unit = "kg", above = 0, meaning = "a \"mass\"" }, list = [1.5, 2] }
-body = [{ name = "b", plane = true, mass = "m", inertia = 1, velocity = [0.5, 0] }]
-wheel = [{ name = "w", on = "b", centre = [0, 0.2], radius = 0.1, inertia = 0.01, torque = "u*list[2]" }]
-outputs = { twice = "2*b_x" }
-[coordinates]
-s = { unit = "m", meaning = "own" }
-[[rows]]
-name = "own"
-equation = "s - 0.1*b_th = 0"
-[start]
-guess = ["v_s"]
-[span]
-end = 1
-step = 0.1
-)toml");
-  const std::string own = "name = \"s\"\nlagrangian = \"v_x^2\"\n[coordinates]\nx = {}\n" + span;
-  EXPECT_EQ(scene_compiler::plain_scene("scene.toml", own), own);
-}
-
-TEST_F(Bodies, SizesFollowTheParameters) {
-  const std::string text = with_span(
-      "parameters = { r = 0.5 }\nbody = [{ name = \"b\", mass = 1, shape = \"cylinder\", radius = \"r\", "
-      "length = \"2*r\" }]\n");
-  const auto bodies = scene_from_text("scene.toml", text, {{"r", 2.0}}).bodies;
-  ASSERT_EQ(bodies.size(), 1u);
-  EXPECT_EQ(bodies[0].shape, "cylinder");
-  EXPECT_EQ(bodies[0].size[0], 2.0);
-  EXPECT_EQ(bodies[0].size[1], 4.0);
-  EXPECT_EQ(bodies[0].coordinates, (std::vector<int>{0, 1, 2, 3, 4, 5, 6}));
-}
-
 /// The point of contact that the file gives stays, and the body is placed by the normal there.
 TEST_F(Bodies, WhatRollsOnASurfaceTouchesItWhereTheFileSays) {
   const CatalogueScene bowl = scene(with_span(R"toml(gravity = 9.81
@@ -384,75 +236,6 @@ rolling = [{ body = "ball", kind = "ball", radius = 0.1, contact = [0.3, 0], sur
   EXPECT_EQ(at(bowl, q, "ball_contact_x"), 0.3);
   EXPECT_NEAR(at(bowl, q, "ball_x"), 0.3 - 0.1 * slope / length, 1e-12);
   EXPECT_NEAR(at(bowl, q, "ball_z"), 0.018 + 0.1 / length, 1e-12);
-}
-
-// ------------------------------------------------------------------ what is refused
-
-std::string message_of(const std::string& text) {
-  try {
-    (void)scene(text);
-  } catch (const Misuse& misuse) {
-    return misuse.what();
-  }
-  return "";
-}
-
-struct Mistake {
-  std::string from, to;
-  std::vector<std::string> words;
-};
-
-TEST_F(Bodies, MistakesAreToldWithTheirPlace) {
-  const std::string unchanged = with_span(pendulum);
-  ASSERT_EQ(message_of(unchanged), "");
-  for (const Mistake& mistake : std::vector<Mistake>{
-           {"mass = 2", "mass = -2", {"scene.toml:5:8", "'mass' of body 'bob' is -2; it must be above 0"}},
-           {"mass = 2", "mass = \"mm\"", {"scene.toml:5:9", "unknown name 'mm'"}},
-           {"mass = 2", "mass = \"2*t\"", {"scene.toml:5:11", "'mass' of body 'bob'"}},
-           {"mass = 2\n", "", {"scene.toml:3:1", "body 'bob' needs 'mass'"}},
-           {"mass = 2", "masse = 2", {"scene.toml:5:1", "did you mean 'mass'"}},
-           {"inertia = [0.1, 0.1, 0.05]",
-            "inertia = [0.1, 0.1]",
-            {"scene.toml:6:11", "three principal moments"}},
-           {"inertia = [0.1, 0.1, 0.05]",
-            "inertia = [0.1, 0.1, 0.3]",
-            {"scene.toml:6:22", "more than the sum"}},
-           {"inertia = [0.1, 0.1, 0.05]", "inertia = [0.1, 0, 0.1]", {"scene.toml:6:17", "above 0"}},
-           {"inertia = [0.1, 0.1, 0.05]", "shape = \"cube\"", {"scene.toml:6:9", "\"box\", \"cylinder\""}},
-           {"inertia = [0.1, 0.1, 0.05]", "radius = 1", {"scene.toml:6:10", "needs a 'shape'"}},
-           {"position = [0.6, 0, -0.8]", "position = [0.6, 0]", {"scene.toml:7:12", "list of three"}},
-           {"inertia = [0.1, 0.1, 0.05]",
-            "inertia = [0.1, 0.1, 0.1, 0.2, 0, 0]",
-            {"principal moments", "above 0"}},
-           {"position = [0.6, 0, -0.8]",
-            "orientation = [1, 1, 0, 0]",
-            {"scene.toml:7:15", "of length 1.41421"}},
-           {"position = [0.6, 0, -0.8]",
-            "orientation = [[1, 0, 0], [0, 1, 0], [0, 0, -1]]",
-            {"scene.toml:7:15", "no rotation"}},
-           {"kind = \"revolute\"",
-            "kind = \"hinge\"",
-            {"scene.toml:10:8", "expected \"distance\", \"fixed\""}},
-           {"[\"ground\", \"bob\"]", "[\"ground\", \"bop\"]", {"scene.toml:11:22", "did you mean 'bob'"}},
-           {"[\"ground\", \"bob\"]", "[\"bob\", \"bob\"]", {"two different bodies"}},
-           {"axis = [0, 1, 0]", "axis = [0, 0, 0]", {"scene.toml:13:8", "length 0"}},
-           {"axis = [0, 1, 0]\n", "", {"scene.toml:8:1", "needs one of 'axis'"}},
-           {"axis = [0, 1, 0]",
-            "axis = [0, 1, 0]\nforce = \"1\"",
-            {"scene.toml:14:1", "unknown key 'force'"}},
-           {"axis = [0, 1, 0]", "axis = [0, 1, 0]\ntorque = \"b\"", {"scene.toml:14:11", "unknown name 'b'"}},
-           {"name = \"pin\"", "name = \"bob\"", {"scene.toml:9:8", "used twice"}},
-           {"[[body]]", "[[bodies]]", {"scene.toml:3", "unknown key 'bodies'"}},
-           {"[[body]]\n", "[[rolling]]\nbody = \"x\"\n[[body]]\n", {"there is no body 'x'", "known are bob"}},
-           {"gravity = 9.81", "hamiltonian = \"1\"", {"no 'hamiltonian'"}}}) {
-    std::string text = unchanged;
-    const std::size_t where = text.find(mistake.from);
-    ASSERT_NE(where, std::string::npos) << mistake.from;
-    const std::string message = message_of(text.replace(where, mistake.from.size(), mistake.to));
-    for (const std::string& word : mistake.words)
-      EXPECT_NE(message.find(word), std::string::npos)
-          << "'" << word << "' not in: " << message << "\nfor " << mistake.to;
-  }
 }
 
 }  // namespace
