@@ -72,10 +72,9 @@ Method method_of(MethodInfo info, GeneratingFunctionFactory generating_function)
                              const Scene& scene, const StepChoices& choices) {
     require_flat(scene, "the step of '" + name + "'");
     if (own_motions(scene, choices).exist())
-      throw Misuse(
-          "scene '" + scene.name +
-          "': its Lagrangian is degenerate, as it is where it is linear in some velocities; there '" + name +
-          "' is unstable or leaves p = ∂L/∂v; use type1/midpoint or typeN/gl:S");
+      throw Misuse("scene '" + scene.name +
+                   "': its Lagrangian is linear in v, in some of them, or otherwise degenerate; there '" +
+                   name + "' is unstable or leaves p = ∂L/∂v; use type1/midpoint or typeN/gl:S");
     return dirac_step(generating_function(scene), scene, applied_rule(choices, own), choices.dense);
   };
   return {std::move(info), make_step, std::move(generating_function)};
