@@ -51,13 +51,18 @@ std::vector<PlanLine> Integrator::plan() const {
     const FirstOrderMotions motions = first_order_motions(*scene_);
     const bool first_order = motions.exist() && !motions.by_force && !method_.info.damped;
     lines.push_back({"multipliers", std::to_string(m) + (method_.info.rows_inside ? " a node" : ""),
-                     first_order           ? "all rows at the Gauss nodes: motions of first order"
+                     first_order && motions.hide_equations()
+                         ? "hidden equations and holonomic rows at the Lobatto, others at the Gauss nodes"
+                     : first_order         ? "all rows at the Gauss nodes: motions of first order"
                      : method_.info.damped ? "all rows, and the rates of holonomic rows, at the Radau nodes"
                      : method_.info.rows_inside
                          ? "nonholonomic rows at the Gauss, holonomic rows at the Lobatto nodes"
                          : std::string("nonholonomic rows by the ") + rule.description() +
                                " rule, holonomic rows at the end of the step"});
-    if (first_order)
+    if (first_order && motions.hide_equations())
+      lines.push_back(
+          {"projection", "left out", "a step ends on all rows and equations without accelerations"});
+    else if (first_order)
       lines.push_back(
           {"projection", "at both ends", "onto holonomic rows; p = ∂L/∂v along motions of first order"});
     else if (method_.info.damped)

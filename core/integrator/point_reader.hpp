@@ -58,7 +58,7 @@ class PointReader {
   bool full_;
   std::unique_ptr<VelocityProblem> velocity_;  ///< one of the four
   std::unique_ptr<PhaseSpaceVelocityProblem> phase_space_velocity_;
-  std::unique_ptr<FirstOrderVelocityProblem> first_order_velocity_;
+  std::unique_ptr<MomentumVelocityProblem> first_order_velocity_;
   std::unique_ptr<HamiltonianVelocityProblem> hamiltonian_velocity_;
   std::unique_ptr<HamiltonianAccelerationProblem>
       hamiltonian_acceleration_;                       ///< made when it is needed first

@@ -7,6 +7,7 @@
 #include <diracstep/core/system/first_order_motions.hpp>
 #include <diracstep/core/system/hamiltonian_point.hpp>
 #include <diracstep/core/system/hidden_rows.hpp>
+#include <diracstep/core/system/kernel_motions.hpp>
 #include <diracstep/core/system/redundant_rows.hpp>
 #include <span>
 #include <sstream>
@@ -25,8 +26,9 @@ std::string joined(const std::vector<std::string>& names) {
   return list;
 }
 
-void require_start(const Scene& scene) {
+void require_start(const Scene& scene, const FirstOrderMotions& motions = {}) {
   try {
+    if (motions.hide_equations()) require_on_hidden(scene, motions);
     require_consistent(scene, scene.start);
   } catch (const InconsistentStart& off) {
     throw InconsistentStart(
@@ -92,11 +94,20 @@ PreparedScene prepared(std::shared_ptr<const Scene> given, const IntegratorOptio
   if (const FirstOrderMotions motions = first_order_motions(*scene);
       motions.exist() && scene->start.v.size() == scene->dimension() &&
       (motions.u.cols() > 0 || scene->rows() > 0 || scene->force)) {
+    if (motions.hide_equations() && options.project_start) {
+      auto moved = std::make_shared<Scene>(*scene);
+      moved->start = project_start(*scene, scene->start, solvers).start;
+      scene = moved;
+    }
+    if (motions.hide_equations()) require_start(*scene, motions);
     require_determined(*scene, motions);
     auto copy = std::make_shared<Scene>(*scene);
     PointReader(scene, solvers, true).determine(copy->start);
     scene = copy;
-    result.lines.push_back({"velocities", motions.by_force ? "by forces" : "of motions of first order",
+    result.lines.push_back({"velocities",
+                            motions.by_force           ? "by forces"
+                            : motions.hide_equations() ? "along the kernel of the masses"
+                                                       : "of motions of first order",
                             std::to_string(motions.w.cols()) + " of " + std::to_string(scene->dimension()) +
                                 " are no data of a motion: positions and rows determine them"});
   }

@@ -5,6 +5,7 @@
 #include <diracstep/core/spaces/space.hpp>
 #include <diracstep/core/steps/gauss_lobatto/first_order_step.hpp>
 #include <diracstep/core/steps/gauss_lobatto/hamiltonian_step.hpp>
+#include <diracstep/core/steps/gauss_lobatto/kernel_step.hpp>
 #include <diracstep/core/steps/gauss_lobatto/phase_space_step.hpp>
 #include <diracstep/core/steps/gauss_lobatto/step.hpp>
 #include <diracstep/core/steps/gauss_lobatto/tableau.hpp>
@@ -26,6 +27,7 @@ FirstOrderMotions own_motions(const Scene& scene, const StepChoices& choices) {
 
 std::unique_ptr<StepProblem> step_of_first_order(int s, const Scene& scene, const FirstOrderMotions& motions,
                                                  bool dense) {
+  if (motions.hide_equations()) return kernel_step(s, scene, motions);
   const bool alone = scene.rows() == 0 && !scene.force && scene.lagrangian->structure().phase_space();
   return alone ? phase_space_step(s, scene, dense) : first_order_step(s, scene, motions);
 }
@@ -70,7 +72,8 @@ Method method_of(MethodInfo info, GeneratingFunctionFactory generating_function)
                              const Scene& scene, const StepChoices& choices) {
     require_flat(scene, "the step of '" + name + "'");
     if (own_motions(scene, choices).exist())
-      throw Misuse("scene '" + scene.name + "': its Lagrangian is linear in v or in some of them, where '" +
+      throw Misuse("scene '" + scene.name +
+                   "': its Lagrangian is linear in v, in some of them, or otherwise degenerate; there '" +
                    name + "' is unstable or leaves p = ∂L/∂v; use type1/midpoint or typeN/gl:S");
     return dirac_step(generating_function(scene), scene, applied_rule(choices, own), choices.dense);
   };

@@ -6,9 +6,10 @@
 #include <diracstep/core/spaces/space.hpp>
 #include <diracstep/core/system/consistent_start.hpp>
 #include <diracstep/core/system/constraint_distribution.hpp>
+#include <diracstep/core/system/detail/kernel_start.hpp>
+#include <diracstep/core/system/detail/nearest_point.hpp>
 #include <diracstep/core/system/hamiltonian_point.hpp>
 #include <diracstep/core/system/hidden_rows.hpp>
-#include <diracstep/core/system/nearest_point.hpp>
 #include <diracstep/core/system/redundant_rows.hpp>
 #include <diracstep/core/system/saddle_point.hpp>
 #include <functional>
@@ -159,6 +160,17 @@ Vector nearest_velocity(const Scene& scene, const Start& start, const std::vecto
   return v;
 }
 
+/// Of a scene whose Lagrangian hides equations: onto these and the rows, all together.
+ConsistentStart project_kernel_start(const Scene& scene, const FirstOrderMotions& motions,
+                                     const Guesses& guesses) {
+  std::vector<bool> may_move;
+  for (const auto* part : {&guesses.q, &guesses.v})
+    for (int i = 0; i < scene.dimension(); ++i)
+      may_move.push_back(part->empty() || (*part)[static_cast<std::size_t>(i)]);
+  const Start moved = moved_onto_hidden(scene, motions, scene.start, may_move);
+  return {moved, (moved.q - scene.start.q).norm(), (moved.v - scene.start.v).norm()};
+}
+
 }  // namespace
 
 ConsistentStart project_start(const Scene& given, const Start& given_start, const SolverFactory& solvers,
@@ -171,6 +183,8 @@ ConsistentStart project_start(const Scene& given, const Start& given_start, cons
   require_size("the start q", start.q.size(), scene.storage_size());
   require_size("the start v", start.v.size(), scene.dimension());
   require_few_unknowns(scene);
+  if (const FirstOrderMotions motions = first_order_motions(scene); motions.hide_equations())
+    return project_kernel_start(scene, motions, guesses);
   ConsistentStart result{start, 0.0, 0.0};
   const Eigen::Index n = scene.dimension();
   result.start.q = nearest_position(scene, start, guesses, solvers);

@@ -24,9 +24,11 @@ struct ConsistentStart {
 /// Euclidean norm, then v the velocity of the affine distribution nearest to the given one in the norm of
 /// ∂²L/∂v² (for a degenerate Lagrangian: of any solution of  ∂L/∂v(q,v) − Aᵀμ = ∂L/∂v(q,v̂),  A v + b = 0);
 /// both among those that differ in `guesses` alone.
-/// The rows that a degenerate Lagrangian hides count as rows (hidden_rows.hpp), and the velocities that carry
-/// no momentum are set by them, given or not.  A start with a momentum in place of v is given its velocity
-/// first. Throws Misuse where no such point is found, with the row that is not met.
+/// Where the equations of motion hide some that hold velocities (kernel_motions.hpp), q and v move together
+/// onto these and all rows by the least changes. The rows that a degenerate Lagrangian hides count as rows
+/// (hidden_rows.hpp), and the velocities that carry no momentum are set by them, given or not.  A start with
+/// a momentum in place of v is given its velocity first. Throws Misuse where no such point is found, with the
+/// row that is not met.
 ConsistentStart project_start(const Scene& scene, const Start& start, const SolverFactory& solvers,
                               const Guesses& guesses = {});
 

@@ -6,6 +6,7 @@
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/core/system/first_order_motions.hpp>
+#include <diracstep/core/system/kernel_motions.hpp>
 #include <diracstep/core/system/rows_along_motions.hpp>
 #include <utility>
 
@@ -14,10 +15,11 @@ namespace diracstep {
 namespace {
 
 constexpr int most_coordinates_of_first_order = 1500;  // matrices are full
+constexpr double regular_to = 1e-13;
 
-Columns kernel_of(const Columns& matrix) {
+Columns kernel_of(const Columns& matrix, double threshold = regular_to) {
   Eigen::FullPivLU<Columns> lu;
-  lu.setThreshold(1e-13);
+  lu.setThreshold(threshold);
   lu.compute(matrix);
   return lu.dimensionOfKernel() == 0 ? Columns(matrix.cols(), 0) : Columns(lu.kernel());
 }
@@ -109,7 +111,7 @@ FirstOrderMotions first_order_motions(const Scene& scene) {
   const int n = scene.dimension();
   if (scene.by_hamiltonian() || scene.space) return {};
   const PhaseStructure& structure = scene.lagrangian->structure();
-  if (structure.phase_space()) return {Columns::Identity(n, n), Columns(n, 0), false};
+  if (structure.phase_space()) return {Columns::Identity(n, n), Columns(n, 0)};
   const Start& start = scene.start;
   const bool sized = start.q.size() == scene.storage_size() && start.v.size() == n;
   if (n > most_coordinates_of_first_order || !sized || !start.q.allFinite() || !start.v.allFinite() ||
@@ -120,9 +122,10 @@ FirstOrderMotions first_order_motions(const Scene& scene) {
   const AtTwoPoints at(scene);
   if (!at.finite()) return {};
   const Columns w = kernel_of(at.mass), free = kernel_of(stack(at.mass, at.one_forms));
-  if (free.cols() == 0) return {};
   const Columns reached = at.by_q.topRows(n).transpose() * free;  // momenta along `free` by positions
   const bool constant = max_norm(reached) <= 1e-12 * size_or_one(max_norm(at.by_q));
+  if (FirstOrderMotions motions = kernel_motions(scene, !constant); motions.exist()) return motions;
+  if (free.cols() == 0) return {};
   if (constant && !(by_force && non_linear_in_velocity(scene, free))) return {};
   const Eigen::HouseholderQR<Columns> qr(w);
   const Columns q = qr.householderQ() * Columns::Identity(n, n);
@@ -183,6 +186,8 @@ void FirstOrderPoint::differentiate() {
   a_ = constraints_.pattern().full(constraints_.coefficients());
   Vector derivative(constraints_.pattern().nonzeros());
   constraints_.distribution().derivative(t_, q_, v_, 1.0, derivative);
+  row_by_t_.resize(scene_.rows());
+  if (scene_.rows() > 0) constraints_.distribution().time_derivative(t_, q_, v_, row_by_t_);
   row_by_q_ = constraints_.pattern().full(derivative);
   Eigen::Index row = 0;
   for (const auto& block : scene_.constraints) {
@@ -240,6 +245,12 @@ void FirstOrderVelocityProblem::jacobian(ConstVectorRef x, VectorRef values) {
   j.bottomLeftCorner(m_, n_) = point_.rows();
 }
 
+std::unique_ptr<MomentumVelocityProblem> velocity_problem(const Scene& scene,
+                                                          const FirstOrderMotions& motions) {
+  if (motions.hide_equations()) return std::make_unique<KernelVelocityProblem>(scene, motions);
+  return std::make_unique<FirstOrderVelocityProblem>(scene, motions);
+}
+
 void require_determined(const Scene& scene, const FirstOrderMotions& motions) {
   const int n = scene.dimension(), m = scene.rows();
   const Start& start = scene.start;
@@ -248,16 +259,16 @@ void require_determined(const Scene& scene, const FirstOrderMotions& motions) {
     throw Misuse(
         "scene '" + scene.name + "': rows and forces on motions of first order take full matrices, and " +
         "it has more than " + std::to_string(most_coordinates_of_first_order) + " coordinates and rows");
-  FirstOrderVelocityProblem problem(scene, motions);
+  const auto problem = velocity_problem(scene, motions);
   Vector x = Vector::Zero(n + m), values((n + m) * (n + m));
   x.head(n) = start.v;
-  problem.begin(start.time, start.q, Vector::Zero(n));
-  problem.jacobian(x, values);
+  problem->begin(start.time, start.q, Vector::Zero(n));
+  problem->jacobian(x, values);
   if (!values.allFinite()) return;  // the step says so itself
   Columns matrix = values.reshaped(n + m, n + m);
   for (Eigen::Index r = 0; r < matrix.rows(); ++r)
     matrix.row(r) /= size_or_one(max_norm(matrix.row(r).transpose()));
-  const Columns open = kernel_of(matrix);
+  const Columns open = kernel_of(matrix, motions.hide_equations() ? 1e-7 : regular_to);
   if (open.cols() == 0) return;
   std::string velocities, forces;
   for (Eigen::Index k = 0; k < open.cols(); ++k) {

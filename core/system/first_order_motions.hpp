@@ -21,11 +21,18 @@ namespace diracstep {
 /// `by_force`: momenta along W are constant, but a force on motions along W that the rows allow is not linear
 /// in v, such as the voltage of a diode in a loop without inductors.  The equations then determine velocities
 /// by ∂f/∂v, at each instant: a differential-algebraic system of index 1, which ordinary steps solve.
+///
+/// `hidden`: the kernel moves, or equations along it hold no velocity along it and are constraints
+/// (kernel_motions.hpp); w is the kernel near the start, and momenta of the coordinates `inert` are the
+/// state.
 struct FirstOrderMotions {
   Columns w, u;
   bool by_force = false;
+  std::vector<int> along = {}, inert = {};
+  std::vector<bool> hidden = {};
 
   bool exist() const { return w.cols() > 0; }
+  bool hide_equations() const { return !hidden.empty(); }
 };
 
 /// Whether ∂²L/∂v² at the start is positive definite whatever the units of the coordinates: the cheap test
@@ -52,8 +59,9 @@ class FirstOrderPoint {
   const Vector& force() const { return force_; }                ///< ∂L/∂q + f + AᵀΛ
   const Vector& momentum_rate() const { return rate_; }         ///< (∂²L/∂v∂q) v + ∂²L/∂v∂t
   const Vector& row_residual() const { return row_residual_; }  ///< A v + b
-  const Columns& mass() const { return mass_; }                 ///< ∂²L/∂v²
-  const Columns& momentum_by_q() const { return by_q_; }        ///< ∂²L/∂v∂q
+  Columns mass_here() const { return scene_.lagrangian->pattern().full(l_.vv); }  ///< ∂²L/∂v², at once
+  const Columns& mass() const { return mass_; }                                   ///< ∂²L/∂v²
+  const Columns& momentum_by_q() const { return by_q_; }                          ///< ∂²L/∂v∂q
   const Columns& rate_by_q() const {
     return rate_by_q_;
   }  ///< ∂ momentum_rate()/∂q; by a difference of second
@@ -62,6 +70,7 @@ class FirstOrderPoint {
   const Columns& force_by_v() const { return force_by_v_; }
   const Columns& rows() const { return a_; }             ///< A
   const Columns& row_by_q() const { return row_by_q_; }  ///< ∂(A v + b)/∂q
+  const Vector& row_by_t() const { return row_by_t_; }   ///< ∂(A v + b)/∂t
   const FirstOrderMotions& motions() const { return motions_; }
 
  private:
@@ -70,12 +79,18 @@ class FirstOrderPoint {
   ConstraintsAtPoint constraints_;
   double t_ = 0.0;
   LagrangianDerivatives l_;
-  Vector q_, v_, lambda_, f_, force_, rate_, row_residual_;
+  Vector q_, v_, lambda_, f_, force_, rate_, row_residual_, row_by_t_;
   Columns mass_, by_q_, rate_by_q_, force_by_q_, force_by_v_, a_, row_by_q_;
 };
 
-/// Unknowns (v, Λ): the equations of FirstOrderPoint at given t, q, p.
-class FirstOrderVelocityProblem final : public NonlinearProblem {
+/// Unknowns (v, Λ) at given t, q, p.
+class MomentumVelocityProblem : public NonlinearProblem {
+ public:
+  virtual void begin(double t, ConstVectorRef q, ConstVectorRef p) = 0;
+};
+
+/// By the equations of FirstOrderPoint.
+class FirstOrderVelocityProblem final : public MomentumVelocityProblem {
  public:
   FirstOrderVelocityProblem(const Scene& scene, const FirstOrderMotions& motions);
 
@@ -83,7 +98,7 @@ class FirstOrderVelocityProblem final : public NonlinearProblem {
   const SparsityPattern& pattern() const override { return pattern_; }
   std::span<const ResidualBlock> blocks() const override { return blocks_; }
 
-  void begin(double t, ConstVectorRef q, ConstVectorRef p);
+  void begin(double t, ConstVectorRef q, ConstVectorRef p) override;
   void residual(ConstVectorRef x, VectorRef f) override;
   void jacobian(ConstVectorRef x, VectorRef values) override;
 
@@ -96,7 +111,11 @@ class FirstOrderVelocityProblem final : public NonlinearProblem {
   Vector q_, p_;
 };
 
-/// Throws Misuse where the equations of FirstOrderPoint do not determine (v, Λ) at the start, with the
+/// The one of the two, here and in kernel_motions.hpp, that motions ask for.
+std::unique_ptr<MomentumVelocityProblem> velocity_problem(const Scene& scene,
+                                                          const FirstOrderMotions& motions);
+
+/// Throws Misuse where the equations of velocity_problem() do not determine (v, Λ) at the start, with the
 /// velocities and the forces of rows that they leave open.
 void require_determined(const Scene& scene, const FirstOrderMotions& motions);
 

@@ -27,9 +27,9 @@ namespace diracstep {
 /// linear capacitors, and elsewhere change nothing but the acceleration along W.
 ///
 /// Empty where ∂²L/∂v² is regular on Δ_Q at the start or near it, for motions of first order
-/// (first_order_motions.hpp), which have a step of their own, and for scenes given by a Hamiltonian alone,
-/// which hide nothing.  Throws Misuse where such a motion is determined by nothing, or by more than is
-/// described here, or where W is not constant, and names it.
+/// (first_order_motions.hpp) and where what is hidden holds velocities or W moves (kernel_motions.hpp), which
+/// have steps of their own, and for scenes given by a Hamiltonian alone, which hide nothing.  Throws Misuse
+/// where such a motion is determined by nothing, or by more than is described here, and names it.
 ConstraintBlocks hidden_rows(const Scene& scene);
 
 /// The scene itself where it hides no rows; else a copy with them below its own, and with the velocities that

@@ -13,6 +13,7 @@
 #include <diracstep/solvers/kinsol_solver.hpp>
 #include <diracstep/validation/references/ida_reference.hpp>
 #include <diracstep/validation/references/implicit_lagrangian_dae.hpp>
+#include <diracstep/validation/references/kernel_reference.hpp>
 #include <limits>
 #include <memory>
 #include <sstream>
@@ -273,7 +274,7 @@ class IdaIntegration {
 
 std::vector<DaeFormulation> formulations_of(const Scene& given) {
   const auto scene = with_hidden_rows(with_lagrangian(given));
-  if (scene->rows() == 0) return {DaeFormulation::rates};
+  if (scene->rows() == 0 || first_order_motions(*scene).hide_equations()) return {DaeFormulation::rates};
   const bool holonomic =
       std::ranges::any_of(scene->constraints, [](const auto& rows) { return rows->holonomic(); });
   if (!holonomic) return {DaeFormulation::rates, DaeFormulation::rates_loose, DaeFormulation::index_2};
@@ -283,6 +284,8 @@ std::vector<DaeFormulation> formulations_of(const Scene& given) {
 ReferenceRun integrate_with_ida(const Scene& given, double t_end, const ReferenceOptions& options) {
   const auto scene = with_hidden_rows(with_lagrangian(given));
   require_reference("IDA", *scene, t_end, options);
+  if (const FirstOrderMotions motions = first_order_motions(*scene); motions.hide_equations())
+    return integrate_kernel_with_ida(*scene, motions, t_end, options);
   return IdaIntegration(*scene, options).run(t_end);
 }
 

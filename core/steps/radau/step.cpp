@@ -248,6 +248,10 @@ const double* RadauStep::scales_of_unsolved_rows(ConstVectorRef f, double level)
 std::unique_ptr<StepProblem> radau_step(int s, const Scene& scene, bool dense) {
   if (!scene.lagrangian) (void)lagrangian_of(scene);  // throws
   if (const FirstOrderMotions motions = first_order_motions(scene); motions.exist()) {
+    if (motions.hide_equations())
+      throw Misuse("scene '" + scene.name +
+                   "': the kernel of ∂²L/∂v² moves or hides equations, which Radau IIA does not keep; use "
+                   "type1/midpoint or typeN/gl:S");
     if (scene.rows() == 0 && !scene.force && motions.u.cols() == 0)
       require_regular_two_form(scene);
     else

@@ -131,7 +131,7 @@ TEST(HiddenRows, WhatIsNotDescribedIsRefusedWithTheReason) {
   scene.lagrangian = lagrangian<3>([](const auto& q, const auto& v) {
     return 0.5 * (v[0] * v[0] + v[1] * v[1]) * (1.0 + q[2]) - 0.5 * q[2] * q[2];
   });
-  refused({"'massless'", "'z'", "other velocities"});
+  EXPECT_TRUE(hidden_rows(scene).empty()) << "what holds velocities is no row (kernel_motions.hpp)";
   scene.lagrangian = lagrangian<3>(
       [](const auto& q, const auto& v) { return 0.5 * (v[0] * v[0] + v[1] * v[1]) - 0.5 * q[0] * q[0]; });
   refused({"'z'", "neither a potential nor a force"});

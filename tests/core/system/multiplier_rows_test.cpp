@@ -1,7 +1,10 @@
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <diracstep/constraints/holonomic.hpp>
 
+#include "extrapolation.hpp"
+#include "methods.hpp"
 #include "misuse.hpp"
 #include "stepping.hpp"
 
@@ -68,6 +71,79 @@ TEST(MultipliersAsCoordinates, AreTheForcesOfTheRowsTheyStandFor) {
           << options.method << " " << k;
       ASSERT_NEAR(mine[k].q[4], -rows[k].lambda[0], 1e-9) << options.method << " " << k;
       ASSERT_NEAR(mine[k].q[5], -rows[k].lambda[1] / 3.0, 1e-9) << options.method << " " << k;
+    }
+  }
+}
+
+/// A scene whose last coordinate is a multiplier, and all of q at t = 1 by the reference.
+struct MultiplierCase {
+  std::shared_ptr<const Scene> scene;
+  Vector q;
+};
+
+/// L = |v|²/2 − y − a (x² + y² − 1); reduced to the angle of (x, y) = (sin θ, −cos θ).
+MultiplierCase pendulum_with_tension() {
+  auto scene = std::make_shared<Scene>();
+  scene->name = "pendulum with its tension";
+  scene->coordinates = {"x", "y", "a"};
+  scene->lagrangian = lagrangian<3>([](const auto& q, const auto& v) {
+    return 0.5 * (v[0] * v[0] + v[1] * v[1]) - q[1] - q[2] * (q[0] * q[0] + q[1] * q[1] - 1.0);
+  });
+  scene->start = {0.0, Vector{{1.0, 0.0, 0.0}}, Vector{{0.0, 0.6, 0.0}}, {}};
+  using testing::LongReal, testing::LongVector;
+  const LongVector end = testing::extrapolated(
+      [](LongReal, const LongVector& y) {
+        return LongVector{{y[1], -std::sin(y[0])}};
+      },
+      LongVector{{std::acos(-1.0L) / 2, LongReal(0.6)}}, 1.0L);
+  const LongReal down = std::cos(end[0]);
+  return {scene, LongVector{{std::sin(end[0]), -down, (end[1] * end[1] + down) / 2}}.cast<double>()};
+}
+
+/// L = |v|²/2 − z − a (z − x²/2 − 3y²/4); reduced to (x, y).
+MultiplierCase bowl_with_pressure() {
+  auto scene = std::make_shared<Scene>();
+  scene->name = "bowl with its pressure";
+  scene->coordinates = {"x", "y", "z", "a"};
+  scene->lagrangian = lagrangian<4>([](const auto& q, const auto& v) {
+    return 0.5 * (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]) - q[2] -
+           q[3] * (q[2] - 0.5 * q[0] * q[0] - 0.75 * q[1] * q[1]);
+  });
+  scene->start = {0.0, Vector{{1.0, 0.5, 0.6875, 0.0}}, Vector{{0.25, 0.5, 0.625, 0.0}}, {}};
+  using testing::LongReal, testing::LongVector;
+  struct Rate {
+    LongReal ax, ay, az;
+  };
+  const auto rate = [](const LongVector& y) {  // y = (x, y, v_x, v_y)
+    const LongReal gx = y[0], gy = 1.5L * y[1], bent = y[2] * y[2] + 1.5L * y[3] * y[3],
+                   pull = -(1 + bent) / (1 + gx * gx + gy * gy);
+    return Rate{pull * gx, pull * gy, pull * (gx * gx + gy * gy) + bent};
+  };
+  const LongVector end = testing::extrapolated(
+      [rate](LongReal, const LongVector& y) {
+        const Rate at = rate(y);
+        return LongVector{{y[2], y[3], at.ax, at.ay}};
+      },
+      LongVector{{1.0L, 0.5L, 0.25L, 0.5L}}, 1.0L);
+  return {scene,
+          LongVector{{end[0], end[1], 0.5L * end[0] * end[0] + 0.75L * end[1] * end[1], -1 - rate(end).az}}
+              .cast<double>()};
+}
+
+TEST(MultipliersAsCoordinates, HaveTheOrderTwiceTheStagesLikeThePositions) {
+  for (const MultiplierCase& that : {pendulum_with_tension(), bowl_with_pressure()}) {
+    const auto error = [&](int s, long steps) {
+      const Sample end =
+          samples_of(that.scene, {.method = testing::gl(s), .step = 1.0 / static_cast<double>(steps)}, steps,
+                     Momentum::projected, Registry::with_built_ins(), steps)
+              .back();
+      return (end.q - that.q).lpNorm<Eigen::Infinity>();
+    };
+    for (const auto& [s, steps] : {std::pair{1, 40L}, {2, 10L}, {3, 5L}}) {
+      const double first = error(s, steps), second = error(s, 2 * steps);
+      EXPECT_GT(second, 3e-13) << that.scene->name << ": at round-off, nothing is measured";
+      EXPECT_NEAR(std::log2(first / second), 2.0 * s, 0.4)
+          << that.scene->name << " s = " << s << " errors " << first << " " << second;
     }
   }
 }

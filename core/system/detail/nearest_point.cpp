@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <diracstep/core/numerics/scales.hpp>
-#include <diracstep/core/system/nearest_point.hpp>
+#include <diracstep/core/system/detail/nearest_point.hpp>
 #include <utility>
 
 namespace diracstep {
