@@ -16,7 +16,7 @@ from .arrays import column, real, whole
 from .errors import Doubt, Misuse
 from .options import momentum_from, options_from
 from .plan import TextTable
-from .run import Event, Statistics
+from .run import Event, Statistics, event_from
 
 if TYPE_CHECKING:
     from .scene import Scene
@@ -145,9 +145,7 @@ class Integrator:
             for k in range(c.lib.count_events(self._handle)):
                 read = c.Event()
                 self._check(c.lib.read_event(self._handle, k, ctypes.byref(read)))
-                q, v, after_q, after_v = (np.ctypeslib.as_array(column, (n,)).copy() if column else None
-                                          for column in (read.q, read.v, read.after_q, read.after_v))
-                met.append(Event(read.name.decode(), read.time, q, v, after_q, after_v, read.impulse))  # type: ignore[arg-type]
+                met.append(event_from(read, n))
         return met
 
     @property

@@ -48,6 +48,13 @@ class Event:
     impulse: float  #: of a contact, momentum over the unit of its row; NaN where there is none
 
 
+def event_from(read: Any, n: int) -> Event:
+    """A copy of what the library tells of an event."""
+    q, v, after_q, after_v = (np.ctypeslib.as_array(column, (n,)).copy() if column else None
+                              for column in (read.q, read.v, read.after_q, read.after_v))
+    return Event(read.name.decode(), read.time, q, v, after_q, after_v, read.impulse)  # type: ignore[arg-type]
+
+
 @dataclass(frozen=True)
 class Search:
     """How an error asked for was reached."""
@@ -62,6 +69,7 @@ class Search:
     reason: str
     warning: str
     runs: TextTable
+    stopped: bool = False  #: whether an event has ended the motion
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -126,7 +134,8 @@ class Run(Points):
     @property
     def stopped(self) -> bool:
         """Whether an event of the scene has ended the motion."""
-        return self.statistics is not None and self.statistics.stopped
+        how = self.statistics or self.search
+        return how is not None and how.stopped
 
     @property
     def names(self) -> list[str]:

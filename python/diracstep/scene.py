@@ -14,14 +14,14 @@ import numpy as np
 from . import _library as c
 from .arrays import column, real, table, whole
 from .callbacks import CallbackScene, GeneratingFunction
-from .command import Equilibrium, Fit, SolvedStart, Verbs, fit, sweep
+from .command import Equilibrium, Fit, SolvedStart, Varied, Verbs, fit, sweep
 from .errors import CallbackCost, Doubt, Failure, Interrupted, Misuse, raised
 from .integrator import Integrator
 from .options import momentum_from, options_from, stop_flag
 from .plan import TextTable
 from .points import Points
 from .progress import Progress
-from .run import Ensemble, Event, Run, Search, Statistics
+from .run import Ensemble, Event, Run, Search, Statistics, event_from
 from .scene_text import SceneText, start_values
 from .study import Study, run_study
 
@@ -196,7 +196,8 @@ class Scene:
         steps: so many steps instead.  at: times to show instead of the steps, in their order; every_time: the start and each so
         much time later.  Values between steps have the order of the method, and the motion keeps its bits.
         error: a relative error at the end; the library finds method and steps, repeating the run until its estimate is below
-        (``max_solves`` and ``max_time`` in seconds limit that; ``adaptive=True`` or ``False`` decides whether steps vary).
+        (``max_solves`` and ``max_time`` in seconds limit that; ``adaptive=True`` or ``False`` decides whether steps vary, which
+        they do not through events).
         every: keeps each so-many-th point.  momentum: the representative kept as p: projected, plus or minus.
         progress: shows a bar (tqdm where installed); without it on long runs only.
         tolerances: {coordinate: absolute tolerance in its unit}, see with_tolerances.
@@ -264,22 +265,25 @@ class Scene:
         chosen, found = options_from(options, until), c.Found()
         points = self._points(_ROOM)
         told: list[Search] = []
+        events: list[Event] = []
 
         def call() -> int:
             code = c.lib.solve(self._handle, ctypes.byref(chosen), ctypes.byref(course), ctypes.byref(request), points.reference(),
                                ctypes.byref(found))
             if found.runs.columns:  # texts belong to this thread, and to its last call
                 told.append(_search_from(found))
+                events.extend(event_from(found.event[k], self._widths["q"]) for k in range(found.events))
             return code
 
         with Progress(progress, points, 0, self.start_time, None) as bar:
             code, message = c.call_interruptibly(call, course.flag, bar.show)
         search = told[0] if told else None
         again = None
-        if search and not search.varies:
+        if search and not search.varies and not self.events:
             found_steps = {**options, "method": search.method, "order": search.order, "step": search.step}
             again = lambda: self._found_again(until, found_steps)  # noqa: E731
-        return self._finished(points, code, message, search=search, doubt=search.warning if search else "", again=again)
+        return self._finished(points, code, message, search=search, doubt=search.warning if search else "", events=events,
+                              again=again)
 
     def _found_again(self, until: float | None, options: dict[str, Any]) -> tuple[Integrator, int]:
         """An integrator for what a search has found, and the steps that lead to the end."""
@@ -404,18 +408,30 @@ class Scene:
         options += [] if method is None else ["--method", method]
         return fit(self, data, parameters, start or {}, sigma or {}, options)
 
-    def sweep(self, grid: Mapping[str, Sequence[float]], record: Sequence[str], *, extrema: Sequence[str] = (),
-              events: Sequence[str] = (), until: float | None = None, step: float | None = None, method: str | None = None,
-              order: int | None = None, error: float | None = None, out: str | os.PathLike[str] | None = None,
-              threads: int = 0) -> np.ndarray:
-        """One run for every combination of values: a structured array with a row for each.
+    def sweep(self, grid: Mapping[str, Sequence[float]] | None = None, record: Sequence[str] = (), *,
+              table: Mapping[str, Sequence[float]] | None = None, random: Mapping[str, Sequence[Any]] | None = None,
+              sobol: Mapping[str, Sequence[Any]] | None = None, count: int | None = None, seed: int = 0,
+              extrema: Sequence[str] = (), events: Sequence[str] = (), derivatives: Sequence[str] = (),
+              until: float | None = None, step: float | None = None, method: str | None = None, order: int | None = None,
+              rule: str | None = None, error: float | None = None, project: bool = False, checks: bool = True,
+              out: str | os.PathLike[str] | None = None, threads: int = 0) -> np.ndarray:
+        """One run for each of many parameters and starts: a structured array with a row for each.
 
-        grid: values by parameter, or by "start.x", "start.v_x".  record: columns of the end, of which extrema are taken over the
-        run where ``extrema`` names them; events: of the scene.  out: a folder to keep, which a further call continues.
-        A member that fails has its reason in the column ``status`` and NaN in the others.  Made by ``diracstep sweep``.
+        What varies has the name of a parameter, or "start.x", "start.v_x".  grid: every combination of these values.  table:
+        columns of one length, a member for each row.  random, sobol: ``count`` draws by laws, {"e": ("uniform", 0, 0.7)}, also
+        "log_uniform", and "normal" with mean and deviation.  All that is given multiplies.
+        record: columns of the end; extrema: of them over the run; events: of the scene, time of the first and how many;
+        derivatives: "d(x)/d(m)", at the end by parameters.  project: starts are moved onto the rows; checks: members are looked
+        at as runs are.
+        out: a folder to keep, which a further call continues; it holds the reasons of members that failed (``results.csv``) and a
+        page (``report.html``).  The column ``status`` says how a member ended; where it failed numbers are NaN.
+        Made by ``diracstep sweep``.
         """
-        settings = {"end": until, "step": step, "method": method, "order": order, "error": error}
-        return sweep(self, grid, record, extrema, events, settings, out, whole(threads, "threads"))
+        settings = {"end": until, "step": step, "method": method, "order": order, "rule": rule, "error": error,
+                    "project": project or None, "checks": None if checks else False}
+        varied = Varied(grid or {}, table or {}, random or {}, sobol or {}, count, seed)
+        recorded = {"values": record, "extrema": extrema, "events": events, "derivatives": derivatives}
+        return sweep(self, varied, recorded, settings, out, whole(threads, "threads"))
 
     # ---- inside ----
     def _lines(self, what: int) -> list[tuple[str, ...]]:
@@ -495,7 +511,7 @@ def _address(array: np.ndarray | None) -> int | None:
 def _search_from(found: c.Found) -> Search:
     heading = ("step", "steps", "solves", "difference", "estimate", "order", "")
     return Search(found.estimate, found.observed_order, found.method.decode(), found.order, found.step, bool(found.varies),
-                  found.solves, found.reason.decode(), found.warning.decode(), TextTable("", heading, found.runs.lines()))
+                  found.solves, found.reason.decode(), found.warning.decode(), TextTable("", heading, found.runs.lines()), bool(found.stopped))
 
 
 def _say_cost(scene: Scene, source: CallbackScene) -> None:

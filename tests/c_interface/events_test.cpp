@@ -83,11 +83,10 @@ TEST_F(CInterface, WhatDoesNotGoWithEventsIsRefused) {
   source.text = ball;
   ASSERT_EQ(open(source), DIRACSTEP_OK);
   Arrays arrays(2, 1, 400);
-  diracstep_error error{};
-  error.error = 1e-6;
+  diracstep_error error{1e-6, 2, 0, 0.0};
   diracstep_found found{};
   EXPECT_EQ(diracstep_solve(model_, nullptr, nullptr, &error, &arrays.points, &found), DIRACSTEP_MISUSE);
-  expect_message({"events"});
+  expect_message({"fixed size", "events"});
   ASSERT_EQ(create(), DIRACSTEP_OK);
   diracstep_derivatives derivatives{};
   derivatives.steps = 3;
@@ -99,6 +98,50 @@ TEST_F(CInterface, WhatDoesNotGoWithEventsIsRefused) {
   course.time = times;
   EXPECT_EQ(diracstep_run(made_, &course, &arrays.points), DIRACSTEP_MISUSE);
   expect_message({"times"});
+}
+
+/// y = 3 cos t - 2 to the floor, then up with half of the speed.
+TEST_F(CInterface, ASearchForAnErrorGoesThroughEvents) {
+  diracstep_source source{};
+  source.text =
+      "name = \"spring_ball\"\nlagrangian = \"v_y^2/2 - y^2/2 - 2*y\"\n[coordinates]\ny = {}\n[start]\ny = 1\n"
+      "[span]\nend = 3\nstep = 0.1\n[[events]]\nname = \"floor\"\nwhen = \"y\"\nrestitution = 0.5\n"
+      "[[events]]\nname = \"top\"\nwhen = \"v_y\"\ndirection = \"falling\"\nif = \"t > 0.1\"\naction = "
+      "\"stop\"\n";
+  ASSERT_EQ(open(source), DIRACSTEP_OK) << diracstep_message();
+  Arrays arrays(1, 1);
+  diracstep_error error{1e-9, 0, 0, 0.0};
+  diracstep_found found{};
+  ASSERT_EQ(diracstep_solve(model_, nullptr, nullptr, &error, &arrays.points, &found), DIRACSTEP_OK)
+      << diracstep_message();
+  const double first = std::acos(2.0 / 3.0), up = std::sqrt(5.0) / 2.0;  // its time, the speed after it
+  const double last = first + std::atan(up / 2.0);
+  EXPECT_LT(found.estimate, 1e-9);
+  EXPECT_EQ(found.varies, 0);
+  EXPECT_GE(found.runs.rows, 3);
+  EXPECT_STREQ(found.warning, "");
+  EXPECT_EQ(found.stopped, 1);
+  ASSERT_EQ(found.events, 2);
+  EXPECT_STREQ(found.event[0].name, "floor");
+  EXPECT_NEAR(found.event[0].time, first, 3e-9);
+  EXPECT_NEAR(found.event[0].after_v[0], up, 3e-9);
+  EXPECT_NEAR(found.event[0].impulse, 1.5 * std::sqrt(5.0), 1e-8);
+  EXPECT_STREQ(found.event[1].name, "top");
+  EXPECT_EQ(found.event[1].after_q, nullptr);
+  const auto end = static_cast<std::size_t>(arrays.points.count - 1);
+  EXPECT_EQ(arrays.t[end], found.event[1].time);
+  EXPECT_NEAR(arrays.t[end], last, 3e-9);
+  EXPECT_NEAR(arrays.last_q(0), std::hypot(2.0, up) - 2.0, 3e-9);
+
+  error.max_solves = 1;
+  EXPECT_EQ(diracstep_solve(model_, nullptr, nullptr, &error, &arrays.points, &found), DIRACSTEP_FAILED);
+  EXPECT_EQ(found.events, 0);
+  const int stop = 1;
+  diracstep_course course{};
+  course.stop = &stop;
+  error.max_solves = 0;
+  EXPECT_EQ(diracstep_solve(model_, nullptr, &course, &error, &arrays.points, &found), DIRACSTEP_INTERRUPTED);
+  expect_message({"interrupted"});
 }
 
 TEST_F(CInterface, EnsemblesGoThroughEventsAndAreLookedAt) {
