@@ -13,13 +13,14 @@ Scenes come from files (``load``), from text (``parse``), from the ``catalogue``
 from __future__ import annotations
 
 from ._library import version
+from .catalogue import catalogue, load, methods, parse
 from .callbacks import GeneratingFunction
 from .command import Equilibrium, Fit, SolvedStart
 from .command import sweep_of_file as sweep
 from .errors import CallbackCost, Doubt, Error, Failure, Interrupted, Misuse
 from .integrator import Gradient, Integrator, Jacobian, State
 from .run import Ensemble, Event, Points, Run, Search, Statistics
-from .scene import Scene, catalogue, load, methods, parse
+from .scene import Scene
 from .study import Study
 from .symbols import (acos, acosh, asin, asinh, atan, atan2, atanh, cos, cosh, exp, log, maximum, minimum, pi, sin, sinh, sqrt, tan,
                       tanh)

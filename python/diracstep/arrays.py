@@ -52,3 +52,8 @@ def whole(value: Any, what: str, least: int = 0, most: int = 2**63 - 1) -> int:
     if number > most:
         raise Misuse(f"{what} is {number}; at most {most} is taken")
     return number
+
+
+def address(array: np.ndarray | None) -> int | None:
+    """Where an array begins, for a pointer of C."""
+    return None if array is None else array.ctypes.data

@@ -6,8 +6,10 @@ import ctypes
 import math
 from typing import Any
 
+import numpy as np
+
 from . import _library as c
-from .arrays import real, whole
+from .arrays import real, table, whole
 from .errors import Misuse
 
 _LARGEST_INT = 2**31 - 1  # of C
@@ -61,3 +63,19 @@ def momentum_from(name: str) -> int:
 
 def stop_flag() -> ctypes.c_int:
     return ctypes.c_int(0)
+
+
+def course_of(every: int, momentum: str, steps: int | None, at: Any) -> tuple[Any, np.ndarray]:
+    course = c.Course(every=whole(every, "every", 1), momentum=momentum_from(momentum))
+    course.flag = stop_flag()
+    course.stop = ctypes.pointer(course.flag)
+    times = np.empty(0)
+    if steps is not None:
+        course.steps = whole(steps, "steps", 1)
+    if at is not None:
+        times = table(np.asarray(at), (np.size(at),), "at")
+        if not times.size:
+            raise Misuse("at holds no times")
+        course.kept = times
+        course.times, course.time = times.size, times.ctypes.data
+    return course, times

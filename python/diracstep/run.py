@@ -72,6 +72,13 @@ class Search:
     stopped: bool = False  #: whether an event has ended the motion
 
 
+def search_from(found: Any) -> Search:
+    """A copy of what the library tells of a search."""
+    heading = ("step", "steps", "solves", "difference", "estimate", "order", "")
+    return Search(found.estimate, found.observed_order, found.method.decode(), found.order, found.step, bool(found.varies),
+                  found.solves, found.reason.decode(), found.warning.decode(), TextTable("", heading, found.runs.lines()), bool(found.stopped))
+
+
 @dataclass(frozen=True, repr=False, eq=False)
 class Points:
     """Points of one scene: row k of each array is point k.

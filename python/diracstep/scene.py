@@ -4,24 +4,24 @@ from __future__ import annotations
 
 import ctypes
 import os
-import time
 import warnings
 from pathlib import Path
-from typing import Any, Callable, Iterator, Mapping, NoReturn, Sequence
+from typing import Any, Callable, Mapping, NoReturn, Sequence
 
 import numpy as np
 
 from . import _library as c
-from .arrays import column, real, table, whole
-from .callbacks import CallbackScene, GeneratingFunction
+from .arrays import address, column, real, table, whole
+from .callbacks import CallbackScene, GeneratingFunction, say_cost
 from .command import Equilibrium, Fit, SolvedStart, Varied, Verbs, fit, sweep
-from .errors import CallbackCost, Doubt, Failure, Interrupted, Misuse, raised
+from .errors import Doubt, Failure, Interrupted, Misuse, raised
 from .integrator import Integrator
-from .options import momentum_from, options_from, stop_flag
+from .opening import parts_of, source_of
+from .options import course_of, momentum_from, options_from, stop_flag
 from .plan import TextTable
 from .points import Points
 from .progress import Progress
-from .run import Ensemble, Event, Run, Search, Statistics, event_from
+from .run import Ensemble, Event, Run, Search, Statistics, event_from, search_from
 from .scene_text import SceneText, start_values
 from .study import Study, run_study
 
@@ -69,7 +69,7 @@ class Scene:
         if start is not None:
             if q is not None or v is not None or p is not None:
                 raise Misuse("start goes with no q, v or p: it holds them by name")
-            q, v, p = _parts_of(start, coordinates)
+            q, v, p = parts_of(start, coordinates)
         if callback:
             if lagrangian is None or hamiltonian or dissipation or invariants or p is not None:
                 raise Misuse("callback=True needs a lagrangian, and knows no hamiltonian, dissipation, invariants or start p")
@@ -80,7 +80,7 @@ class Scene:
                                    real(step, "step"))
             self._open(callbacks=source, coordinates=coordinates, plugins=plugins, methods=methods, drop_redundant=drop_redundant,
                        tolerances=tolerances)
-            _say_cost(self, source)
+            say_cost(self, source)
             return
         writer = SceneText(name, coordinates, parameters)
         writer.add("lagrangian", lagrangian)
@@ -105,7 +105,7 @@ class Scene:
                                        "methods": list(methods), "drop_redundant": drop_redundant, "tolerances": tolerances}
         self._tolerances = {key: float(value) for key, value in (tolerances or {}).items()}
         self._changes = {key: float(value) for key, value in (parameters or {}).items()}
-        source, kept = _source(name, text, callbacks, self._changes, plugins, self._methods, drop_redundant, self._tolerances)
+        source, kept = source_of(name, text, callbacks, self._changes, plugins, self._methods, drop_redundant, self._tolerances)
         handle = ctypes.c_void_p()
         self._check(c.lib.open(c.VERSION, ctypes.byref(source), ctypes.byref(handle)))
         del kept
@@ -218,7 +218,7 @@ class Scene:
                 progress=progress, max_solves=max_solves, max_time=max_time, **options)
         if every_time is not None:
             at = self._times(real(every_time, "every_time"), self.until if until is None else real(until, "until"))
-        course, kept = _course(every, momentum, steps, at)
+        course, kept = course_of(every, momentum, steps, at)
         if error is not None:
             return self._search(course, error, until, options, max_solves, max_time, progress)
         end = None if steps is not None else self._end(until, kept, options)
@@ -271,7 +271,7 @@ class Scene:
             code = c.lib.solve(self._handle, ctypes.byref(chosen), ctypes.byref(course), ctypes.byref(request), points.reference(),
                                ctypes.byref(found))
             if found.runs.columns:  # texts belong to this thread, and to its last call
-                told.append(_search_from(found))
+                told.append(search_from(found))
                 events.extend(event_from(found.event[k], self._widths["q"]) for k in range(found.events))
             return code
 
@@ -326,7 +326,7 @@ class Scene:
         starts_v = None if v is None else table(v, shape, "v")
         times = None if t is None else table(t, (members,), "t")
         flag, points = stop_flag(), Points(self._widths, members, grows=False)
-        request = c.Ensemble(members=members, q=starts_q.ctypes.data, v=_address(starts_v), time=_address(times),
+        request = c.Ensemble(members=members, q=starts_q.ctypes.data, v=address(starts_v), time=address(times),
                              steps=0 if steps is None else whole(steps, "steps", 1), momentum=momentum_from(momentum),
                              threads=whole(threads, "threads", most=2**31 - 1), stop=ctypes.pointer(flag))
         request.kept = starts_q, starts_v, times  # the call may go on after a second Ctrl-C has left this function
@@ -456,142 +456,3 @@ class Scene:
 
     def _repr_html_(self) -> str:
         return TextTable(self.name, ("", ""), self.about)._repr_html_() + self.plan._repr_html_()
-
-
-def _source(name: str | None, text: str | None, callbacks: CallbackScene | None, changes: Mapping[str, float],
-            plugins: Sequence[str], methods: Sequence[GeneratingFunction], drop_redundant: bool,
-            tolerances: Mapping[str, float]) -> tuple[c.Source, Any]:
-    source = c.Source(name=c.encoded(name), text=c.encoded(text), drop_redundant=int(drop_redundant))
-    if callbacks is not None:
-        source.callbacks = ctypes.pointer(callbacks.struct)
-    parameters = (c.Parameter * max(1, len(changes)))(*(c.Parameter(key.encode(), value) for key, value in changes.items()))
-    source.parameters, source.parameter = len(changes), parameters
-    files = (ctypes.c_char_p * max(1, len(plugins)))(*(os.fspath(file).encode() for file in plugins))
-    source.plugins, source.plugin = len(plugins), files
-    linked = (ctypes.POINTER(c.Plugin) * max(1, len(methods)))(*(ctypes.pointer(method.struct) for method in methods))
-    source.linked, source.linked_plugin = len(methods), linked
-    own = (c.Parameter * max(1, len(tolerances)))(*(c.Parameter(key.encode(), value) for key, value in tolerances.items()))
-    source.tolerances, source.tolerance = len(tolerances), own
-    return source, (parameters, files, linked, own)
-
-
-def _parts_of(start: Mapping[str, float], coordinates: Sequence[str]) -> tuple[Any, ...]:
-    """q, v and p by coordinate, None where there are none, of a start by names."""
-    parts: tuple[dict[str, float], ...] = {}, {}, {}
-    for name, value in start.items():
-        for part, prefix in zip(parts, ("", "v_", "p_")):
-            if name.startswith(prefix) and name[len(prefix):] in coordinates:
-                part[name[len(prefix):]] = value
-                break
-        else:
-            raise Misuse(f"start: no coordinate {name!r}; there are " + ", ".join(coordinates) + ", and v_ and p_ of them")
-    return tuple(part or None for part in parts)
-
-
-def _course(every: int, momentum: str, steps: int | None, at: Any) -> tuple[Any, np.ndarray]:
-    course = c.Course(every=whole(every, "every", 1), momentum=momentum_from(momentum))
-    course.flag = stop_flag()
-    course.stop = ctypes.pointer(course.flag)
-    times = np.empty(0)
-    if steps is not None:
-        course.steps = whole(steps, "steps", 1)
-    if at is not None:
-        times = table(np.asarray(at), (np.size(at),), "at")
-        if not times.size:
-            raise Misuse("at holds no times")
-        course.kept = times
-        course.times, course.time = times.size, times.ctypes.data
-    return course, times
-
-
-def _address(array: np.ndarray | None) -> int | None:
-    return None if array is None else array.ctypes.data
-
-
-def _search_from(found: c.Found) -> Search:
-    heading = ("step", "steps", "solves", "difference", "estimate", "order", "")
-    return Search(found.estimate, found.observed_order, found.method.decode(), found.order, found.step, bool(found.varies),
-                  found.solves, found.reason.decode(), found.warning.decode(), TextTable("", heading, found.runs.lines()), bool(found.stopped))
-
-
-def _say_cost(scene: Scene, source: CallbackScene) -> None:
-    """Measures one step of a scene of callbacks, and warns of what it takes."""
-    try:
-        integrator = scene.integrator()
-        before, start = source.calls, time.perf_counter()
-        integrator.step()
-    except (Misuse, Failure):
-        source.exceptions.take()
-        return  # a run will tell
-    taken, calls = time.perf_counter() - start, source.calls - before
-    warnings.warn(f"{scene.name}: a step takes {taken:.2g} s, in which the Python functions are called {calls} times; traced "
-                  "functions (without callback=True) take microseconds", CallbackCost, stacklevel=3)
-
-
-def load(name: str | os.PathLike[str], *, plugins: Sequence[str] = (), methods: Sequence[GeneratingFunction] = (),
-         drop_redundant: bool = False, tolerances: Mapping[str, float] | None = None, **parameters: float) -> Scene:
-    """A scene from a file NAME.toml, or one of the catalogue or of a plugin by its name; parameters and sizes changed."""
-    scene = Scene.__new__(Scene)
-    scene._open(name=os.fspath(name), parameters=parameters, plugins=plugins, methods=methods, drop_redundant=drop_redundant,
-                       tolerances=tolerances)
-    return scene
-
-
-def parse(text: str, *, name: str = "text", plugins: Sequence[str] = (), methods: Sequence[GeneratingFunction] = (),
-          drop_redundant: bool = False, tolerances: Mapping[str, float] | None = None, **parameters: float) -> Scene:
-    """A scene from the text of a scene file; ``name`` stands in messages."""
-    scene = Scene.__new__(Scene)
-    scene._open(name=name, text=text, parameters=parameters, plugins=plugins, methods=methods, drop_redundant=drop_redundant,
-                       tolerances=tolerances)
-    return scene
-
-
-class _Lists:
-    """A model without a scene, for the lists of the library."""
-
-    def __init__(self, plugins: Sequence[str] = ()) -> None:
-        source, kept = _source(None, None, None, {}, plugins, (), False, {})
-        self._handle = ctypes.c_void_p()
-        c.check(c.lib.open(c.VERSION, ctypes.byref(source), ctypes.byref(self._handle)))
-        del kept
-        self._close = c.lib.close
-
-    def lines(self, what: int) -> list[tuple[str, ...]]:
-        return c.lines_of(self._handle.value or 0, what)
-
-    def __del__(self) -> None:
-        if getattr(self, "_handle", None):
-            self._close(self._handle)
-
-
-class Catalogue(Mapping[str, Scene]):
-    """The scenes that come with the library, by name; each is made when it is asked for."""
-
-    def __getitem__(self, name: str) -> Scene:
-        if name not in self:
-            raise KeyError(f"no scene {name!r}; there are " + ", ".join(self))
-        return load(name)
-
-    def __iter__(self) -> Iterator[str]:
-        return iter([name for name, in _Lists().lines(c.SCENES)])
-
-    def __len__(self) -> int:
-        return sum(1 for _ in self)
-
-    def __contains__(self, name: object) -> bool:
-        return any(name == known for known in self)
-
-    def __repr__(self) -> str:
-        return "<catalogue: " + ", ".join(self) + ">"
-
-    def _repr_html_(self) -> str:
-        described = [(name, dict(self[name].about).get("kind", ""), dict(self[name].about).get("description", "")) for name in self]
-        return TextTable("", ("scene", "kind", "description"), described)._repr_html_()
-
-
-catalogue = Catalogue()
-
-
-def methods(plugins: Sequence[str] = ()) -> TextTable:
-    """The methods, with those of plugins: name, order, whether self-adjoint, formula."""
-    return TextTable("", ("method", "order", "", "formula"), _Lists(plugins).lines(c.METHODS))

@@ -1,0 +1,41 @@
+"""What a scene is made from, as the struct of the library."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+from typing import Any, Mapping, Sequence
+
+from . import _library as c
+from .callbacks import CallbackScene, GeneratingFunction
+from .errors import Misuse
+
+
+def source_of(name: str | None, text: str | None, callbacks: CallbackScene | None, changes: Mapping[str, float],
+              plugins: Sequence[str], methods: Sequence[GeneratingFunction], drop_redundant: bool,
+              tolerances: Mapping[str, float]) -> tuple[c.Source, Any]:
+    source = c.Source(name=c.encoded(name), text=c.encoded(text), drop_redundant=int(drop_redundant))
+    if callbacks is not None:
+        source.callbacks = ctypes.pointer(callbacks.struct)
+    parameters = (c.Parameter * max(1, len(changes)))(*(c.Parameter(key.encode(), value) for key, value in changes.items()))
+    source.parameters, source.parameter = len(changes), parameters
+    files = (ctypes.c_char_p * max(1, len(plugins)))(*(os.fspath(file).encode() for file in plugins))
+    source.plugins, source.plugin = len(plugins), files
+    linked = (ctypes.POINTER(c.Plugin) * max(1, len(methods)))(*(ctypes.pointer(method.struct) for method in methods))
+    source.linked, source.linked_plugin = len(methods), linked
+    own = (c.Parameter * max(1, len(tolerances)))(*(c.Parameter(key.encode(), value) for key, value in tolerances.items()))
+    source.tolerances, source.tolerance = len(tolerances), own
+    return source, (parameters, files, linked, own)
+
+
+def parts_of(start: Mapping[str, float], coordinates: Sequence[str]) -> tuple[Any, ...]:
+    """q, v and p by coordinate, None where there are none, of a start by names."""
+    parts: tuple[dict[str, float], ...] = {}, {}, {}
+    for name, value in start.items():
+        for part, prefix in zip(parts, ("", "v_", "p_")):
+            if name.startswith(prefix) and name[len(prefix):] in coordinates:
+                part[name[len(prefix):]] = value
+                break
+        else:
+            raise Misuse(f"start: no coordinate {name!r}; there are " + ", ".join(coordinates) + ", and v_ and p_ of them")
+    return tuple(part or None for part in parts)
