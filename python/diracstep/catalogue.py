@@ -7,8 +7,10 @@ import os
 from typing import Iterator, Mapping, Sequence
 
 from . import _library as c
+from .arrays import path
+from .arrays import text as checked_text
 from .callbacks import GeneratingFunction
-from .opening import source_of
+from .opening import checked, source_of
 from .plan import TextTable
 from .scene import Scene
 
@@ -16,26 +18,22 @@ from .scene import Scene
 def load(name: str | os.PathLike[str], *, plugins: Sequence[str] = (), methods: Sequence[GeneratingFunction] = (),
          drop_redundant: bool = False, tolerances: Mapping[str, float] | None = None, **parameters: float) -> Scene:
     """A scene from a file NAME.toml, or one of the catalogue or of a plugin by its name; parameters and sizes changed."""
-    scene = Scene.__new__(Scene)
-    scene._open(name=os.fspath(name), parameters=parameters, plugins=plugins, methods=methods, drop_redundant=drop_redundant,
+    return Scene._made(name=path(name, "name"), parameters=parameters, plugins=plugins, methods=methods, drop_redundant=drop_redundant,
                        tolerances=tolerances)
-    return scene
 
 
 def parse(text: str, *, name: str = "text", plugins: Sequence[str] = (), methods: Sequence[GeneratingFunction] = (),
           drop_redundant: bool = False, tolerances: Mapping[str, float] | None = None, **parameters: float) -> Scene:
     """A scene from the text of a scene file; ``name`` stands in messages."""
-    scene = Scene.__new__(Scene)
-    scene._open(name=name, text=text, parameters=parameters, plugins=plugins, methods=methods, drop_redundant=drop_redundant,
-                       tolerances=tolerances)
-    return scene
+    return Scene._made(name=checked_text(name, "name"), text=checked_text(text, "text"), parameters=parameters,
+                       plugins=plugins, methods=methods, drop_redundant=drop_redundant, tolerances=tolerances)
 
 
 class _Lists:
     """A model without a scene, for the lists of the library."""
 
     def __init__(self, plugins: Sequence[str] = ()) -> None:
-        source, kept = source_of(None, None, None, {}, plugins, (), False, {})
+        source, kept = source_of(None, None, None, {}, tolerances={}, **checked(plugins, (), False))
         self._handle = ctypes.c_void_p()
         c.check(c.lib.open(c.VERSION, ctypes.byref(source), ctypes.byref(self._handle)))
         del kept

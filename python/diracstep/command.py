@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, Mapping, Sequence
 
 import numpy as np
 
-from .arrays import real, table, whole
+from .arrays import real, table, texts, whole
 from .errors import Doubt, Failure, Misuse
 
 if TYPE_CHECKING:
@@ -50,6 +50,11 @@ class Verbs:
         file = self.folder / f"{self._scene.name}.toml"
         file.write_text(text, encoding="utf-8")
         return str(file)
+
+    def beside(self) -> str:
+        """The scene for a file in the folder: a sweep is continued by a file of the same text, though the folder is another."""
+        path = Path(self.name)
+        return path.name if path.parent == self.folder else self.name
 
     def __enter__(self) -> Verbs:
         return self
@@ -85,7 +90,10 @@ def call_command(verb: str, arguments: Sequence[str], plugins: Sequence[str], na
 
 
 def _told(text: str) -> str:
-    return "\n".join(line.removeprefix("diracstep: ") for line in text.strip().splitlines())
+    """What the command says, without the lines on its version and machine that some verbs begin with."""
+    lines = [line.removeprefix("diracstep: ") for line in text.strip().splitlines()]
+    heading = [index for index, line in enumerate(lines[:6]) if line.startswith("system: ")]
+    return "\n".join(lines[heading[0] + 1:] if heading else lines)
 
 
 class Report:
@@ -141,6 +149,9 @@ class Fit(Report):
 
 def fit(scene: Scene, data: Any, parameters: Sequence[str], start: Mapping[str, float], sigma: Mapping[str, float],
         options: Sequence[str]) -> Fit:
+    parameters = texts(parameters, "parameters")
+    if not isinstance(data, (str, os.PathLike, Mapping)):
+        raise Misuse(f"data is {type(data).__name__}; the path of a file, or columns by name, 't' among them, are needed")
     with Verbs(scene) as verbs:
         file = str(data) if isinstance(data, (str, os.PathLike)) else _data_file(verbs.folder, data)
         pairs = [text for option, values in (("--from", start), ("--sigma", sigma)) for name, value in values.items()
@@ -164,15 +175,25 @@ def _data_file(folder: Path, data: Mapping[str, Any]) -> str:
 def sweep(scene: Scene, varied: Varied, recorded: Mapping[str, Sequence[str]], settings: Mapping[str, Any],
           out: str | os.PathLike[str] | None, threads: int) -> np.ndarray:
     with Verbs(scene) as verbs:
-        lines = [f"scene = {json.dumps(verbs.name)}"]
+        lines = [f"scene = {json.dumps(verbs.beside())}"]
         lines += [f"{name} = {json.dumps(value)}" for name, value in settings.items() if value is not None]
         lines += varied.lines(verbs.folder, scene._changes)
-        lines += ["[record]", *(f"{what} = {json.dumps(list(names))}" for what, names in recorded.items())]
+        lines += ["[record]", *(f"{what} = {json.dumps(texts(names, _ARGUMENT.get(what, what)))}" for what, names in recorded.items())]
         file = verbs.folder / "sweep.toml"
         file.write_text("\n".join(lines) + "\n", encoding="utf-8")
         where = Path(out) if out is not None else verbs.folder / "out"
         verbs.call("sweep", str(file), "--out", str(where), "--threads", str(threads), *verbs.tolerances(), scene=False)
-        return np.load(where / "results.npy")
+        return _results(where)
+
+
+def _results(folder: Path) -> np.ndarray:
+    """The table of a sweep, its texts as those of Python."""
+    results = np.load(folder / "results.npy")
+    kinds = [(name, results.dtype[name]) for name in results.dtype.names]
+    return results.astype([(name, f"U{kind.itemsize}" if kind.kind == "S" else kind) for name, kind in kinds])
+
+
+_ARGUMENT = {"values": "record"}  # of what is recorded, where the file has another name
 
 
 class Varied:
@@ -180,6 +201,9 @@ class Varied:
 
     def __init__(self, grid: Mapping[str, Any], table: Mapping[str, Any], random: Mapping[str, Sequence[Any]],
                  sobol: Mapping[str, Sequence[Any]], count: int | None, seed: int) -> None:
+        for what, given in (("grid", grid), ("table", table), ("random", random), ("sobol", sobol)):
+            if not isinstance(given, Mapping):
+                raise Misuse(f"{what} is {given!r}; a dictionary by name of a parameter, \"start.x\" or \"start.v_x\" is needed")
         if not (grid or table or random or sobol):
             raise Misuse("nothing varies: a sweep needs grid, table, random or sobol")
         if (random or sobol) and count is None:
@@ -200,7 +224,7 @@ class Varied:
         if self._table:
             columns = [",".join(self._table), *(",".join(map(repr, row)) for row in zip(*self._table.values()))]
             (folder / "members.csv").write_text("\n".join(columns) + "\n", encoding="utf-8")
-            lines += [f"table = {json.dumps(str(folder / 'members.csv'))}"]
+            lines += ['table = "members.csv"']
         names = {*self._grid, *self._table, *(name for laws in self._draws.values() for name, _ in laws)}
         lines += ["[set]", *(f"{json.dumps(name)} = {value!r}" for name, value in changes.items() if name not in names)]
         if self._grid:
@@ -212,12 +236,14 @@ class Varied:
 
 
 def _column(values: Any, name: str) -> list[float]:
+    if np.ndim(values) != 1 or not np.size(values):
+        raise Misuse(f"{name} is {values!r}; a list of numbers is needed")
     return table(values, (np.size(values),), name).tolist()
 
 
 def _law(name: str, law: Sequence[Any]) -> tuple[str, str]:
     """The name and its law, ("uniform", 0.5, 2.0), as the file of a sweep writes it."""
-    if isinstance(law, str) or len(law) != 3 or not isinstance(law[0], str):
+    if not isinstance(law, (list, tuple)) or len(law) != 3 or law[0] not in ("uniform", "log_uniform", "normal"):
         raise Misuse(f"{name} is drawn by {law!r}; (\"uniform\", from, to), (\"log_uniform\", from, to) or "
                      "(\"normal\", mean, deviation) is needed")
     return name, "{ " + f"{law[0]} = [{real(law[1], name)!r}, {real(law[2], name)!r}]" + " }"
@@ -234,4 +260,4 @@ def sweep_of_file(file: str | os.PathLike[str], *, out: str | os.PathLike[str] |
         where = Path(out) if out is not None else Path(folder) / "out"
         call_command("sweep", [os.fspath(file), "--out", str(where), "--threads", str(whole(threads, "threads"))], plugins,
                      str(file))
-        return np.load(where / "results.npy")
+        return _results(where)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from . import _library as c
-from .arrays import real, table, whole
+from .arrays import flag, real, table, text, whole
 from .errors import Misuse
 
 _LARGEST_INT = 2**31 - 1  # of C
@@ -24,18 +24,16 @@ def options_from(given: dict[str, Any], until: float | None, pushed: bool = Fals
     """
     unknown = [name for name in given if name not in KNOWN]
     if unknown:
-        raise Misuse(f"no option {unknown[0]!r}; there are " + ", ".join(KNOWN))
+        raise Misuse(f"no argument {unknown[0]!r}; beside those of the function (help tells them) there are " + ", ".join(KNOWN))
     options = c.Options()
     for name in ("method", "rule", "solver", "jacobian", "control"):
         value = given.get(name)
-        if value is not None and not isinstance(value, str):
-            raise Misuse(f"{name} is {value!r}; a text is needed")
-        setattr(options, name, c.encoded(value))
+        setattr(options, name, c.encoded(None if value is None else text(value, name)))
     for name in ("order", "substeps"):
         setattr(options, name, whole(given.get(name) or 0, name, most=_LARGEST_INT))
     options.max_steps = whole(given.get("max_steps") or 0, "max_steps")
     for name in ("project_start", "compensated_sums"):
-        setattr(options, name, int(bool(given.get(name))))
+        setattr(options, name, int(flag(given.get(name, False), name)))
     if given.get("step") is not None:
         options.step = real(given["step"], "step")
         if options.step == 0.0:
@@ -46,10 +44,11 @@ def options_from(given: dict[str, Any], until: float | None, pushed: bool = Fals
         options.eps = real(eps, "eps")
         if options.eps <= 0.0:
             raise Misuse(f"eps is {options.eps}; a number of radians above 0 is needed")
-    elif given.get("adaptive"):
+    adaptive = given.get("adaptive")
+    if adaptive is not None and flag(adaptive, "adaptive") and eps is None:
         options.eps = math.nan  # what is usual for the method, which may be chosen for it
-    options.fixed = int(fixed or given.get("adaptive") is False)
-    options.pushed = int(pushed)
+    options.fixed = int(fixed or adaptive is not None and not adaptive)
+    options.pushed = int(flag(pushed, "pushed"))
     if until is not None:
         options.ends, options.end = 1, real(until, "until")
     return options

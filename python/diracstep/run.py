@@ -112,7 +112,7 @@ class Run(Points):
     doubt: str = ""  #: empty, or why the points are not to be believed
     interrupted: bool = False  #: whether Ctrl-C ended it
     events: list[Event] = field(default_factory=list)  #: of the scene, in the order of time; the last ends a ``stopped`` run
-    _again: Any = None  #: makes an integrator at the start that takes the steps of this run; None where there is none
+    _again: Any = None  #: end, options and number of the steps of this run; None where they are not of one size
     _places: dict[str, tuple[np.ndarray, int]] = field(default_factory=dict, init=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -128,15 +128,28 @@ class Run(Points):
             places["p_" + name] = (self.p, index)
             places[name] = (self.q, index)
 
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "_places": {}}  # they are views
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self.__post_init__()
+
     def __getitem__(self, name: str) -> np.ndarray:
         """One quantity along the run: ``"x"``, ``"v_x"``, ``"p_x"``, the name of a row for its force, of an invariant, of an
         output of the scene's file, or ``"t"`` and ``"energy"``."""
-        if name in self._places:
+        if isinstance(name, str) and name in self._places:
             array, index = self._places[name]
             return array[:, index]
         if name in ("t", "energy"):
             return getattr(self, name)
         raise KeyError(f"no quantity {name!r}; there are t, energy, " + ", ".join(self._places))
+
+    def __contains__(self, name: object) -> bool:
+        """Whether ``run[name]`` is known."""
+        return name in self.names
+
+    __iter__ = None  # it has points, and quantities by name: neither is what a loop would mean
 
     @property
     def stopped(self) -> bool:
@@ -197,7 +210,10 @@ class Run(Points):
     def _stepped(self, what: str, *arguments: Any) -> Any:
         if self._again is None or self.statistics is not None and self.statistics.step == 0.0:
             raise Misuse("derivatives need a run of steps of fixed size to its end (adaptive=False, or a step)")
-        integrator, steps = self._again()
+        end, options, steps = self._again
+        integrator = self.scene.integrator(until=end, **options)
+        if steps is None:
+            steps = round((end - self.scene.start_time) / integrator.statistics.step)
         if what == "jacobian":
             return integrator.jacobian(steps, *arguments)
         return integrator.gradient(steps, *arguments)

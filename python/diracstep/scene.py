@@ -11,12 +11,12 @@ from typing import Any, Callable, Mapping, NoReturn, Sequence
 import numpy as np
 
 from . import _library as c
-from .arrays import address, column, real, table, whole
+from .arrays import address, column, flag, real, reals, table, text, whole
 from .callbacks import CallbackScene, GeneratingFunction, say_cost
 from .command import Equilibrium, Fit, SolvedStart, Varied, Verbs, fit, sweep
 from .errors import Doubt, Failure, Interrupted, Misuse, raised
 from .integrator import Integrator
-from .opening import parts_of, source_of
+from .opening import checked, names_of, parts_of, source_of
 from .options import course_of, momentum_from, options_from, stop_flag
 from .plan import TextTable
 from .points import Points
@@ -63,25 +63,26 @@ class Scene:
                  drop_redundant: bool = False, tolerances: Mapping[str, float] | None = None) -> None:
         if getattr(self, "_handle", 0):
             raise Misuse("a scene is made once")
-        coordinates, parameters = list(coordinates), dict(parameters or {})
-        if not coordinates:
-            raise Misuse("a scene needs coordinates")
+        coordinates, parameters = names_of(coordinates), reals(parameters, "parameters")
+        name, description = text(name, "name"), text(description, "description")
+        until, step, t = real(until, "until"), real(step, "step"), real(t, "t")
         if start is not None:
             if q is not None or v is not None or p is not None:
                 raise Misuse("start goes with no q, v or p: it holds them by name")
             q, v, p = parts_of(start, coordinates)
-        if callback:
+        if flag(callback, "callback"):
             if lagrangian is None or hamiltonian or dissipation or invariants or p is not None:
                 raise Misuse("callback=True needs a lagrangian, and knows no hamiltonian, dissipation, invariants or start p")
             zeros = np.zeros(len(coordinates))
             source = CallbackScene(name, coordinates, parameters, lagrangian, rows, force,
                                    zeros if q is None else column(q, coordinates, "q"),
-                                   zeros if v is None else column(v, coordinates, "v"), real(t, "t"), real(until, "until"),
-                                   real(step, "step"))
+                                   zeros if v is None else column(v, coordinates, "v"), t, until, step)
             self._open(callbacks=source, coordinates=coordinates, plugins=plugins, methods=methods, drop_redundant=drop_redundant,
                        tolerances=tolerances)
             say_cost(self, source)
             return
+        if lagrangian is None and hamiltonian is None:
+            raise Misuse("a scene needs a lagrangian or a hamiltonian, such as lagrangian=lambda q, v: …")
         writer = SceneText(name, coordinates, parameters)
         writer.add("lagrangian", lagrangian)
         writer.add("hamiltonian", hamiltonian)
@@ -89,29 +90,37 @@ class Scene:
         writer.add_rows(rows)
         writer.add_force(force)
         writer.add_invariants(invariants or {})
-        text = writer.text(start_values(coordinates, q, v, p, t), until, step, {"description": description})
-        self._open(text=text, name=name, coordinates=coordinates, plugins=plugins, methods=methods, drop_redundant=drop_redundant,
-                       tolerances=tolerances)
+        written = writer.text(start_values(coordinates, q, v, p, t), until, step, {"description": description})
+        self._open(text=written, name=name, coordinates=coordinates, plugins=plugins, methods=methods,
+                   drop_redundant=drop_redundant, tolerances=tolerances)
 
     # ---- opening ----
+    @classmethod
+    def _made(cls, **given: Any) -> Scene:
+        scene = cls.__new__(cls)
+        scene._open(**given)
+        return scene
+
     def _open(self, *, name: str | None = None, text: str | None = None, callbacks: CallbackScene | None = None,
               coordinates: Sequence[str] | None = None, parameters: Mapping[str, float] | None = None,
               plugins: Sequence[str] = (), methods: Sequence[GeneratingFunction] = (), drop_redundant: bool = False,
               tolerances: Mapping[str, float] | None = None) -> None:
         self._handle = 0
         self._callbacks = callbacks
-        self._methods = list(methods)
-        self._again: dict[str, Any] = {"name": name, "text": text, "coordinates": coordinates, "plugins": list(plugins),
-                                       "methods": list(methods), "drop_redundant": drop_redundant, "tolerances": tolerances}
-        self._tolerances = {key: float(value) for key, value in (tolerances or {}).items()}
-        self._changes = {key: float(value) for key, value in (parameters or {}).items()}
-        source, kept = source_of(name, text, callbacks, self._changes, plugins, self._methods, drop_redundant, self._tolerances)
+        self._tolerances = reals(tolerances, "tolerances")
+        self._changes = {key: real(value, f"the parameter {key}") for key, value in (parameters or {}).items()}
+        loaded = checked(plugins, methods, drop_redundant)
+        self._methods = loaded["methods"]
+        self._again: dict[str, Any] = {"name": name, "text": text, "coordinates": coordinates, "tolerances": self._tolerances,
+                                       **loaded}
+        source, kept = source_of(name, text, callbacks, self._changes, tolerances=self._tolerances, **loaded)
         handle = ctypes.c_void_p()
         self._check(c.lib.open(c.VERSION, ctypes.byref(source), ctypes.byref(handle)))
         del kept
         self._handle = handle.value or 0
         self._close = c.lib.close  # there until the end of the interpreter
         if name is not None and name.endswith((".toml", ".cir")) and text is None:
+            self._again["name"] = os.path.abspath(name)  # also where the process moves to another folder
             text = Path(name).read_text(encoding="utf-8")
         self.text = text  #: of the scene file; None for scenes of the catalogue, of plugins, and of callbacks
         self._read_facts(coordinates)
@@ -165,25 +174,24 @@ class Scene:
         """The same scene with other values of parameters and sizes; nothing is compiled again."""
         if self._callbacks is not None:
             raise Misuse("the parameters of a scene of callbacks are fixed; make it anew")
-        made = Scene.__new__(Scene)
-        made._open(**self._again, parameters={**self._changes, **parameters})
-        return made
+        return Scene._made(**self._again, parameters={**self._changes, **parameters})
 
     def with_tolerances(self, tolerances: Mapping[str, float]) -> Scene:
         """The same scene with absolute tolerances, in their units, of coordinates that are far smaller than others."""
         if self._callbacks is not None:
             raise Misuse("the tolerances of a scene of callbacks are stated where it is made")
-        again: dict[str, Any] = {**self._again, "tolerances": {**self._tolerances, **tolerances}}
-        made = Scene.__new__(Scene)
-        made._open(**again, parameters=self._changes)
-        return made
+        again: dict[str, Any] = {**self._again, "tolerances": {**self._tolerances, **reals(tolerances, "tolerances")}}
+        return Scene._made(**again, parameters=self._changes)
 
     def __del__(self) -> None:
         if getattr(self, "_handle", 0):
             self._close(self._handle)
 
-    def __reduce__(self) -> NoReturn:
-        raise TypeError("a scene is not copied or pickled: it belongs to the library; make it again, or with with_parameters()")
+    def __reduce__(self) -> tuple[Any, ...]:
+        """A scene is copied and pickled as what it was made from, and made anew from that."""
+        if self._callbacks is not None or self._methods:
+            raise TypeError("a scene of callbacks, or with methods in Python, is not copied or pickled: make it again")
+        return made_from, ({**self._again, "parameters": self._changes},)
 
     # ---- runs ----
     def run(self, *, until: float | None = None, steps: int | None = None, at: Any = None, every_time: float | None = None,
@@ -212,12 +220,15 @@ class Scene:
         """
         if sum(choice is not None for choice in (steps, at, every_time, error)) > 1 or steps is not None and until is not None:
             raise Misuse("steps, at, every_time and error exclude each other, and steps goes with no until")
-        if tolerances:
+        if error is None and (max_solves or max_time):
+            raise Misuse("max_solves and max_time limit the search for an error, and go with error")
+        if tolerances is not None:
             return self.with_tolerances(tolerances).run(
                 until=until, steps=steps, at=at, every_time=every_time, error=error, every=every, momentum=momentum,
                 progress=progress, max_solves=max_solves, max_time=max_time, **options)
         if every_time is not None:
             at = self._times(real(every_time, "every_time"), self.until if until is None else real(until, "until"))
+        progress = None if progress is None else flag(progress, "progress")
         course, kept = course_of(every, momentum, steps, at)
         if error is not None:
             return self._search(course, error, until, options, max_solves, max_time, progress)
@@ -234,11 +245,8 @@ class Scene:
                 bar.show)
         taken = integrator.statistics
 
-        def again() -> tuple[Integrator, int]:
-            return self.integrator(until=end, **options), taken.steps
-
         return self._finished(points, code, message, statistics=taken, doubt=integrator.doubt,
-                              events=integrator.events, again=None if at is not None else again)
+                              events=integrator.events, again=None if at is not None else (end, options, taken.steps))
 
     def _end(self, until: float | None, times: np.ndarray, options: dict[str, Any]) -> float:
         """Where steps are to lead: as far as the times to show, where that is farther than the end of the scene."""
@@ -260,6 +268,7 @@ class Scene:
     def _search(self, course: Any, error: float, until: float | None, options: dict[str, Any], max_solves: int, max_time: float,
                 progress: bool | None) -> Run:
         kind = options.pop("adaptive", None)
+        kind = None if kind is None else flag(kind, "adaptive")
         request = c.ErrorRequest(error=real(error, "error"), steps=0 if kind is None else 2 if kind else 1,
                                  max_solves=whole(max_solves, "max_solves"), max_time=real(max_time, "max_time"))
         chosen, found = options_from(options, until), c.Found()
@@ -281,15 +290,9 @@ class Scene:
         again = None
         if search and not search.varies and not self.events:
             found_steps = {**options, "method": search.method, "order": search.order, "step": search.step}
-            again = lambda: self._found_again(until, found_steps)  # noqa: E731
+            again = self.until if until is None else real(until, "until"), found_steps, None
         return self._finished(points, code, message, search=search, doubt=search.warning if search else "", events=events,
                               again=again)
-
-    def _found_again(self, until: float | None, options: dict[str, Any]) -> tuple[Integrator, int]:
-        """An integrator for what a search has found, and the steps that lead to the end."""
-        end = self.until if until is None else until
-        integrator = self.integrator(until=end, **options)
-        return integrator, round((end - self.start_time) / integrator.statistics.step)
 
     def _points(self, room: int) -> Points:
         return Points(self._widths, room)
@@ -320,7 +323,9 @@ class Scene:
         Ctrl-C ends it with KeyboardInterrupt.
         """
         starts_q = np.asarray(q)
-        members = len(starts_q) if starts_q.ndim else 0
+        if starts_q.ndim != 2:
+            raise Misuse(f"q has shape {starts_q.shape}; (members, {len(self._coordinates)}) is needed: a start in each row")
+        members = len(starts_q)
         shape = (members, len(self._coordinates))
         starts_q = table(starts_q, shape, "q")
         starts_v = None if v is None else table(v, shape, "v")
@@ -456,3 +461,8 @@ class Scene:
 
     def _repr_html_(self) -> str:
         return TextTable(self.name, ("", ""), self.about)._repr_html_() + self.plan._repr_html_()
+
+
+def made_from(again: dict[str, Any]) -> Scene:
+    """A scene that was copied or pickled."""
+    return Scene._made(**again)
