@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Mapping, Sequence
 
 import numpy as np
@@ -98,25 +99,10 @@ class Points:
     invariants: np.ndarray
     outputs: np.ndarray
 
-    def __len__(self) -> int:
-        """The number of points."""
-        return len(self.t)
-
-
-@dataclass(frozen=True, repr=False, eq=False)
-class Run(Points):
-    """Points of a motion, with the arrays of ``Points``, and how they came about."""
-
-    statistics: Statistics | None = None
-    search: Search | None = None  #: where an error was asked for
-    doubt: str = ""  #: empty, or why the points are not to be believed
-    interrupted: bool = False  #: whether Ctrl-C ended it
-    events: list[Event] = field(default_factory=list)  #: of the scene, in the order of time; the last ends a ``stopped`` run
-    _again: Any = None  #: end, options and number of the steps of this run; None where they are not of one size
-    _places: dict[str, tuple[np.ndarray, int]] = field(default_factory=dict, init=False, compare=False)
-
-    def __post_init__(self) -> None:
-        scene, places = self.scene, self._places
+    @cached_property
+    def _places(self) -> dict[str, tuple[np.ndarray, int]]:
+        """Array and column of each quantity."""
+        scene, places = self.scene, {}
         for index, name in enumerate(scene.rows):
             places[name] = (self.lambda_, index)
         for index, name in enumerate(scene.invariants):
@@ -127,16 +113,17 @@ class Run(Points):
             places["v_" + name] = (self.v, index)
             places["p_" + name] = (self.p, index)
             places[name] = (self.q, index)
+        return places
 
     def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "_places": {}}  # they are views
+        return {name: value for name, value in self.__dict__.items() if name != "_places"}  # they are views
 
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__dict__.update(state)
-        self.__post_init__()
+    def __len__(self) -> int:
+        """The number of points."""
+        return len(self.t)
 
     def __getitem__(self, name: str) -> np.ndarray:
-        """One quantity along the run: ``"x"``, ``"v_x"``, ``"p_x"``, the name of a row for its force, of an invariant, of an
+        """One quantity of all points: ``"x"``, ``"v_x"``, ``"p_x"``, the name of a row for its force, of an invariant, of an
         output of the scene's file, or ``"t"`` and ``"energy"``."""
         if isinstance(name, str) and name in self._places:
             array, index = self._places[name]
@@ -146,20 +133,14 @@ class Run(Points):
         raise KeyError(f"no quantity {name!r}; there are t, energy, " + ", ".join(self._places))
 
     def __contains__(self, name: object) -> bool:
-        """Whether ``run[name]`` is known."""
+        """Whether ``[name]`` is known."""
         return name in self.names
 
     __iter__ = None  # it has points, and quantities by name: neither is what a loop would mean
 
     @property
-    def stopped(self) -> bool:
-        """Whether an event of the scene has ended the motion."""
-        how = self.statistics or self.search
-        return how is not None and how.stopped
-
-    @property
     def names(self) -> list[str]:
-        """The quantities that ``run[name]`` knows."""
+        """The quantities that ``[name]`` knows."""
         return ["t", *self._places, "energy"]
 
     def table(self) -> Any:
@@ -173,6 +154,24 @@ class Run(Points):
                 table[name] = values
             return table
         return pandas.DataFrame(columns)
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class Run(Points):
+    """Points of a motion, with the arrays of ``Points``, and how they came about."""
+
+    statistics: Statistics | None = None
+    search: Search | None = None  #: where an error was asked for
+    doubt: str = ""  #: empty, or why the points are not to be believed
+    interrupted: bool = False  #: whether Ctrl-C ended it
+    events: list[Event] = field(default_factory=list)  #: of the scene, in the order of time; the last ends a ``stopped`` run
+    _again: Any = None  #: end, options and number of the steps of this run; None where they are not of one size
+
+    @property
+    def stopped(self) -> bool:
+        """Whether an event of the scene has ended the motion."""
+        how = self.statistics or self.search
+        return how is not None and how.stopped
 
     # ---- derivatives ----
     def jacobian(self, parameters: Sequence[str] = ()) -> Jacobian:

@@ -143,6 +143,14 @@ def test_an_ensemble_is_its_members(spring):
         spring.ensemble([[np.inf]])
 
 
+def test_an_ensemble_has_its_quantities_by_name(skate):
+    ends = skate.ensemble(np.zeros((3, 3)), until=1.0, step=0.1)
+    assert np.array_equal(ends["v_x"], ends.v[:, 0]) and np.array_equal(ends["blade"], ends.lambda_[:, 0])
+    assert "blade" in ends and len(ends.table()) == 3
+    with pytest.raises(KeyError, match="no quantity 'z'"):
+        ends["z"]
+
+
 def test_an_ensemble_names_the_members_that_fail():
     falling = ds.Scene(["x"], lambda q, v: v.x**2 / 2 + 1 / q.x**2, q=[1.0], until=3.0, step=0.05)
     ends = falling.ensemble([[1.0], [50.0]])
