@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Mapping, Sequence
 import numpy as np
 
 from .arrays import real, table, texts, whole
-from .errors import Doubt, Failure, Misuse
+from .errors import Doubt, Failure, Misuse, spelled
 
 if TYPE_CHECKING:
     from .scene import Scene
@@ -93,7 +93,7 @@ def _told(text: str) -> str:
     """What the command says, without the lines on its version and machine that some verbs begin with."""
     lines = [line.removeprefix("diracstep: ") for line in text.strip().splitlines()]
     heading = [index for index, line in enumerate(lines[:6]) if line.startswith("system: ")]
-    return "\n".join(lines[heading[0] + 1:] if heading else lines)
+    return spelled("\n".join(lines[heading[0] + 1:] if heading else lines))
 
 
 class Report:

@@ -13,7 +13,7 @@ import numpy as np
 
 from . import _library as c
 from .arrays import column, real, texts, whole
-from .errors import Doubt, Misuse
+from .errors import Doubt, Misuse, spelled
 from .options import momentum_from, options_from
 from .plan import TextTable
 from .run import Event, Statistics, event_from
@@ -143,7 +143,7 @@ class Integrator:
             doubt = c.lib.doubt(self._handle).decode()
         if doubt and doubt != self._told:
             self._told = doubt
-            warnings.warn(f"{self.scene.name}: {doubt}", Doubt, stacklevel=2)
+            warnings.warn(f"{self.scene.name}: {spelled(doubt)}", Doubt, stacklevel=2)
         return State(t=read.time, energy=read.energy, **columns)
 
     @property

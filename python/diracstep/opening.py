@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import ctypes
 import os
+import re
 from typing import Any, Mapping, Sequence
 
 from . import _library as c
 from .arrays import flag, path, texts
 from .callbacks import CallbackScene, GeneratingFunction
 from .errors import Misuse
+from .scene_text import scene_name
 
 
 def checked(plugins: Any, methods: Any, drop_redundant: Any) -> dict[str, Any]:
@@ -51,7 +53,15 @@ def names_of(coordinates: Any) -> list[str]:
     twice = [name for index, name in enumerate(names) if name in names[:index]]
     if twice:
         raise Misuse(f"coordinates: {twice[0]!r} stands twice")
+    require_names(names, "coordinates")
     return names
+
+
+def require_names(names: Sequence[str], what: str) -> None:
+    """Raises Misuse for a name that formulas cannot have."""
+    for name in names:
+        if not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]*", scene_name(name)):
+            raise Misuse(f"{what}: {name!r} is no name; letters, digits and _ are needed, and no digit first")
 
 
 def parts_of(start: Mapping[str, float], coordinates: Sequence[str]) -> tuple[Any, ...]:

@@ -14,9 +14,9 @@ from . import _library as c
 from .arrays import address, column, flag, real, reals, table, text, whole
 from .callbacks import CallbackScene, GeneratingFunction, say_cost
 from .command import Equilibrium, Fit, SolvedStart, Varied, Verbs, fit, sweep
-from .errors import Doubt, Failure, Interrupted, Misuse, raised
+from .errors import Doubt, Failure, Interrupted, Misuse, raised, spelled
 from .integrator import Integrator
-from .opening import checked, names_of, parts_of, source_of
+from .opening import checked, names_of, parts_of, require_names, source_of
 from .options import course_of, momentum_from, options_from, stop_flag
 from .plan import TextTable
 from .points import Points
@@ -64,6 +64,7 @@ class Scene:
         if getattr(self, "_handle", 0):
             raise Misuse("a scene is made once")
         coordinates, parameters = names_of(coordinates), reals(parameters, "parameters")
+        require_names(list(parameters), "parameters")
         name, description = text(name, "name"), text(description, "description")
         until, step, t = real(until, "until"), real(step, "step"), real(t, "t")
         if start is not None:
@@ -306,11 +307,11 @@ class Scene:
         if points.failure is not None:
             raise points.failure
         if code == c.INTERRUPTED:
-            warnings.warn(message, Interrupted, stacklevel=3)
+            warnings.warn(spelled(message), Interrupted, stacklevel=3)
         elif code != c.OK:
             self._raise(code, message, run)
         if doubt:
-            warnings.warn(f"{self.name}: {doubt}", Doubt, stacklevel=3)
+            warnings.warn(f"{self.name}: {spelled(doubt)}", Doubt, stacklevel=3)
         return run
 
     def ensemble(self, q: Any, v: Any = None, *, t: Any = None, until: float | None = None, steps: int | None = None,
@@ -356,7 +357,7 @@ class Scene:
                 self._raise(code, message)
         if told["doubted"]:
             member, why = next(iter(told["doubted"].items()))
-            warnings.warn(f"{self.name}: member {member}: {why}", Doubt, stacklevel=2)
+            warnings.warn(f"{self.name}: member {member}: {spelled(why)}", Doubt, stacklevel=2)
         return Ensemble(self, **points.arrays, failures=told["failed"], doubts=told["doubted"])
 
     def integrator(self, *, until: float | None = None, pushed: bool = False, **options: Any) -> Integrator:

@@ -60,7 +60,10 @@ def arguments_of(function: Formula, by_name: Mapping[str, Any], what: str) -> di
     """The function's arguments by its own names of them; raises Misuse for a name that is not known."""
     if not callable(function):
         raise Misuse(f"{what} is {type(function).__name__}; a function is needed, such as lambda q, v: …")
-    wanted = inspect.signature(function).parameters.values()
+    try:
+        wanted = inspect.signature(function).parameters.values()
+    except ValueError:
+        raise Misuse(f"{what} is {function!r}, which does not tell its arguments; a function is needed, such as lambda q, v: …") from None
     unknown = [entry.name for entry in wanted if entry.name not in by_name and entry.default is entry.empty]
     if unknown:
         raise Misuse(f"{what} has an argument {unknown[0]!r}; known are " + ", ".join(by_name))

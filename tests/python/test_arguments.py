@@ -33,6 +33,9 @@ SCENE = [
     ({"coordinates": ["x", 3]}, r"coordinates\[1\] is 3; a text"),
     ({"coordinates": ["x", "x"]}, "'x' stands twice"),
     ({"coordinates": []}, "needs coordinates"),
+    ({"coordinates": ["my x"]}, "'my x' is no name"),
+    ({"parameters": {"2g": 1.0}}, "'2g' is no name"),
+    ({"lagrangian": np.sin}, "does not tell its arguments"),
     ({"lagrangian": "v^2"}, "lagrangian is str; a function"),
     ({"lagrangian": lambda v: None}, "lagrangian returned NoneType; one formula is needed, written with return"),
     ({"lagrangian": lambda v: "v"}, "lagrangian returned str; one formula"),
@@ -106,6 +109,19 @@ def test_a_message_of_the_command_begins_with_what_is_wrong(spring):
     with pytest.raises(ds.Misuse) as told:
         spring.study(methods=["type9/none"])
     assert str(told.value).startswith("unknown method 'type9/none'")
+
+
+def test_options_are_spelled_as_in_python():
+    def circle(rows, y, **options):
+        return ds.Scene(["x", "y"], lambda q, v: v @ v / 2 - q.y, rows=rows, q=[1.0, y], **options)
+
+    with pytest.raises(ds.Misuse, match='drop them: drop_redundant=True, or redundant = "drop"'):
+        circle(lambda q: [q @ q - 1, 2 * (q @ q) - 2], 0.0).run()
+    assert len(circle(lambda q: [q @ q - 1, 2 * (q @ q) - 2], 0.0, drop_redundant=True).run(steps=1, step=0.1)) == 2
+    with pytest.raises(ds.Misuse, match="or project_start=True$"):
+        circle(lambda q: q @ q - 1, 0.1).run()
+    with pytest.raises(ds.Failure, match=r"\(max_time|max_solves"):
+        ds.load("kepler_e099").run(error=1e-13, max_solves=100)
 
 
 def test_numbers_of_other_kinds_are_taken():
