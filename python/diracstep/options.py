@@ -47,6 +47,8 @@ def options_from(given: dict[str, Any], until: float | None, pushed: bool = Fals
     adaptive = given.get("adaptive")
     if adaptive is not None and flag(adaptive, "adaptive") and eps is None:
         options.eps = math.nan  # what is usual for the method, which may be chosen for it
+    if eps is not None and adaptive is not None and not adaptive:
+        raise Misuse("eps makes steps vary and goes with no adaptive=False")
     options.fixed = int(fixed or adaptive is not None and not adaptive)
     options.pushed = int(flag(pushed, "pushed"))
     if until is not None:

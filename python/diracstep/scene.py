@@ -268,6 +268,9 @@ class Scene:
 
     def _search(self, course: Any, error: float, until: float | None, options: dict[str, Any], max_solves: int, max_time: float,
                 progress: bool | None) -> Run:
+        for name in ("eps", "smallest_step", "max_steps"):
+            if options.get(name) is not None:
+                raise Misuse(f"{name} goes with no error: the search finds the steps; max_solves and max_time limit it")
         kind = options.pop("adaptive", None)
         kind = None if kind is None else flag(kind, "adaptive")
         request = c.ErrorRequest(error=real(error, "error"), steps=0 if kind is None else 2 if kind else 1,

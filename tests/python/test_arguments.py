@@ -60,6 +60,8 @@ RUN = [
     ({"eps": 0.0}, "eps is 0.0; a number of radians above 0"),
     ({"adaptive": "yes"}, "adaptive is 'yes'; True or False"),
     ({"adaptive": 1, "error": 1e-6}, "adaptive is 1; True or False"),
+    ({"adaptive": False, "eps": 0.2}, "no adaptive=False"),
+    ({"error": 1e-6, "eps": 0.2}, "eps goes with no error"),
     ({"project_start": "no"}, "project_start is 'no'; True or False"),
     ({"method": 3}, "method is 3; a text"),
     ({"order": 2.5}, "order is 2.5; a whole number"),
@@ -122,6 +124,13 @@ def test_options_are_spelled_as_in_python():
         circle(lambda q: q @ q - 1, 0.1).run()
     with pytest.raises(ds.Failure, match=r"\(max_time|max_solves"):
         ds.load("kepler_e099").run(error=1e-13, max_solves=100)
+
+
+def test_what_needs_steps_of_one_size_says_so(spring):
+    integrator = spring.integrator(adaptive=True)
+    for call in (integrator.save, lambda: integrator.reset(q=[1.0]), lambda: integrator.step(size=0.1)):
+        with pytest.raises(ds.Misuse, match=r"steps of fixed size \(adaptive=False\)"):
+            call()
 
 
 def test_numbers_of_other_kinds_are_taken():
