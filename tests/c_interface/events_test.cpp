@@ -104,7 +104,8 @@ TEST_F(CInterface, WhatDoesNotGoWithEventsIsRefused) {
 TEST_F(CInterface, ASearchForAnErrorGoesThroughEvents) {
   diracstep_source source{};
   source.text =
-      "name = \"spring_ball\"\nlagrangian = \"v_y^2/2 - y^2/2 - 2*y\"\n[coordinates]\ny = {}\n[start]\ny = 1\n"
+      "name = \"spring_ball\"\nlagrangian = \"v_y^2/2 - y^2/2 - 2*y\"\n[coordinates]\ny = {}\n[start]\ny = "
+      "1\n"
       "[span]\nend = 3\nstep = 0.1\n[[events]]\nname = \"floor\"\nwhen = \"y\"\nrestitution = 0.5\n"
       "[[events]]\nname = \"top\"\nwhen = \"v_y\"\ndirection = \"falling\"\nif = \"t > 0.1\"\naction = "
       "\"stop\"\n";
