@@ -6,7 +6,7 @@
  * numbers (rows), i numbers (invariants) or o numbers (outputs): see diracstep_facts.  Units are those of the
  * scene.
  *
- * Events of a scene (docs/events.md) are looked for by runs, by ensembles and by single steps, and act.
+ * Events of a scene (docs/events.md) are looked for by runs, searches, ensembles and single steps, and act.
  *
  * A model is not changed by anything: threads may share it.  An integrator belongs to one thread at a time;
  * different ones share nothing.
