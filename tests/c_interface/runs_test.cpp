@@ -3,6 +3,7 @@
 #include <cmath>
 #include <diracstep/core/adaptive/adaptive_run.hpp>
 #include <diracstep/scene_format/scene_catalogue.hpp>
+#include <diracstep/solvers/kinsol_solver.hpp>
 #include <thread>
 
 #include "c_interface.hpp"
