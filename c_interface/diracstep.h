@@ -6,7 +6,7 @@
  * numbers (rows), i numbers (invariants) or o numbers (outputs): see diracstep_facts.  Units are those of the
  * scene.
  *
- * Events of a scene (docs/events.md) are looked for by runs, by ensembles and by single steps, and act.
+ * Events of a scene (docs/events.md) are looked for by runs, searches, ensembles and single steps, and act.
  *
  * A model is not changed by anything: threads may share it.  An integrator belongs to one thread at a time;
  * different ones share nothing.
@@ -23,7 +23,7 @@ extern "C" {
 
 /* Raised when a struct here or in diracstep_scene.h, or what a function does, changes; not for new functions.
  */
-#define DIRACSTEP_VERSION_OF_C_INTERFACE 4u
+#define DIRACSTEP_VERSION_OF_C_INTERFACE 5u
 
 #if defined(_WIN32)
 #define DIRACSTEP_API __declspec(dllexport)
@@ -283,7 +283,7 @@ typedef struct diracstep_error {
   double max_time; /* seconds; 0: 30 */
 } diracstep_error;
 
-/* What the search found.  Texts and the table are valid until the next call of this thread. */
+/* What the search found.  Texts, table and events are valid until the next call of this thread. */
 typedef struct diracstep_found {
   double estimate;       /* of the error at the end */
   double observed_order; /* NaN where it is not known */
@@ -291,13 +291,17 @@ typedef struct diracstep_found {
   int order, varies;
   long solves; /* of all runs */
   const char *method, *reason;
-  const char *warning;  /* "", or why the estimate deserves less trust */
+  const char *warning;  /* "", or why the estimate deserves less trust or the run is not to be believed */
   diracstep_table runs; /* step, steps, solves, difference, estimate, observed order, why it does not count */
+  int stopped;          /* 1: an event has ended the motion, the last one of … */
+  long events;          /* … so many events of the scene that the run met … */
+  const diracstep_event *event; /* … and they, in the order of time */
 } diracstep_found;
 
 /* A run with method and steps that the library finds, repeated until the estimated error at the end is below
- * the one asked for.  Of the course, `ends`, `end`, `every`, `momentum` and `stop` count.  DIRACSTEP_FAILED
- * where the search is refused: `found` and one point are then the best answer so far. */
+ * the one asked for.  Of the course, `ends`, `end`, `every`, `momentum` and `stop` count.  Steps are of one
+ * size where the scene has events: DIRACSTEP_MISUSE where they are to vary.  DIRACSTEP_FAILED where the
+ * search is refused: `found` and one point are then the best answer so far. */
 DIRACSTEP_API int diracstep_solve(const diracstep_model *model, const diracstep_options *options,
                                   const diracstep_course *course, const diracstep_error *error,
                                   diracstep_points *points, diracstep_found *found);

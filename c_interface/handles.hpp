@@ -111,6 +111,8 @@ const CatalogueScene& entry_of(const diracstep_model& model);
 /// Texts that C reads, kept until the next call of this thread.
 const char* keep(std::string text);
 diracstep_table keep(int columns, std::vector<std::string> cells);
+/// What C reads that is neither.
+void keep(std::shared_ptr<const void> owner);
 
 Momentum momentum_from(int momentum);
 SolverFactory solvers_from(const diracstep_options& options);
@@ -130,6 +132,14 @@ double end_from(const diracstep_model& model, const diracstep_options& options);
 double open_step(const diracstep_model& model, const diracstep_options& options, double start);
 /// So that whole steps lead to the end of the options, where these have one.
 double fitted_step(const diracstep_options& options, double start, double step);
+
+/// An integrator as diracstep_create() makes it.
+std::unique_ptr<diracstep_integrator> make_integrator(const diracstep_model& model,
+                                                      diracstep_options options);
+/// One run, as diracstep_run() takes it.
+void run_course(diracstep_integrator& handle, const diracstep_course& course, diracstep_points& points);
+/// The events met so far; they point into the handle.
+std::vector<diracstep_event> events_of(const diracstep_integrator& handle);
 
 /// Whether the caller has asked for the end; false without a flag.
 bool stopped(const int* flag);

@@ -56,7 +56,10 @@ auto maker(const diracstep_model& model, const CatalogueScene& entry, const Solv
   };
 }
 
-std::unique_ptr<diracstep_integrator> make(const diracstep_model& model, diracstep_options options) {
+}  // namespace
+
+std::unique_ptr<diracstep_integrator> c_interface::make_integrator(const diracstep_model& model,
+                                                                   diracstep_options options) {
   CatalogueScene entry = entry_of(model);
   std::shared_ptr<Vector> push;
   if (options.pushed != 0) {
@@ -87,6 +90,8 @@ std::unique_ptr<diracstep_integrator> make(const diracstep_model& model, diracst
   handle->motion = handle->make(nullptr);
   return handle;
 }
+
+namespace {
 
 void write(const Vector& column, double* to) {
   if (to != nullptr) std::copy(column.begin(), column.end(), to);
@@ -134,7 +139,8 @@ int diracstep_create(const diracstep_model* model, const diracstep_options* opti
   return guarded([&] {
     given(integrator, "where the integrator goes") = nullptr;
     *integrator =
-        make(given(model, "the model"), options != nullptr ? *options : diracstep_options{}).release();
+        make_integrator(given(model, "the model"), options != nullptr ? *options : diracstep_options{})
+            .release();
   });
 }
 

@@ -16,6 +16,7 @@ struct Answers {
   std::deque<std::string> texts;   ///< of keep(text) in this call
   std::vector<std::string> cells;  ///< of the table
   std::vector<const char*> cell_pointers;
+  std::vector<std::shared_ptr<const void>> others;
 };
 
 Answers& answers() {
@@ -48,7 +49,10 @@ int code_of_exception() noexcept {
   }
 }
 
-void begin_call() noexcept { answers().texts.clear(); }
+void begin_call() noexcept {
+  answers().texts.clear();
+  answers().others.clear();
+}
 
 const char* keep(std::string text) {
   std::deque<std::string>& texts = answers().texts;
@@ -62,6 +66,8 @@ diracstep_table keep(int columns, std::vector<std::string> cells) {
   for (const std::string& cell : kept.cells) kept.cell_pointers.push_back(cell.c_str());
   return {static_cast<int>(kept.cells.size()) / columns, columns, kept.cell_pointers.data()};
 }
+
+void keep(std::shared_ptr<const void> owner) { answers().others.push_back(std::move(owner)); }
 
 bool stopped(const int* flag) {
   return flag != nullptr &&

@@ -196,19 +196,22 @@ class Run {
 
 }  // namespace
 
+void c_interface::run_course(diracstep_integrator& handle, const diracstep_course& course,
+                             diracstep_points& points) {
+  require_sense(course);
+  if (handle.event_at_end() != nullptr)
+    throw Misuse("an event has ended the motion at t = " + to_text(handle.time(), 17) + "; reset it");
+  if (course.ends != 0) require_inputs_until(handle.entry, course.end, "the end");
+  handle.doubt.clear();
+  handle.checks.begin_anew();
+  std::visit([&](auto& motion) { Run(handle, *motion, course, points).go(); }, handle.motion);
+}
+
 int diracstep_run(diracstep_integrator* integrator, const diracstep_course* course,
                   diracstep_points* points) {
   return guarded([&] {
-    diracstep_integrator& handle = given(integrator, "the integrator");
-    const diracstep_course chosen = course != nullptr ? *course : diracstep_course{};
-    require_sense(chosen);
-    diracstep_points& into = given(points, "where the points go");
-    if (handle.event_at_end() != nullptr)
-      throw Misuse("an event has ended the motion at t = " + to_text(handle.time(), 17) + "; reset it");
-    if (chosen.ends != 0) require_inputs_until(handle.entry, chosen.end, "the end");
-    handle.doubt.clear();
-    handle.checks.begin_anew();
-    std::visit([&](auto& motion) { Run(handle, *motion, chosen, into).go(); }, handle.motion);
+    run_course(given(integrator, "the integrator"), course != nullptr ? *course : diracstep_course{},
+               given(points, "where the points go"));
   });
 }
 

@@ -1,6 +1,7 @@
 #include <cmath>
 #include <diracstep/c_interface/point_writer.hpp>
 #include <diracstep/core/adaptive/error_control.hpp>
+#include <diracstep/core/adaptive/error_with_events.hpp>
 #include <diracstep/core/adaptive/rate_monitor.hpp>
 
 using namespace diracstep;
@@ -25,7 +26,7 @@ ErrorControlOptions wanted(const diracstep_model& model, const diracstep_options
   search.control = control_from(options);
   if (options.step != 0.0)
     search.first_step = std::abs(options.step);
-  else if (!has_accelerations(*model.scene))
+  else if (!model.entry.events.empty() || !has_accelerations(*model.scene))
     search.first_step = std::abs(model.entry.natural_step);
   search.integrator = stepping_from(model, options);
   search.integrator.method = automatic_method;
@@ -63,27 +64,76 @@ diracstep_found found_from(const ErrorControlReport& report) {
           keep(report.method),
           keep(joined(report.method_reason, report.reason, report.division)),
           keep(report.warning),
-          keep(7, cells_of(report.runs))};
+          keep(7, cells_of(report.runs)),
+          0,
+          0,
+          nullptr};
 }
 
-void solve(const diracstep_model& model, const diracstep_options& options, const diracstep_course& course,
+/// Throws what the search ended with where it was refused; its best answer is then the only point.
+void require_found(const ErrorControlReport& report, const CatalogueScene& entry,
+                   const diracstep_course& course, diracstep_points& points) {
+  if (report.ok()) return;
+  PointWriter writer(points, entry);
+  if (report.end.q.size() > 0) writer.write(report.end);
+  if (stopped(course.stop)) throw Interruption(report.refusal);
+  throw Failure(report.refusal);
+}
+
+/// The run that a search through events has accepted, once more: each of its points, with the checks of a
+/// run.
+void take_found_steps(const diracstep_model& model, diracstep_options options,
+                      const ErrorControlReport& report, diracstep_course course, diracstep_points& points,
+                      diracstep_found& found) {
+  options.method = report.method.c_str();
+  options.order = report.order;
+  options.step = report.step;
+  options.ends = course.ends = 1;
+  options.end = course.end;
+  options.eps = 0.0;
+  course.steps = course.times = 0;
+  const std::shared_ptr<diracstep_integrator> handle = make_integrator(model, options);
+  const auto events = std::make_shared<std::vector<diracstep_event>>();
+  keep(handle);
+  keep(events);
+  run_course(*handle, course, points);
+  *events = events_of(*handle);
+  found.stopped = handle->event_at_end() != nullptr ? 1 : 0;
+  found.events = static_cast<long>(events->size());
+  found.event = events->data();
+  if (!handle->doubt.empty()) found.warning = keep(joined(report.warning, handle->doubt, ""));
+}
+
+/// Finds the steps through the events of the scene, and takes them.
+void solve_through_events(const diracstep_model& model, const diracstep_options& options,
+                          const diracstep_course& course, const diracstep_error& error,
+                          diracstep_points& points, diracstep_found& found) {
+  const CatalogueScene& entry = entry_of(model);
+  if (error.steps == 2)
+    throw Misuse("an error asked for takes steps of fixed size through the events of the scene");
+  const ErrorControlReport report =
+      solve_events_to_error(entry.scene, entry.all_rows, entry.events, model.registry, solvers_from(options),
+                            course.end, wanted(model, options, course, error));
+  found = found_from(report);
+  require_found(report, entry, course, points);
+  take_found_steps(model, options, report, course, points, found);
+}
+
+void solve(const diracstep_model& model, const diracstep_options& options, diracstep_course course,
            const diracstep_error& error, diracstep_points& points, diracstep_found& found) {
   require_sense(course);
   const CatalogueScene& entry = entry_of(model);
-  if (!entry.events.empty())
-    throw Misuse("an error asked for does not go with the events of the scene: name a method and a step");
-  const double end = course.ends != 0 ? course.end : end_from(model, options);
+  if (course.ends == 0) course.end = end_from(model, options);
+  const double end = course.end;
   require_inputs_until(entry, end, "the end");
+  points.count = 0;
+  if (!entry.events.empty()) return solve_through_events(model, options, course, error, points, found);
   const SolverFactory solvers = solvers_from(options);
   const ErrorControlReport report =
       solve_to_error(entry.scene, model.registry, solvers, end, wanted(model, options, course, error));
-  PointWriter writer(points, entry);
   found = found_from(report);
-  if (!report.ok()) {
-    if (report.end.q.size() > 0) writer.write(report.end);
-    if (stopped(course.stop)) throw Interruption(report.refusal);
-    throw Failure(report.refusal);
-  }
+  require_found(report, entry, course, points);
+  PointWriter writer(points, entry);
   const RunReport again =
       run_again(entry.scene, model.registry, solvers, report, momentum_from(course.momentum),
                 course.every > 0 ? course.every : 1, [&](const Sample& point) {

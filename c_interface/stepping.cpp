@@ -68,7 +68,29 @@ void take_steps(diracstep_integrator& handle, Motion& motion, long steps) {
   }
 }
 
+const std::vector<EventHit>& hits_of(const diracstep_integrator& handle) {
+  return std::visit([](const auto& motion) -> const std::vector<EventHit>& { return motion->hits(); },
+                    handle.motion);
+}
+
+diracstep_event told_of(const CatalogueScene& entry, const EventHit& hit) {
+  const Event& met = entry.events[hit.event];
+  return {met.name.c_str(),
+          hit.sample.time,
+          hit.sample.q.data(),
+          hit.sample.v.data(),
+          hit.after ? hit.after->q.data() : nullptr,
+          hit.after ? hit.after->v.data() : nullptr,
+          met.restitution ? hit.impulse : std::nan("")};
+}
+
 }  // namespace
+
+std::vector<diracstep_event> c_interface::events_of(const diracstep_integrator& handle) {
+  std::vector<diracstep_event> events;
+  for (const EventHit& hit : hits_of(handle)) events.push_back(told_of(handle.entry, hit));
+  return events;
+}
 
 std::string StepChecks::text() const {
   if (!found.empty()) return found;
@@ -142,9 +164,7 @@ int diracstep_push(diracstep_integrator* integrator, const double* force) {
 }
 
 long diracstep_count_events(const diracstep_integrator* integrator) {
-  if (integrator == nullptr) return 0;
-  return std::visit([](const auto& motion) { return static_cast<long>(motion->hits().size()); },
-                    integrator->motion);
+  return integrator != nullptr ? static_cast<long>(hits_of(*integrator).size()) : 0;
 }
 
 int diracstep_read_event(const diracstep_integrator* integrator, long k, diracstep_event* event) {
@@ -153,16 +173,6 @@ int diracstep_read_event(const diracstep_integrator* integrator, long k, diracst
     const long count = diracstep_count_events(integrator);
     if (k < 0 || k >= count)
       throw Misuse("there is no event " + std::to_string(k) + "; " + std::to_string(count) + " were met");
-    const EventHit& hit = std::visit(
-        [&](const auto& motion) -> const EventHit& { return motion->hits()[static_cast<std::size_t>(k)]; },
-        from.motion);
-    const Event& met = from.entry.events[hit.event];
-    given(event, "where the event goes") = {met.name.c_str(),
-                                            hit.sample.time,
-                                            hit.sample.q.data(),
-                                            hit.sample.v.data(),
-                                            hit.after ? hit.after->q.data() : nullptr,
-                                            hit.after ? hit.after->v.data() : nullptr,
-                                            met.restitution ? hit.impulse : std::nan("")};
+    given(event, "where the event goes") = told_of(from.entry, hits_of(from)[static_cast<std::size_t>(k)]);
   });
 }

@@ -67,6 +67,7 @@ class EventRuns {
            (options_.go_on && !options_.go_on());
   }
   std::string limit() const {
+    if (options_.go_on && !options_.go_on()) return "interrupted";
     return "not finished with the time or work allowed (--max-time, --max-solves)";
   }
   long solves_left() const { return options_.max_solves - solves_; }

@@ -13,12 +13,14 @@ Scenes come from files (``load``), from text (``parse``), from the ``catalogue``
 from __future__ import annotations
 
 from ._library import version
+from .catalogue import catalogue, load, methods, parse
 from .callbacks import GeneratingFunction
 from .command import Equilibrium, Fit, SolvedStart
+from .command import sweep_of_file as sweep
 from .errors import CallbackCost, Doubt, Error, Failure, Interrupted, Misuse
 from .integrator import Gradient, Integrator, Jacobian, State
 from .run import Ensemble, Event, Points, Run, Search, Statistics
-from .scene import Scene, catalogue, load, methods, parse
+from .scene import Scene
 from .study import Study
 from .symbols import (acos, acosh, asin, asinh, atan, atan2, atanh, cos, cosh, exp, log, maximum, minimum, pi, sin, sinh, sqrt, tan,
                       tanh)
@@ -28,5 +30,5 @@ __version__ = version()
 __all__ = ["CallbackCost", "Doubt", "Ensemble", "Equilibrium", "Error", "Event", "Failure", "Fit", "GeneratingFunction",
            "Gradient", "Integrator", "Interrupted", "Jacobian", "Misuse", "Points", "Run", "Scene", "Search", "SolvedStart",
            "State", "Statistics", "Study", "acos", "acosh", "asin", "asinh", "atan", "atan2", "atanh", "catalogue", "cos",
-           "cosh", "exp", "load", "log", "maximum", "methods", "minimum", "parse", "pi", "sin", "sinh", "sqrt", "tan",
+           "cosh", "exp", "load", "log", "maximum", "methods", "minimum", "parse", "pi", "sin", "sinh", "sqrt", "sweep", "tan",
            "tanh", "version"]

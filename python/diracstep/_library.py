@@ -13,7 +13,7 @@ from typing import Any, Callable
 
 from .errors import raised
 
-VERSION = 4  # DIRACSTEP_VERSION_OF_C_INTERFACE
+VERSION = 5  # DIRACSTEP_VERSION_OF_C_INTERFACE
 PLUGIN_VERSION = 1  # DIRACSTEP_PLUGIN_VERSION
 FILE = "libdiracstep.so.0.1"
 
@@ -163,7 +163,8 @@ class ErrorRequest(Structure):
 class Found(Structure):
     _fields_ = [("estimate", c_double), ("observed_order", c_double), ("step", c_double), ("order", c_int),
                 ("varies", c_int), ("solves", c_long), ("method", c_char_p), ("reason", c_char_p),
-                ("warning", c_char_p), ("runs", Table)]
+                ("warning", c_char_p), ("runs", Table), ("stopped", c_int), ("events", c_long),
+                ("event", POINTER(Event))]
 
 
 class Ensemble(Structure):

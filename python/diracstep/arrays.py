@@ -1,7 +1,10 @@
-"""Numbers given by the user as arrays that the library can read."""
+"""What users give, checked: numbers as arrays that the library can read, texts, flags.  Misuse names the argument."""
 
 from __future__ import annotations
 
+import numbers
+import os
+import reprlib
 from typing import Any, Mapping, Sequence
 
 import numpy as np
@@ -36,9 +39,56 @@ def table(values: Any, shape: tuple[int, ...], what: str) -> np.ndarray:
     return array
 
 
+def _refused(value: Any, what: str, needed: str) -> Misuse:
+    return Misuse(f"{what} is {reprlib.repr(value)}; {needed} is needed")
+
+
 def real(value: Any, what: str) -> float:
     """One finite number."""
-    return float(table(value, (), what))
+    if isinstance(value, np.ndarray) and value.ndim == 0:
+        value = value.item()
+    if not isinstance(value, (numbers.Real, np.bool_)):
+        raise _refused(value, what, "a number")
+    if not np.isfinite(number := float(value)):
+        raise _refused(number, what, "a finite number")
+    return number
+
+
+def reals(values: Any, what: str) -> dict[str, float]:
+    """Finite numbers by name; none for None."""
+    if values is None:
+        return {}
+    if not isinstance(values, Mapping):
+        raise _refused(values, what, "a dictionary of numbers by name")
+    return {text(name, f"a name of {what}"): real(value, f"{name} of {what}") for name, value in values.items()}
+
+
+def text(value: Any, what: str) -> str:
+    """A text."""
+    if not isinstance(value, str):
+        raise _refused(value, what, "a text")
+    return value
+
+
+def texts(values: Any, what: str) -> list[str]:
+    """A list of texts; one text alone is refused."""
+    if isinstance(values, (str, bytes, Mapping)) or not hasattr(values, "__iter__"):
+        raise _refused(values, what, "a list of texts")
+    return [text(value, f"{what}[{index}]") for index, value in enumerate(values)]
+
+
+def path(value: Any, what: str) -> str:
+    """The path of a file, as a text."""
+    if not isinstance(value, (str, os.PathLike)):
+        raise _refused(value, what, "a text or a path")
+    return str(os.fspath(value))
+
+
+def flag(value: Any, what: str) -> bool:
+    """True or False, which other values are not taken for."""
+    if not isinstance(value, (bool, np.bool_)):
+        raise _refused(value, what, "True or False")
+    return bool(value)
 
 
 def whole(value: Any, what: str, least: int = 0, most: int = 2**63 - 1) -> int:
@@ -46,9 +96,14 @@ def whole(value: Any, what: str, least: int = 0, most: int = 2**63 - 1) -> int:
     try:
         number = int(value.__index__())
     except AttributeError:
-        raise Misuse(f"{what} is {value!r}; a whole number is needed") from None
+        raise _refused(value, what, "a whole number") from None
     if number < least:
         raise Misuse(f"{what} is {number}; at least {least} is needed")
     if number > most:
         raise Misuse(f"{what} is {number}; at most {most} is taken")
     return number
+
+
+def address(array: np.ndarray | None) -> int | None:
+    """Where an array begins, for a pointer of C."""
+    return None if array is None else array.ctypes.data

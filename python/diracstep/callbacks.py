@@ -4,13 +4,18 @@ cannot be written as a formula.  They are hundreds of times slower than traced o
 from __future__ import annotations
 
 import ctypes
-from typing import Any, Callable, Mapping, Sequence
+import time
+import warnings
+from typing import TYPE_CHECKING, Any, Callable, Mapping, Sequence
 
 import numpy as np
 
 from . import _library as c
-from .errors import Misuse
+from .errors import CallbackCost, Failure, Misuse
 from .scene_text import arguments_of, scene_name
+
+if TYPE_CHECKING:
+    from .scene import Scene
 
 
 def _view(address: int, count: int) -> np.ndarray:
@@ -156,3 +161,17 @@ def _lagrangian_of(system: c.System) -> Callable[[float, Any, Any], float]:
         return result.value
 
     return evaluate
+
+
+def say_cost(scene: Scene, source: CallbackScene) -> None:
+    """Measures one step of a scene of callbacks, and warns of what it takes."""
+    try:
+        integrator = scene.integrator()
+        before, start = source.calls, time.perf_counter()
+        integrator.step()
+    except (Misuse, Failure):
+        source.exceptions.take()
+        return  # a run will tell
+    taken, calls = time.perf_counter() - start, source.calls - before
+    warnings.warn(f"{scene.name}: a step takes {taken:.2g} s, in which the Python functions are called {calls} times; traced "
+                  "functions (without callback=True) take microseconds", CallbackCost, stacklevel=3)

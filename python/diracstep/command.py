@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Any, Mapping, Sequence
 
 import numpy as np
 
-from .arrays import real, table
-from .errors import Doubt, Failure, Misuse
+from .arrays import real, table, texts, whole
+from .errors import Doubt, Failure, Misuse, spelled
 
 if TYPE_CHECKING:
     from .scene import Scene
@@ -51,6 +51,11 @@ class Verbs:
         file.write_text(text, encoding="utf-8")
         return str(file)
 
+    def beside(self) -> str:
+        """The scene for a file in the folder: a sweep is continued by a file of the same text, though the folder is another."""
+        path = Path(self.name)
+        return path.name if path.parent == self.folder else self.name
+
     def __enter__(self) -> Verbs:
         return self
 
@@ -59,29 +64,36 @@ class Verbs:
 
     def call(self, verb: str, *arguments: str, scene: bool = True) -> dict[str, Any]:
         """The document that a verb gives; ``scene``: whether it takes the scene and its parameters."""
-        call = [_command(), verb, *([self.name] if scene else []), *arguments, "--json"]
+        call = [*([self.name] if scene else []), *arguments]
         if scene:
             for name, value in self._scene._changes.items():
                 call += ["--set", f"{name}={value!r}"]
         if self._scene._again["drop_redundant"] and verb != "fit":
             call += ["--drop-redundant"]
-        for plugin in self._scene._again["plugins"]:
-            call += ["--plugin", os.fspath(plugin)]
-        done = subprocess.run(call, capture_output=True, text=True, check=False)
-        if done.returncode == 2:
-            raise Misuse(_told(done.stderr))
-        if done.returncode == 3:
-            warnings.warn(f"{self._scene.name}: {_told(done.stderr)}", Doubt, stacklevel=4)
-        elif done.returncode != 0:
-            raise Failure(_told(done.stderr))
-        return json.loads(done.stdout)
+        return call_command(verb, call, self._scene._again["plugins"], self._scene.name)
 
     def tolerances(self) -> list[str]:
         return [text for name, value in self._scene._tolerances.items() for text in ("--tolerance", f"{name}={value!r}")]
 
 
+def call_command(verb: str, arguments: Sequence[str], plugins: Sequence[str], name: str) -> Any:
+    """The document that a verb gives; ``name`` stands before a doubt."""
+    loaded = [text for plugin in plugins for text in ("--plugin", os.fspath(plugin))]
+    done = subprocess.run([_command(), verb, *arguments, *loaded, "--json"], capture_output=True, text=True, check=False)
+    if done.returncode == 2:
+        raise Misuse(_told(done.stderr))
+    if done.returncode == 3:
+        warnings.warn(f"{name}: {_told(done.stderr)}", Doubt, stacklevel=5)
+    elif done.returncode != 0:
+        raise Failure(_told(done.stderr))
+    return json.loads(done.stdout)
+
+
 def _told(text: str) -> str:
-    return "\n".join(line.removeprefix("diracstep: ") for line in text.strip().splitlines())
+    """What the command says, without the lines on its version and machine that some verbs begin with."""
+    lines = [line.removeprefix("diracstep: ") for line in text.strip().splitlines()]
+    heading = [index for index, line in enumerate(lines[:6]) if line.startswith("system: ")]
+    return spelled("\n".join(lines[heading[0] + 1:] if heading else lines))
 
 
 class Report:
@@ -137,6 +149,9 @@ class Fit(Report):
 
 def fit(scene: Scene, data: Any, parameters: Sequence[str], start: Mapping[str, float], sigma: Mapping[str, float],
         options: Sequence[str]) -> Fit:
+    parameters = texts(parameters, "parameters")
+    if not isinstance(data, (str, os.PathLike, Mapping)):
+        raise Misuse(f"data is {type(data).__name__}; the path of a file, or columns by name, 't' among them, are needed")
     with Verbs(scene) as verbs:
         file = str(data) if isinstance(data, (str, os.PathLike)) else _data_file(verbs.folder, data)
         pairs = [text for option, values in (("--from", start), ("--sigma", sigma)) for name, value in values.items()
@@ -157,31 +172,92 @@ def _data_file(folder: Path, data: Mapping[str, Any]) -> str:
     return str(file)
 
 
-def sweep(scene: Scene, grid: Mapping[str, Sequence[float]], record: Sequence[str], extrema: Sequence[str],
-          events: Sequence[str], settings: Mapping[str, Any], out: str | os.PathLike[str] | None, threads: int) -> np.ndarray:
+def sweep(scene: Scene, varied: Varied, recorded: Mapping[str, Sequence[str]], settings: Mapping[str, Any],
+          out: str | os.PathLike[str] | None, threads: int) -> np.ndarray:
     with Verbs(scene) as verbs:
-        lines = [f"scene = {json.dumps(_local(verbs))}"]
+        lines = [f"scene = {json.dumps(verbs.beside())}"]
         lines += [f"{name} = {json.dumps(value)}" for name, value in settings.items() if value is not None]
-        lines += ["[set]", *(f"{json.dumps(name)} = {value!r}" for name, value in scene._changes.items() if name not in grid)]
-        lines += ["[grid]"]
-        for name, values in grid.items():
-            numbers = table(values, (len(values),), name).tolist()
-            lines.append(f"{json.dumps(name)} = {json.dumps(numbers)}")
-        lines += ["[record]", f"values = {json.dumps(list(record))}", f"extrema = {json.dumps(list(extrema))}",
-                  f"events = {json.dumps(list(events))}"]
+        lines += varied.lines(verbs.folder, scene._changes)
+        lines += ["[record]", *(f"{what} = {json.dumps(texts(names, _ARGUMENT.get(what, what)))}" for what, names in recorded.items())]
         file = verbs.folder / "sweep.toml"
         file.write_text("\n".join(lines) + "\n", encoding="utf-8")
         where = Path(out) if out is not None else verbs.folder / "out"
         verbs.call("sweep", str(file), "--out", str(where), "--threads", str(threads), *verbs.tolerances(), scene=False)
-        return np.load(where / "results.npy")
+        return _results(where)
 
 
-def _local(verbs: Verbs) -> str:
-    """The scene beside the file of a sweep."""
-    path = Path(verbs.name)
-    if path.suffix not in (".toml", ".cir"):
-        return verbs.name
-    if path.parent != verbs.folder:
-        raise Misuse("a sweep from Python needs a scene of the catalogue, of text or of functions; for one of a file write a "
-                     "sweep's file beside it (diracstep sweep)")
-    return path.name
+def _results(folder: Path) -> np.ndarray:
+    """The table of a sweep, its texts as those of Python."""
+    results = np.load(folder / "results.npy")
+    kinds = [(name, results.dtype[name]) for name in results.dtype.names]
+    return results.astype([(name, f"U{kind.itemsize}" if kind.kind == "S" else kind) for name, kind in kinds])
+
+
+_ARGUMENT = {"values": "record"}  # of what is recorded, where the file has another name
+
+
+class Varied:
+    """What differs from member to member of a sweep, as the tables of its file."""
+
+    def __init__(self, grid: Mapping[str, Any], table: Mapping[str, Any], random: Mapping[str, Sequence[Any]],
+                 sobol: Mapping[str, Sequence[Any]], count: int | None, seed: int) -> None:
+        for what, given in (("grid", grid), ("table", table), ("random", random), ("sobol", sobol)):
+            if not isinstance(given, Mapping):
+                raise Misuse(f"{what} is {given!r}; a dictionary by name of a parameter, \"start.x\" or \"start.v_x\" is needed")
+        if not (grid or table or random or sobol):
+            raise Misuse("nothing varies: a sweep needs grid, table, random or sobol")
+        if (random or sobol) and count is None:
+            raise Misuse("random and sobol need count, the number of draws")
+        self._grid = {name: _column(values, name) for name, values in grid.items()}
+        self._table = {name: _column(values, name) for name, values in table.items()}
+        if len({len(values) for values in self._table.values()}) > 1:
+            raise Misuse("table needs columns of one length; there are " +
+                         ", ".join(f"{name} of {len(values)}" for name, values in self._table.items()))
+        self._draws = {what: [_law(name, law) for name, law in laws.items()]
+                       for what, laws in (("random", random), ("sobol", sobol)) if laws}
+        self._count = whole(count, "count", 1) if self._draws else 0
+        self._seed = whole(seed, "seed")
+
+    def lines(self, folder: Path, changes: Mapping[str, float]) -> list[str]:
+        """Lines of the file of a sweep, a table written into its folder; ``changes``: parameters of all members."""
+        lines = []
+        if self._table:
+            columns = [",".join(self._table), *(",".join(map(repr, row)) for row in zip(*self._table.values()))]
+            (folder / "members.csv").write_text("\n".join(columns) + "\n", encoding="utf-8")
+            lines += ['table = "members.csv"']
+        names = {*self._grid, *self._table, *(name for laws in self._draws.values() for name, _ in laws)}
+        lines += ["[set]", *(f"{json.dumps(name)} = {value!r}" for name, value in changes.items() if name not in names)]
+        if self._grid:
+            lines += ["[grid]", *(f"{json.dumps(name)} = {json.dumps(values)}" for name, values in self._grid.items())]
+        for what, laws in self._draws.items():
+            lines += [f"[{what}]", f"count = {self._count}", f"seed = {self._seed}", f"[{what}.of]"]
+            lines += [f"{json.dumps(name)} = {law}" for name, law in laws]
+        return lines
+
+
+def _column(values: Any, name: str) -> list[float]:
+    if np.ndim(values) != 1 or not np.size(values):
+        raise Misuse(f"{name} is {values!r}; a list of numbers is needed")
+    return table(values, (np.size(values),), name).tolist()
+
+
+def _law(name: str, law: Sequence[Any]) -> tuple[str, str]:
+    """The name and its law, ("uniform", 0.5, 2.0), as the file of a sweep writes it."""
+    if not isinstance(law, (list, tuple)) or len(law) != 3 or law[0] not in ("uniform", "log_uniform", "normal"):
+        raise Misuse(f"{name} is drawn by {law!r}; (\"uniform\", from, to), (\"log_uniform\", from, to) or "
+                     "(\"normal\", mean, deviation) is needed")
+    return name, "{ " + f"{law[0]} = [{real(law[1], name)!r}, {real(law[2], name)!r}]" + " }"
+
+
+def sweep_of_file(file: str | os.PathLike[str], *, out: str | os.PathLike[str] | None = None, threads: int = 0,
+                  plugins: Sequence[str] = ()) -> np.ndarray:
+    """Runs the file of a sweep: a structured array with a row for each member.
+
+    out: a folder to keep, which a further call continues; it holds the reasons of members that failed (``results.csv``) and a
+    page (``report.html``).  threads: 0: one for each processor.  Made by ``diracstep sweep``.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        where = Path(out) if out is not None else Path(folder) / "out"
+        call_command("sweep", [os.fspath(file), "--out", str(where), "--threads", str(whole(threads, "threads"))], plugins,
+                     str(file))
+        return _results(where)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -37,6 +38,15 @@ class CallbackCost(UserWarning):
     """A scene calls Python functions at every evaluation: what that costs."""
 
 
+def spelled(text: str) -> str:
+    """A text of the library or of the command, with options as they are spelled here: --max-time is max_time."""
+    text = text.replace('--drop-redundant, redundant = "drop" in a scene file, or IntegratorOptions::drop_redundant_rows',
+                        'drop_redundant=True, or redundant = "drop" in a scene file')
+    text = text.replace("(option `fixed`)", "(adaptive=False)")
+    text = re.sub(r"(?:set )?IntegratorOptions::(\w+)", r"\1=True", text)
+    return re.sub(r"(?<![\w-])--([a-z][a-z-]*)", lambda option: option[1].replace("-", "_"), text)
+
+
 def raised(code: int, message: str) -> Any:
     """The exception for a code of the library."""
-    return (Misuse if code == 2 else Failure)(message)
+    return (Misuse if code == 2 else Failure)(spelled(message))

@@ -7,21 +7,27 @@ import threading
 import time
 import warnings
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NoReturn, Sequence
+from typing import TYPE_CHECKING, Any, Mapping, NoReturn, Sequence
 
 import numpy as np
 
 from . import _library as c
-from .arrays import column, real, whole
-from .errors import Doubt, Misuse
+from .arrays import column, real, texts, whole
+from .errors import Doubt, Misuse, spelled
 from .options import momentum_from, options_from
 from .plan import TextTable
-from .run import Event, Statistics
+from .run import Event, Statistics, event_from
 
 if TYPE_CHECKING:
     from .scene import Scene
 
 _OK = c.OK
+
+
+def _cotangent(given: Any) -> Mapping[str, Any]:
+    if not isinstance(given, Mapping) or not set(given) <= {"q", "v", "p"}:
+        raise Misuse(f"the cotangent is {given!r}; a dictionary of columns \"q\", \"v\", \"p\" is needed")
+    return given
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +89,8 @@ class Integrator:
         raise TypeError("an integrator is not copied or pickled; save() and restore() carry its state to another one")
 
     def step(self, count: int = 1, *, size: float | None = None) -> None:
-        """Takes so many steps, or one of another size; fewer where an event of the scene ends the motion, and then no more.
+        """Takes so many steps, of another size where one is given; fewer where an event of the scene ends the motion, and then
+        no more.
 
         After a Failure the state is that before the failed step; Ctrl-C ends many steps within a fraction of a second, where the
         motion has come to by then."""
@@ -99,8 +106,11 @@ class Integrator:
                 if time.perf_counter() - begin < 0.05:
                     part *= 2
             return
-        with self._lock:
-            self._check(c.lib.step_by(self._handle, real(size, "size")))
+        size, left = real(size, "size"), whole(count, "steps")
+        while left > 0:
+            with self._lock:
+                self._check(c.lib.step_by(self._handle, size))
+            left = 0 if left > 1 and self.stopped else left - 1
 
     def _take(self, count: int) -> None:
         with self._lock:
@@ -133,7 +143,7 @@ class Integrator:
             doubt = c.lib.doubt(self._handle).decode()
         if doubt and doubt != self._told:
             self._told = doubt
-            warnings.warn(f"{self.scene.name}: {doubt}", Doubt, stacklevel=2)
+            warnings.warn(f"{self.scene.name}: {spelled(doubt)}", Doubt, stacklevel=2)
         return State(t=read.time, energy=read.energy, **columns)
 
     @property
@@ -145,9 +155,7 @@ class Integrator:
             for k in range(c.lib.count_events(self._handle)):
                 read = c.Event()
                 self._check(c.lib.read_event(self._handle, k, ctypes.byref(read)))
-                q, v, after_q, after_v = (np.ctypeslib.as_array(column, (n,)).copy() if column else None
-                                          for column in (read.q, read.v, read.after_q, read.after_v))
-                met.append(Event(read.name.decode(), read.time, q, v, after_q, after_v, read.impulse))  # type: ignore[arg-type]
+                met.append(event_from(read, n))
         return met
 
     @property
@@ -160,6 +168,7 @@ class Integrator:
 
         Parameters move the start as the scene's file says.
         """
+        parameters = texts(parameters, "parameters")
         n, wanted = len(self.scene._coordinates), self._derivatives(steps, parameters)
         inputs = 2 * n + len(parameters)
         arrays = {name: np.empty((inputs, n)) for name in "qvp"}
@@ -186,7 +195,7 @@ class Integrator:
                 seen = [np.ctypeslib.as_array(ctypes.cast(address, c.Numbers), (size,)).copy() if size else np.empty(0)
                            for address, size in ((at.q, n), (at.v, n), (at.p, n), (at.lambda_, m))]
                 state = State(at.time, seen[0], seen[1], seen[2], seen[3], at.energy, np.empty(0), np.empty(0))
-                given = cotangent(state) if callable(cotangent) else cotangent
+                given = _cotangent(cotangent(state) if callable(cotangent) else cotangent)
                 for name, to in (("q", q), ("v", v), ("p", p)):
                     if name in given:
                         np.ctypeslib.as_array(to, (n,))[:] = column(given[name], self.scene._coordinates, name)
@@ -194,6 +203,7 @@ class Integrator:
             except BaseException as error:  # noqa: BLE001  raised below
                 return kept.keep(error)
 
+        parameters = texts(parameters, "parameters")
         wanted = self._derivatives(steps, parameters)
         q, v, by_parameters = np.empty(n), np.empty(n), np.empty(len(parameters))
         wanted.q, wanted.v, wanted.by_parameters = q.ctypes.data, v.ctypes.data, by_parameters.ctypes.data

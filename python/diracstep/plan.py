@@ -14,6 +14,11 @@ class TextTable(Sequence[tuple[str, ...]]):
         self.heading = tuple(heading)
         self._rows = [tuple(row) for row in rows]
 
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, TextTable) and (self.title, self.heading, self._rows) == (other.title, other.heading, other._rows)
+
+    __hash__ = None  # type: ignore[assignment]
+
     def __len__(self) -> int:
         return len(self._rows)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Mapping, Sequence
 
 import numpy as np
@@ -48,6 +49,13 @@ class Event:
     impulse: float  #: of a contact, momentum over the unit of its row; NaN where there is none
 
 
+def event_from(read: Any, n: int) -> Event:
+    """A copy of what the library tells of an event."""
+    q, v, after_q, after_v = (np.ctypeslib.as_array(column, (n,)).copy() if column else None
+                              for column in (read.q, read.v, read.after_q, read.after_v))
+    return Event(read.name.decode(), read.time, q, v, after_q, after_v, read.impulse)  # type: ignore[arg-type]
+
+
 @dataclass(frozen=True)
 class Search:
     """How an error asked for was reached."""
@@ -62,6 +70,14 @@ class Search:
     reason: str
     warning: str
     runs: TextTable
+    stopped: bool = False  #: whether an event has ended the motion
+
+
+def search_from(found: Any) -> Search:
+    """A copy of what the library tells of a search."""
+    heading = ("step", "steps", "solves", "difference", "estimate", "order", "")
+    return Search(found.estimate, found.observed_order, found.method.decode(), found.order, found.step, bool(found.varies),
+                  found.solves, found.reason.decode(), found.warning.decode(), TextTable("", heading, found.runs.lines()), bool(found.stopped))
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -83,25 +99,10 @@ class Points:
     invariants: np.ndarray
     outputs: np.ndarray
 
-    def __len__(self) -> int:
-        """The number of points."""
-        return len(self.t)
-
-
-@dataclass(frozen=True, repr=False, eq=False)
-class Run(Points):
-    """Points of a motion, with the arrays of ``Points``, and how they came about."""
-
-    statistics: Statistics | None = None
-    search: Search | None = None  #: where an error was asked for
-    doubt: str = ""  #: empty, or why the points are not to be believed
-    interrupted: bool = False  #: whether Ctrl-C ended it
-    events: list[Event] = field(default_factory=list)  #: of the scene, in the order of time; the last ends a ``stopped`` run
-    _again: Any = None  #: makes an integrator at the start that takes the steps of this run; None where there is none
-    _places: dict[str, tuple[np.ndarray, int]] = field(default_factory=dict, init=False, compare=False)
-
-    def __post_init__(self) -> None:
-        scene, places = self.scene, self._places
+    @cached_property
+    def _places(self) -> dict[str, tuple[np.ndarray, int]]:
+        """Array and column of each quantity."""
+        scene, places = self.scene, {}
         for index, name in enumerate(scene.rows):
             places[name] = (self.lambda_, index)
         for index, name in enumerate(scene.invariants):
@@ -112,25 +113,34 @@ class Run(Points):
             places["v_" + name] = (self.v, index)
             places["p_" + name] = (self.p, index)
             places[name] = (self.q, index)
+        return places
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in self.__dict__.items() if name != "_places"}  # they are views
+
+    def __len__(self) -> int:
+        """The number of points."""
+        return len(self.t)
 
     def __getitem__(self, name: str) -> np.ndarray:
-        """One quantity along the run: ``"x"``, ``"v_x"``, ``"p_x"``, the name of a row for its force, of an invariant, of an
+        """One quantity of all points: ``"x"``, ``"v_x"``, ``"p_x"``, the name of a row for its force, of an invariant, of an
         output of the scene's file, or ``"t"`` and ``"energy"``."""
-        if name in self._places:
+        if isinstance(name, str) and name in self._places:
             array, index = self._places[name]
             return array[:, index]
         if name in ("t", "energy"):
             return getattr(self, name)
         raise KeyError(f"no quantity {name!r}; there are t, energy, " + ", ".join(self._places))
 
-    @property
-    def stopped(self) -> bool:
-        """Whether an event of the scene has ended the motion."""
-        return self.statistics is not None and self.statistics.stopped
+    def __contains__(self, name: object) -> bool:
+        """Whether ``[name]`` is known."""
+        return name in self.names
+
+    __iter__ = None  # it has points, and quantities by name: neither is what a loop would mean
 
     @property
     def names(self) -> list[str]:
-        """The quantities that ``run[name]`` knows."""
+        """The quantities that ``[name]`` knows."""
         return ["t", *self._places, "energy"]
 
     def table(self) -> Any:
@@ -144,6 +154,24 @@ class Run(Points):
                 table[name] = values
             return table
         return pandas.DataFrame(columns)
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class Run(Points):
+    """Points of a motion, with the arrays of ``Points``, and how they came about."""
+
+    statistics: Statistics | None = None
+    search: Search | None = None  #: where an error was asked for
+    doubt: str = ""  #: empty, or why the points are not to be believed
+    interrupted: bool = False  #: whether Ctrl-C ended it
+    events: list[Event] = field(default_factory=list)  #: of the scene, in the order of time; the last ends a ``stopped`` run
+    _again: Any = None  #: end, options and number of the steps of this run; None where they are not of one size
+
+    @property
+    def stopped(self) -> bool:
+        """Whether an event of the scene has ended the motion."""
+        how = self.statistics or self.search
+        return how is not None and how.stopped
 
     # ---- derivatives ----
     def jacobian(self, parameters: Sequence[str] = ()) -> Jacobian:
@@ -181,7 +209,10 @@ class Run(Points):
     def _stepped(self, what: str, *arguments: Any) -> Any:
         if self._again is None or self.statistics is not None and self.statistics.step == 0.0:
             raise Misuse("derivatives need a run of steps of fixed size to its end (adaptive=False, or a step)")
-        integrator, steps = self._again()
+        end, options, steps = self._again
+        integrator = self.scene.integrator(until=end, **options)
+        if steps is None:
+            steps = round((end - self.scene.start_time) / integrator.statistics.step)
         if what == "jacobian":
             return integrator.jacobian(steps, *arguments)
         return integrator.gradient(steps, *arguments)

@@ -4,24 +4,24 @@ from __future__ import annotations
 
 import ctypes
 import os
-import time
 import warnings
 from pathlib import Path
-from typing import Any, Callable, Iterator, Mapping, NoReturn, Sequence
+from typing import Any, Callable, Mapping, NoReturn, Sequence
 
 import numpy as np
 
 from . import _library as c
-from .arrays import column, real, table, whole
-from .callbacks import CallbackScene, GeneratingFunction
-from .command import Equilibrium, Fit, SolvedStart, Verbs, fit, sweep
-from .errors import CallbackCost, Doubt, Failure, Interrupted, Misuse, raised
+from .arrays import address, column, flag, real, reals, table, text, whole
+from .callbacks import CallbackScene, GeneratingFunction, say_cost
+from .command import Equilibrium, Fit, SolvedStart, Varied, Verbs, fit, sweep
+from .errors import Doubt, Failure, Interrupted, Misuse, raised, spelled
 from .integrator import Integrator
-from .options import momentum_from, options_from, stop_flag
+from .opening import checked, names_of, parts_of, require_names, source_of
+from .options import course_of, momentum_from, options_from, stop_flag
 from .plan import TextTable
 from .points import Points
 from .progress import Progress
-from .run import Ensemble, Event, Run, Search, Statistics
+from .run import Ensemble, Event, Run, Search, Statistics, event_from, search_from
 from .scene_text import SceneText, start_values
 from .study import Study, run_study
 
@@ -63,25 +63,27 @@ class Scene:
                  drop_redundant: bool = False, tolerances: Mapping[str, float] | None = None) -> None:
         if getattr(self, "_handle", 0):
             raise Misuse("a scene is made once")
-        coordinates, parameters = list(coordinates), dict(parameters or {})
-        if not coordinates:
-            raise Misuse("a scene needs coordinates")
+        coordinates, parameters = names_of(coordinates), reals(parameters, "parameters")
+        require_names(list(parameters), "parameters")
+        name, description = text(name, "name"), text(description, "description")
+        until, step, t = real(until, "until"), real(step, "step"), real(t, "t")
         if start is not None:
             if q is not None or v is not None or p is not None:
                 raise Misuse("start goes with no q, v or p: it holds them by name")
-            q, v, p = _parts_of(start, coordinates)
-        if callback:
+            q, v, p = parts_of(start, coordinates)
+        if flag(callback, "callback"):
             if lagrangian is None or hamiltonian or dissipation or invariants or p is not None:
                 raise Misuse("callback=True needs a lagrangian, and knows no hamiltonian, dissipation, invariants or start p")
             zeros = np.zeros(len(coordinates))
             source = CallbackScene(name, coordinates, parameters, lagrangian, rows, force,
                                    zeros if q is None else column(q, coordinates, "q"),
-                                   zeros if v is None else column(v, coordinates, "v"), real(t, "t"), real(until, "until"),
-                                   real(step, "step"))
+                                   zeros if v is None else column(v, coordinates, "v"), t, until, step)
             self._open(callbacks=source, coordinates=coordinates, plugins=plugins, methods=methods, drop_redundant=drop_redundant,
                        tolerances=tolerances)
-            _say_cost(self, source)
+            say_cost(self, source)
             return
+        if lagrangian is None and hamiltonian is None:
+            raise Misuse("a scene needs a lagrangian or a hamiltonian, such as lagrangian=lambda q, v: …")
         writer = SceneText(name, coordinates, parameters)
         writer.add("lagrangian", lagrangian)
         writer.add("hamiltonian", hamiltonian)
@@ -89,29 +91,37 @@ class Scene:
         writer.add_rows(rows)
         writer.add_force(force)
         writer.add_invariants(invariants or {})
-        text = writer.text(start_values(coordinates, q, v, p, t), until, step, {"description": description})
-        self._open(text=text, name=name, coordinates=coordinates, plugins=plugins, methods=methods, drop_redundant=drop_redundant,
-                       tolerances=tolerances)
+        written = writer.text(start_values(coordinates, q, v, p, t), until, step, {"description": description})
+        self._open(text=written, name=name, coordinates=coordinates, plugins=plugins, methods=methods,
+                   drop_redundant=drop_redundant, tolerances=tolerances)
 
     # ---- opening ----
+    @classmethod
+    def _made(cls, **given: Any) -> Scene:
+        scene = cls.__new__(cls)
+        scene._open(**given)
+        return scene
+
     def _open(self, *, name: str | None = None, text: str | None = None, callbacks: CallbackScene | None = None,
               coordinates: Sequence[str] | None = None, parameters: Mapping[str, float] | None = None,
               plugins: Sequence[str] = (), methods: Sequence[GeneratingFunction] = (), drop_redundant: bool = False,
               tolerances: Mapping[str, float] | None = None) -> None:
         self._handle = 0
         self._callbacks = callbacks
-        self._methods = list(methods)
-        self._again: dict[str, Any] = {"name": name, "text": text, "coordinates": coordinates, "plugins": list(plugins),
-                                       "methods": list(methods), "drop_redundant": drop_redundant, "tolerances": tolerances}
-        self._tolerances = {key: float(value) for key, value in (tolerances or {}).items()}
-        self._changes = {key: float(value) for key, value in (parameters or {}).items()}
-        source, kept = _source(name, text, callbacks, self._changes, plugins, self._methods, drop_redundant, self._tolerances)
+        self._tolerances = reals(tolerances, "tolerances")
+        self._changes = {key: real(value, f"the parameter {key}") for key, value in (parameters or {}).items()}
+        loaded = checked(plugins, methods, drop_redundant)
+        self._methods = loaded["methods"]
+        self._again: dict[str, Any] = {"name": name, "text": text, "coordinates": coordinates, "tolerances": self._tolerances,
+                                       **loaded}
+        source, kept = source_of(name, text, callbacks, self._changes, tolerances=self._tolerances, **loaded)
         handle = ctypes.c_void_p()
         self._check(c.lib.open(c.VERSION, ctypes.byref(source), ctypes.byref(handle)))
         del kept
         self._handle = handle.value or 0
         self._close = c.lib.close  # there until the end of the interpreter
         if name is not None and name.endswith((".toml", ".cir")) and text is None:
+            self._again["name"] = os.path.abspath(name)  # also where the process moves to another folder
             text = Path(name).read_text(encoding="utf-8")
         self.text = text  #: of the scene file; None for scenes of the catalogue, of plugins, and of callbacks
         self._read_facts(coordinates)
@@ -165,25 +175,24 @@ class Scene:
         """The same scene with other values of parameters and sizes; nothing is compiled again."""
         if self._callbacks is not None:
             raise Misuse("the parameters of a scene of callbacks are fixed; make it anew")
-        made = Scene.__new__(Scene)
-        made._open(**self._again, parameters={**self._changes, **parameters})
-        return made
+        return Scene._made(**self._again, parameters={**self._changes, **parameters})
 
     def with_tolerances(self, tolerances: Mapping[str, float]) -> Scene:
         """The same scene with absolute tolerances, in their units, of coordinates that are far smaller than others."""
         if self._callbacks is not None:
             raise Misuse("the tolerances of a scene of callbacks are stated where it is made")
-        again: dict[str, Any] = {**self._again, "tolerances": {**self._tolerances, **tolerances}}
-        made = Scene.__new__(Scene)
-        made._open(**again, parameters=self._changes)
-        return made
+        again: dict[str, Any] = {**self._again, "tolerances": {**self._tolerances, **reals(tolerances, "tolerances")}}
+        return Scene._made(**again, parameters=self._changes)
 
     def __del__(self) -> None:
         if getattr(self, "_handle", 0):
             self._close(self._handle)
 
-    def __reduce__(self) -> NoReturn:
-        raise TypeError("a scene is not copied or pickled: it belongs to the library; make it again, or with with_parameters()")
+    def __reduce__(self) -> tuple[Any, ...]:
+        """A scene is copied and pickled as what it was made from, and made anew from that."""
+        if self._callbacks is not None or self._methods:
+            raise TypeError("a scene of callbacks, or with methods in Python, is not copied or pickled: make it again")
+        return made_from, ({**self._again, "parameters": self._changes},)
 
     # ---- runs ----
     def run(self, *, until: float | None = None, steps: int | None = None, at: Any = None, every_time: float | None = None,
@@ -196,7 +205,8 @@ class Scene:
         steps: so many steps instead.  at: times to show instead of the steps, in their order; every_time: the start and each so
         much time later.  Values between steps have the order of the method, and the motion keeps its bits.
         error: a relative error at the end; the library finds method and steps, repeating the run until its estimate is below
-        (``max_solves`` and ``max_time`` in seconds limit that; ``adaptive=True`` or ``False`` decides whether steps vary).
+        (``max_solves`` and ``max_time`` in seconds limit that; ``adaptive=True`` or ``False`` decides whether steps vary, which
+        they do not through events).
         every: keeps each so-many-th point.  momentum: the representative kept as p: projected, plus or minus.
         progress: shows a bar (tqdm where installed); without it on long runs only.
         tolerances: {coordinate: absolute tolerance in its unit}, see with_tolerances.
@@ -211,13 +221,16 @@ class Scene:
         """
         if sum(choice is not None for choice in (steps, at, every_time, error)) > 1 or steps is not None and until is not None:
             raise Misuse("steps, at, every_time and error exclude each other, and steps goes with no until")
-        if tolerances:
+        if error is None and (max_solves or max_time):
+            raise Misuse("max_solves and max_time limit the search for an error, and go with error")
+        if tolerances is not None:
             return self.with_tolerances(tolerances).run(
                 until=until, steps=steps, at=at, every_time=every_time, error=error, every=every, momentum=momentum,
                 progress=progress, max_solves=max_solves, max_time=max_time, **options)
         if every_time is not None:
             at = self._times(real(every_time, "every_time"), self.until if until is None else real(until, "until"))
-        course, kept = _course(every, momentum, steps, at)
+        progress = None if progress is None else flag(progress, "progress")
+        course, kept = course_of(every, momentum, steps, at)
         if error is not None:
             return self._search(course, error, until, options, max_solves, max_time, progress)
         end = None if steps is not None else self._end(until, kept, options)
@@ -233,11 +246,8 @@ class Scene:
                 bar.show)
         taken = integrator.statistics
 
-        def again() -> tuple[Integrator, int]:
-            return self.integrator(until=end, **options), taken.steps
-
         return self._finished(points, code, message, statistics=taken, doubt=integrator.doubt,
-                              events=integrator.events, again=None if at is not None else again)
+                              events=integrator.events, again=None if at is not None else (end, options, taken.steps))
 
     def _end(self, until: float | None, times: np.ndarray, options: dict[str, Any]) -> float:
         """Where steps are to lead: as far as the times to show, where that is farther than the end of the scene."""
@@ -258,34 +268,35 @@ class Scene:
 
     def _search(self, course: Any, error: float, until: float | None, options: dict[str, Any], max_solves: int, max_time: float,
                 progress: bool | None) -> Run:
+        for name in ("eps", "smallest_step", "max_steps"):
+            if options.get(name) is not None:
+                raise Misuse(f"{name} goes with no error: the search finds the steps; max_solves and max_time limit it")
         kind = options.pop("adaptive", None)
+        kind = None if kind is None else flag(kind, "adaptive")
         request = c.ErrorRequest(error=real(error, "error"), steps=0 if kind is None else 2 if kind else 1,
                                  max_solves=whole(max_solves, "max_solves"), max_time=real(max_time, "max_time"))
         chosen, found = options_from(options, until), c.Found()
         points = self._points(_ROOM)
         told: list[Search] = []
+        events: list[Event] = []
 
         def call() -> int:
             code = c.lib.solve(self._handle, ctypes.byref(chosen), ctypes.byref(course), ctypes.byref(request), points.reference(),
                                ctypes.byref(found))
             if found.runs.columns:  # texts belong to this thread, and to its last call
-                told.append(_search_from(found))
+                told.append(search_from(found))
+                events.extend(event_from(found.event[k], self._widths["q"]) for k in range(found.events))
             return code
 
         with Progress(progress, points, 0, self.start_time, None) as bar:
             code, message = c.call_interruptibly(call, course.flag, bar.show)
         search = told[0] if told else None
         again = None
-        if search and not search.varies:
+        if search and not search.varies and not self.events:
             found_steps = {**options, "method": search.method, "order": search.order, "step": search.step}
-            again = lambda: self._found_again(until, found_steps)  # noqa: E731
-        return self._finished(points, code, message, search=search, doubt=search.warning if search else "", again=again)
-
-    def _found_again(self, until: float | None, options: dict[str, Any]) -> tuple[Integrator, int]:
-        """An integrator for what a search has found, and the steps that lead to the end."""
-        end = self.until if until is None else until
-        integrator = self.integrator(until=end, **options)
-        return integrator, round((end - self.start_time) / integrator.statistics.step)
+            again = self.until if until is None else real(until, "until"), found_steps, None
+        return self._finished(points, code, message, search=search, doubt=search.warning if search else "", events=events,
+                              again=again)
 
     def _points(self, room: int) -> Points:
         return Points(self._widths, room)
@@ -299,11 +310,11 @@ class Scene:
         if points.failure is not None:
             raise points.failure
         if code == c.INTERRUPTED:
-            warnings.warn(message, Interrupted, stacklevel=3)
+            warnings.warn(spelled(message), Interrupted, stacklevel=3)
         elif code != c.OK:
             self._raise(code, message, run)
         if doubt:
-            warnings.warn(f"{self.name}: {doubt}", Doubt, stacklevel=3)
+            warnings.warn(f"{self.name}: {spelled(doubt)}", Doubt, stacklevel=3)
         return run
 
     def ensemble(self, q: Any, v: Any = None, *, t: Any = None, until: float | None = None, steps: int | None = None,
@@ -316,13 +327,15 @@ class Scene:
         Ctrl-C ends it with KeyboardInterrupt.
         """
         starts_q = np.asarray(q)
-        members = len(starts_q) if starts_q.ndim else 0
+        if starts_q.ndim != 2:
+            raise Misuse(f"q has shape {starts_q.shape}; (members, {len(self._coordinates)}) is needed: a start in each row")
+        members = len(starts_q)
         shape = (members, len(self._coordinates))
         starts_q = table(starts_q, shape, "q")
         starts_v = None if v is None else table(v, shape, "v")
         times = None if t is None else table(t, (members,), "t")
         flag, points = stop_flag(), Points(self._widths, members, grows=False)
-        request = c.Ensemble(members=members, q=starts_q.ctypes.data, v=_address(starts_v), time=_address(times),
+        request = c.Ensemble(members=members, q=starts_q.ctypes.data, v=address(starts_v), time=address(times),
                              steps=0 if steps is None else whole(steps, "steps", 1), momentum=momentum_from(momentum),
                              threads=whole(threads, "threads", most=2**31 - 1), stop=ctypes.pointer(flag))
         request.kept = starts_q, starts_v, times  # the call may go on after a second Ctrl-C has left this function
@@ -347,7 +360,7 @@ class Scene:
                 self._raise(code, message)
         if told["doubted"]:
             member, why = next(iter(told["doubted"].items()))
-            warnings.warn(f"{self.name}: member {member}: {why}", Doubt, stacklevel=2)
+            warnings.warn(f"{self.name}: member {member}: {spelled(why)}", Doubt, stacklevel=2)
         return Ensemble(self, **points.arrays, failures=told["failed"], doubts=told["doubted"])
 
     def integrator(self, *, until: float | None = None, pushed: bool = False, **options: Any) -> Integrator:
@@ -404,18 +417,30 @@ class Scene:
         options += [] if method is None else ["--method", method]
         return fit(self, data, parameters, start or {}, sigma or {}, options)
 
-    def sweep(self, grid: Mapping[str, Sequence[float]], record: Sequence[str], *, extrema: Sequence[str] = (),
-              events: Sequence[str] = (), until: float | None = None, step: float | None = None, method: str | None = None,
-              order: int | None = None, error: float | None = None, out: str | os.PathLike[str] | None = None,
-              threads: int = 0) -> np.ndarray:
-        """One run for every combination of values: a structured array with a row for each.
+    def sweep(self, grid: Mapping[str, Sequence[float]] | None = None, record: Sequence[str] = (), *,
+              table: Mapping[str, Sequence[float]] | None = None, random: Mapping[str, Sequence[Any]] | None = None,
+              sobol: Mapping[str, Sequence[Any]] | None = None, count: int | None = None, seed: int = 0,
+              extrema: Sequence[str] = (), events: Sequence[str] = (), derivatives: Sequence[str] = (),
+              until: float | None = None, step: float | None = None, method: str | None = None, order: int | None = None,
+              rule: str | None = None, error: float | None = None, project: bool = False, checks: bool = True,
+              out: str | os.PathLike[str] | None = None, threads: int = 0) -> np.ndarray:
+        """One run for each of many parameters and starts: a structured array with a row for each.
 
-        grid: values by parameter, or by "start.x", "start.v_x".  record: columns of the end, of which extrema are taken over the
-        run where ``extrema`` names them; events: of the scene.  out: a folder to keep, which a further call continues.
-        A member that fails has its reason in the column ``status`` and NaN in the others.  Made by ``diracstep sweep``.
+        What varies has the name of a parameter, or "start.x", "start.v_x".  grid: every combination of these values.  table:
+        columns of one length, a member for each row.  random, sobol: ``count`` draws by laws, {"e": ("uniform", 0, 0.7)}, also
+        "log_uniform", and "normal" with mean and deviation.  All that is given multiplies.
+        record: columns of the end; extrema: of them over the run; events: of the scene, time of the first and how many;
+        derivatives: "d(x)/d(m)", at the end by parameters.  project: starts are moved onto the rows; checks: members are looked
+        at as runs are.
+        out: a folder to keep, which a further call continues; it holds the reasons of members that failed (``results.csv``) and a
+        page (``report.html``).  The column ``status`` says how a member ended; where it failed numbers are NaN.
+        Made by ``diracstep sweep``.
         """
-        settings = {"end": until, "step": step, "method": method, "order": order, "error": error}
-        return sweep(self, grid, record, extrema, events, settings, out, whole(threads, "threads"))
+        settings = {"end": until, "step": step, "method": method, "order": order, "rule": rule, "error": error,
+                    "project": project or None, "checks": None if checks else False}
+        varied = Varied(grid or {}, table or {}, random or {}, sobol or {}, count, seed)
+        recorded = {"values": record, "extrema": extrema, "events": events, "derivatives": derivatives}
+        return sweep(self, varied, recorded, settings, out, whole(threads, "threads"))
 
     # ---- inside ----
     def _lines(self, what: int) -> list[tuple[str, ...]]:
@@ -442,140 +467,6 @@ class Scene:
         return TextTable(self.name, ("", ""), self.about)._repr_html_() + self.plan._repr_html_()
 
 
-def _source(name: str | None, text: str | None, callbacks: CallbackScene | None, changes: Mapping[str, float],
-            plugins: Sequence[str], methods: Sequence[GeneratingFunction], drop_redundant: bool,
-            tolerances: Mapping[str, float]) -> tuple[c.Source, Any]:
-    source = c.Source(name=c.encoded(name), text=c.encoded(text), drop_redundant=int(drop_redundant))
-    if callbacks is not None:
-        source.callbacks = ctypes.pointer(callbacks.struct)
-    parameters = (c.Parameter * max(1, len(changes)))(*(c.Parameter(key.encode(), value) for key, value in changes.items()))
-    source.parameters, source.parameter = len(changes), parameters
-    files = (ctypes.c_char_p * max(1, len(plugins)))(*(os.fspath(file).encode() for file in plugins))
-    source.plugins, source.plugin = len(plugins), files
-    linked = (ctypes.POINTER(c.Plugin) * max(1, len(methods)))(*(ctypes.pointer(method.struct) for method in methods))
-    source.linked, source.linked_plugin = len(methods), linked
-    own = (c.Parameter * max(1, len(tolerances)))(*(c.Parameter(key.encode(), value) for key, value in tolerances.items()))
-    source.tolerances, source.tolerance = len(tolerances), own
-    return source, (parameters, files, linked, own)
-
-
-def _parts_of(start: Mapping[str, float], coordinates: Sequence[str]) -> tuple[Any, ...]:
-    """q, v and p by coordinate, None where there are none, of a start by names."""
-    parts: tuple[dict[str, float], ...] = {}, {}, {}
-    for name, value in start.items():
-        for part, prefix in zip(parts, ("", "v_", "p_")):
-            if name.startswith(prefix) and name[len(prefix):] in coordinates:
-                part[name[len(prefix):]] = value
-                break
-        else:
-            raise Misuse(f"start: no coordinate {name!r}; there are " + ", ".join(coordinates) + ", and v_ and p_ of them")
-    return tuple(part or None for part in parts)
-
-
-def _course(every: int, momentum: str, steps: int | None, at: Any) -> tuple[Any, np.ndarray]:
-    course = c.Course(every=whole(every, "every", 1), momentum=momentum_from(momentum))
-    course.flag = stop_flag()
-    course.stop = ctypes.pointer(course.flag)
-    times = np.empty(0)
-    if steps is not None:
-        course.steps = whole(steps, "steps", 1)
-    if at is not None:
-        times = table(np.asarray(at), (np.size(at),), "at")
-        if not times.size:
-            raise Misuse("at holds no times")
-        course.kept = times
-        course.times, course.time = times.size, times.ctypes.data
-    return course, times
-
-
-def _address(array: np.ndarray | None) -> int | None:
-    return None if array is None else array.ctypes.data
-
-
-def _search_from(found: c.Found) -> Search:
-    heading = ("step", "steps", "solves", "difference", "estimate", "order", "")
-    return Search(found.estimate, found.observed_order, found.method.decode(), found.order, found.step, bool(found.varies),
-                  found.solves, found.reason.decode(), found.warning.decode(), TextTable("", heading, found.runs.lines()))
-
-
-def _say_cost(scene: Scene, source: CallbackScene) -> None:
-    """Measures one step of a scene of callbacks, and warns of what it takes."""
-    try:
-        integrator = scene.integrator()
-        before, start = source.calls, time.perf_counter()
-        integrator.step()
-    except (Misuse, Failure):
-        source.exceptions.take()
-        return  # a run will tell
-    taken, calls = time.perf_counter() - start, source.calls - before
-    warnings.warn(f"{scene.name}: a step takes {taken:.2g} s, in which the Python functions are called {calls} times; traced "
-                  "functions (without callback=True) take microseconds", CallbackCost, stacklevel=3)
-
-
-def load(name: str | os.PathLike[str], *, plugins: Sequence[str] = (), methods: Sequence[GeneratingFunction] = (),
-         drop_redundant: bool = False, tolerances: Mapping[str, float] | None = None, **parameters: float) -> Scene:
-    """A scene from a file NAME.toml, or one of the catalogue or of a plugin by its name; parameters and sizes changed."""
-    scene = Scene.__new__(Scene)
-    scene._open(name=os.fspath(name), parameters=parameters, plugins=plugins, methods=methods, drop_redundant=drop_redundant,
-                       tolerances=tolerances)
-    return scene
-
-
-def parse(text: str, *, name: str = "text", plugins: Sequence[str] = (), methods: Sequence[GeneratingFunction] = (),
-          drop_redundant: bool = False, tolerances: Mapping[str, float] | None = None, **parameters: float) -> Scene:
-    """A scene from the text of a scene file; ``name`` stands in messages."""
-    scene = Scene.__new__(Scene)
-    scene._open(name=name, text=text, parameters=parameters, plugins=plugins, methods=methods, drop_redundant=drop_redundant,
-                       tolerances=tolerances)
-    return scene
-
-
-class _Lists:
-    """A model without a scene, for the lists of the library."""
-
-    def __init__(self, plugins: Sequence[str] = ()) -> None:
-        source, kept = _source(None, None, None, {}, plugins, (), False, {})
-        self._handle = ctypes.c_void_p()
-        c.check(c.lib.open(c.VERSION, ctypes.byref(source), ctypes.byref(self._handle)))
-        del kept
-        self._close = c.lib.close
-
-    def lines(self, what: int) -> list[tuple[str, ...]]:
-        return c.lines_of(self._handle.value or 0, what)
-
-    def __del__(self) -> None:
-        if getattr(self, "_handle", None):
-            self._close(self._handle)
-
-
-class Catalogue(Mapping[str, Scene]):
-    """The scenes that come with the library, by name; each is made when it is asked for."""
-
-    def __getitem__(self, name: str) -> Scene:
-        if name not in self:
-            raise KeyError(f"no scene {name!r}; there are " + ", ".join(self))
-        return load(name)
-
-    def __iter__(self) -> Iterator[str]:
-        return iter([name for name, in _Lists().lines(c.SCENES)])
-
-    def __len__(self) -> int:
-        return sum(1 for _ in self)
-
-    def __contains__(self, name: object) -> bool:
-        return any(name == known for known in self)
-
-    def __repr__(self) -> str:
-        return "<catalogue: " + ", ".join(self) + ">"
-
-    def _repr_html_(self) -> str:
-        described = [(name, dict(self[name].about).get("kind", ""), dict(self[name].about).get("description", "")) for name in self]
-        return TextTable("", ("scene", "kind", "description"), described)._repr_html_()
-
-
-catalogue = Catalogue()
-
-
-def methods(plugins: Sequence[str] = ()) -> TextTable:
-    """The methods, with those of plugins: name, order, whether self-adjoint, formula."""
-    return TextTable("", ("method", "order", "", "formula"), _Lists(plugins).lines(c.METHODS))
+def made_from(again: dict[str, Any]) -> Scene:
+    """A scene that was copied or pickled."""
+    return Scene._made(**again)

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import inspect
 import json
+import numbers
 import re
 import unicodedata
 from typing import Any, Callable, Mapping, Sequence
 
 import numpy as np
 
+from .arrays import real
 from .errors import Misuse
 from .symbols import Column, Expression, formulas
 
@@ -58,7 +60,10 @@ def arguments_of(function: Formula, by_name: Mapping[str, Any], what: str) -> di
     """The function's arguments by its own names of them; raises Misuse for a name that is not known."""
     if not callable(function):
         raise Misuse(f"{what} is {type(function).__name__}; a function is needed, such as lambda q, v: …")
-    wanted = inspect.signature(function).parameters.values()
+    try:
+        wanted = inspect.signature(function).parameters.values()
+    except ValueError:
+        raise Misuse(f"{what} is {function!r}, which does not tell its arguments; a function is needed, such as lambda q, v: …") from None
     unknown = [entry.name for entry in wanted if entry.name not in by_name and entry.default is entry.empty]
     if unknown:
         raise Misuse(f"{what} has an argument {unknown[0]!r}; known are " + ", ".join(by_name))
@@ -72,8 +77,9 @@ def _string(text: str) -> str:
 def _one(value: Any, what: str) -> Any:
     if isinstance(value, np.ndarray) and value.ndim == 0:
         value = value.item()
-    if isinstance(value, (list, tuple, dict, np.ndarray)):
-        raise Misuse(f"{what} returned {type(value).__name__}; one formula is needed")
+    if not isinstance(value, (Expression, numbers.Real)):
+        hint = ", written with return" if value is None else ""
+        raise Misuse(f"{what} returned {type(value).__name__}; one formula is needed{hint}")
     return value
 
 
@@ -84,6 +90,8 @@ def _by_name(values: Any, names: Sequence[str], what: str) -> dict[str, Any]:
         if unknown:
             raise Misuse(f"{what}: no coordinate {unknown[0]!r}; there are " + ", ".join(names))
         return dict(values)
+    if isinstance(values, str) or not hasattr(values, "__iter__") or np.ndim(values) == 0:
+        raise Misuse(f"{what} is {type(values).__name__}; {len(names)} entries or a dictionary by coordinate are needed")
     values = list(values)
     if len(values) != len(names):
         raise Misuse(f"{what} has {len(values)} entries; the scene has {len(names)} coordinates")
@@ -127,6 +135,8 @@ class SceneText:
                 self._add("force", scene_name(name), _one(formula, f"force on {name}"))
 
     def add_invariants(self, invariants: Mapping[str, Formula]) -> None:
+        if not isinstance(invariants, Mapping):
+            raise Misuse(f"invariants is {type(invariants).__name__}; a dictionary of functions by name is needed")
         for name, function in invariants.items():
             self._add("invariants", scene_name(name), _one(self.symbols.traced(function, f"invariant {name}"), f"invariant {name}"))
 
@@ -153,10 +163,7 @@ class SceneText:
 
 
 def _real(value: Any, what: str) -> str:
-    number = float(value)
-    if not np.isfinite(number):
-        raise Misuse(f"{what} = {number}; a finite number is needed")
-    return repr(number)
+    return repr(real(value, what))
 
 
 def start_values(coordinates: Sequence[str], q: Any, v: Any, p: Any, t: float) -> dict[str, float]:

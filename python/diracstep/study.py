@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Any, Sequence
 
 import numpy as np
 
+from .arrays import real, texts, whole
 from .command import Verbs
+from .errors import Misuse
 from .run import _pyplot
 
 if TYPE_CHECKING:
@@ -60,13 +62,21 @@ def _label(row: dict[str, Any]) -> str:
     return f"{row['method']}, order {order}" if order else str(row["method"])
 
 
+def _listed(values: Any, what: str) -> list[Any]:
+    if isinstance(values, str) or not hasattr(values, "__iter__"):
+        raise Misuse(f"{what} is {values!r}; a list of numbers is needed")
+    return list(values)
+
+
 def run_study(scene: Scene, *, methods: Sequence[str], orders: Sequence[int], steps: Sequence[float], rtols: Sequence[float],
               until: float | None, ida: bool, erk: bool, repeat: int, budget: float) -> Study:
-    arguments = ["--repeat", str(repeat), "--budget", repr(float(budget))]
-    for option, values in (("--methods", methods), ("--orders", orders), ("--steps", steps), ("--rtols", rtols)):
-        if len(values):
-            arguments += [option, ",".join(str(value) for value in values)]
-    arguments += ["--end", repr(float(until))] if until is not None else []
+    arguments = ["--repeat", str(whole(repeat, "repeat", 1)), "--budget", repr(real(budget, "budget"))]
+    given = {"methods": texts(methods, "methods"), "orders": [str(whole(order, "orders", 1)) for order in _listed(orders, "orders")],
+             "steps": [repr(real(step, "steps")) for step in _listed(steps, "steps")],
+             "rtols": [repr(real(rtol, "rtols")) for rtol in _listed(rtols, "rtols")]}
+    for option, values in given.items():
+        arguments += ["--" + option, ",".join(values)] if values else []
+    arguments += ["--end", repr(real(until, "until"))] if until is not None else []
     arguments += [] if ida else ["--without-ida"]
     arguments += [] if erk else ["--without-erk"]
     with Verbs(scene) as verbs:

@@ -111,7 +111,8 @@ class Expression:
                         "abs in place of a branch, or callback=True for a real Python function")
 
     def _compared(self, _: Any) -> Any:
-        raise TypeError("formulas are not compared: the function is called once, with symbols. A row is written as an expression "
+        raise TypeError("formulas are not compared: the function is called once, with symbols. Use ds.minimum, ds.maximum or abs in "
+                        "place of a branch, or callback=True for a real Python function; a row is written as an expression "
                         "that is zero")
 
     __lt__ = __le__ = __gt__ = __ge__ = __eq__ = __ne__ = _compared  # type: ignore[assignment]

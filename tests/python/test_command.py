@@ -47,6 +47,40 @@ def test_a_sweep_is_a_table(spring, tmp_path):
     assert np.array_equal(first, ds.load("pendulum_cartesian").sweep({"g": [5.0, 10.0]}, ["y"], until=0.5, out=kept))
     with pytest.raises(ds.Misuse, match="'m'"):
         spring.sweep({"m": [1.0]}, ["x"])
+    assert set(table["status"]) == {"ok"}
+
+
+def test_a_sweep_takes_tables_and_draws(spring, tmp_path):
+    table = spring.sweep(table={"k": [1.0, 4.0], "start.x": [2.0, 3.0]}, record=["x"], until=1.0, step=0.01, out=tmp_path / "kept")
+    assert table["x"] == pytest.approx([2 * np.cos(1.0), 3 * np.cos(2.0)], abs=1e-9)
+    again = spring.sweep(table={"k": [1.0, 4.0], "start.x": [2.0, 3.0]}, record=["x"], until=1.0, step=0.01, out=tmp_path / "kept")
+    assert np.array_equal(again, table)  # continued, although the files of the sweep lay elsewhere
+    with pytest.raises(ds.Misuse, match="another sweep"):
+        spring.sweep(table={"k": [1.0, 5.0], "start.x": [2.0, 3.0]}, record=["x"], until=1.0, step=0.01, out=tmp_path / "kept")
+    for laws in ("random", "sobol"):
+        drawn = spring.sweep(record=["x"], until=1.0, step=0.01, count=16, seed=3, derivatives=["d(x)/d(k)"],
+                             **{laws: {"k": ("log_uniform", 1.0, 4.0)}})
+        roots = np.sqrt(drawn["k"])
+        assert drawn["x"] == pytest.approx(np.cos(roots), abs=1e-9) and 1.0 <= drawn["k"].min() < 1.5 < drawn["k"].max() <= 4.0
+        assert drawn["d(x)/d(k)"] == pytest.approx(-np.sin(roots) / roots / 2, abs=1e-8)
+    for wrong, words in (({"random": {"k": ("gauss", 1, 2)}, "count": 2}, "log_uniform"), ({"sobol": {"k": ("normal", 1, 2)}}, "count"),
+                         ({"table": {"k": [1.0], "start.x": [1.0, 2.0]}}, "one length"), ({}, "nothing varies"),
+                         ({"grid": {"k": 1.0}}, "a list of numbers"), ({"grid": ["k"]}, "a dictionary")):
+        with pytest.raises(ds.Misuse, match=words):
+            spring.sweep(record=["x"], **wrong)
+
+
+def test_sweeps_of_scenes_and_sweeps_that_are_files(spring, tmp_path, monkeypatch):
+    (tmp_path / "scene.toml").write_text(spring.text)
+    (tmp_path / "sweep.toml").write_text('scene = "scene.toml"\nend = 1.0\nstep = 0.01\n[grid]\nk = [1, 4]\n[record]\nvalues = ["x"]\n')
+    table = ds.sweep(tmp_path / "sweep.toml", out=tmp_path / "out")
+    assert table["x"] == pytest.approx(np.cos([1.0, 2.0]), abs=1e-9) and (tmp_path / "out" / "report.html").exists()
+    monkeypatch.chdir(tmp_path)
+    scene = ds.load("scene.toml")
+    monkeypatch.chdir("/")
+    assert np.array_equal(scene.sweep({"k": [1.0, 4.0]}, ["x"], until=1.0, step=0.01), table)
+    with pytest.raises(ds.Misuse, match="cannot be read"):
+        ds.sweep("none.toml")
 
 
 def test_a_scene_with_files_of_its_own_stays_where_it_is(tmp_path):

@@ -118,8 +118,24 @@ set = { u = "4*(1 - x) - 3*v_x" }
     assert [event.q[0] for event in run.events] == pytest.approx(times, abs=1e-12)
 
 
+def test_an_error_asked_for_goes_through_events():
+    text = BALL.replace('9.81*y"', '9.81*y - y^2/2"')
+    run = ds.parse(text).run(error=1e-9)
+    down = np.arccos(9.81 / 10.81)  # y = 10.81 cos t - 9.81, then up with half of the speed
+    up = 10.81 * np.sin(down) / 2
+    assert [event.name for event in run.events] == ["floor", "top"] and run.search.estimate < 1e-9
+    assert run.events[0].t == pytest.approx(down, abs=1e-8) and run.events[0].after_v[0] == pytest.approx(up, abs=1e-7)
+    assert run.stopped and run.t[-1] == run.events[-1].t == pytest.approx(down + np.arctan(up / 9.81), abs=1e-8)
+    assert set(run["count"]) == {0.0, 1.0} and "stopped=True" in repr(run.search)
+    with pytest.raises(ds.Misuse, match="steps of fixed size"):
+        run.jacobian()
+    with pytest.raises(ds.Failure) as refused:
+        ds.parse(text).run(error=1e-9, max_solves=300)
+    assert len(refused.value.run) == 1 and not refused.value.run.events
+
+
 def test_what_does_not_go_with_events_is_refused(ball):
-    for options, words in (({"error": 1e-6}, "events"), ({"at": [0.1, 0.2]}, "times"), ({"every_time": 0.1}, "times")):
+    for options, words in (({"error": 1e-6, "adaptive": True}, "events"), ({"at": [0.1, 0.2]}, "times"), ({"every_time": 0.1}, "times")):
         with pytest.raises(ds.Misuse, match=words):
             ball.run(**options)
     with pytest.raises(ds.Misuse, match="events"):

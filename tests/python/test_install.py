@@ -1,6 +1,8 @@
 """The package as pip installs it from the source tree, and what it says of itself."""
 
+import ctypes
 import importlib.util
+import os
 import re
 import shutil
 import subprocess
@@ -40,6 +42,26 @@ def test_the_structs_are_those_of_the_header():
     assert declared == set(c._PROTOTYPES)
 
 
+def test_the_structs_of_the_julia_module_are_those_of_the_header():
+    from diracstep import _library as c
+
+    module = (ROOT / "julia" / "src" / "DiracStep.jl").read_text(encoding="utf-8")
+    assert int(re.search(r"interface_version = Cuint\((\d+)\)", module)[1]) == c.VERSION
+    kinds = {"Cint": ctypes.c_int, "Clong": ctypes.c_long, "Cdouble": ctypes.c_double, "Cstring": ctypes.c_char_p}
+    names = {"Parameter": c.Parameter, "Source": c.Source, "Facts": c.Facts, "Options": c.Options, "Table": c.Table, "Points": c.Points,
+             "ReadState": c.State, "Course": c.Course}
+    declared = re.findall(r"^(?:mutable )?struct (\w+)\n(.*?)^end$", module, re.DOTALL | re.MULTILINE)
+    assert set(names) <= {name for name, _ in declared}
+    for name, body in declared:
+        if name in names:
+            fields = re.findall(r"^    (\w+)::(\w+)", body, re.MULTILINE)
+            stated = [(field.rstrip("_"), kind) for field, kind in names[name]._fields_]
+            assert [field.rstrip("_") for field, _ in fields] == [field for field, _ in stated], name
+            for (field, julia), (_, kind) in zip(fields, stated):
+                assert kinds.get(julia, kind) is kind, f"{name}.{field}"
+                assert (julia == "Ptr") == (kind not in kinds.values()), f"{name}.{field}"
+
+
 def test_pip_installs_the_package(tmp_path):
     has_tools = all(importlib.util.find_spec(name) for name in ("pip", "setuptools"))
     if not has_tools:
@@ -54,3 +76,9 @@ def test_pip_installs_the_package(tmp_path):
     assert done.returncode == 0, done.stderr
     installed = {path.name for path in (tmp_path / "site" / "diracstep").iterdir() if path.suffix != ".pyc"}
     assert {"py.typed"} | {path.name for path in (ROOT / "python" / "diracstep").glob("*.py")} <= installed
+    told = "import diracstep as ds; print(ds.__file__); run = ds.load('knife_edge').run(step=0.1, until=1); print(len(run))"
+    used = subprocess.run([sys.executable, "-c", told], capture_output=True, text=True, cwd=tmp_path,
+                          env={**os.environ, "PYTHONPATH": str(tmp_path / "site")})
+    assert used.returncode == 0, used.stderr
+    file, points = used.stdout.split()
+    assert file.startswith(str(tmp_path / "site")) and points == "11"

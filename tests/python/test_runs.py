@@ -104,9 +104,9 @@ def test_a_failure_has_the_librarys_text_and_what_was_computed():
 
 
 @pytest.mark.parametrize("arguments, words", [
-    ({"step": 0.0}, "step is 0"), ({"step": "a"}, "real numbers"), ({"step": [0.1]}, "shape"), ({"until": np.nan}, "finite"),
+    ({"step": 0.0}, "step is 0"), ({"step": "a"}, "a number"), ({"step": [0.1]}, "a number"), ({"until": np.nan}, "finite"),
     ({"every": 0}, "at least 1"), ({"every": 1.5}, "whole number"), ({"steps": 3, "until": 1.0}, "exclude"),
-    ({"method": "type9/none"}, "type1/midpoint"), ({"metod": "a"}, "no option 'metod'.*method"), ({"at": []}, "no times"),
+    ({"method": "type9/none"}, "type1/midpoint"), ({"metod": "a"}, "no argument 'metod'.*method"), ({"at": []}, "no times"),
     ({"at": [1.0, 0.5]}, "ahead"), ({"rule": "none"}, "midpoint"), ({"eps": -1.0}, "above 0"), ({"order": 3}, "order"),
     ({"method": 3}, "a text"), ({"solver": "mine"}, "newton"), ({"control": "mine", "adaptive": True}, "integrating"),
 ])
@@ -141,6 +141,14 @@ def test_an_ensemble_is_its_members(spring):
         spring.ensemble(np.zeros((3, 2)))
     with pytest.raises(ds.Misuse, match="finite"):
         spring.ensemble([[np.inf]])
+
+
+def test_an_ensemble_has_its_quantities_by_name(skate):
+    ends = skate.ensemble(np.zeros((3, 3)), until=1.0, step=0.1)
+    assert np.array_equal(ends["v_x"], ends.v[:, 0]) and np.array_equal(ends["blade"], ends.lambda_[:, 0])
+    assert "blade" in ends and len(ends.table()) == 3
+    with pytest.raises(KeyError, match="no quantity 'z'"):
+        ends["z"]
 
 
 def test_an_ensemble_names_the_members_that_fail():

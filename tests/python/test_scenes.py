@@ -102,9 +102,39 @@ def test_names_are_not_changed_through_what_is_given():
         scene.coordinates = ["x"]
 
 
-def test_scenes_and_integrators_are_not_copied():
+def pickled(thing):
+    return pickle.loads(pickle.dumps(thing))
+
+
+def test_scenes_are_copied_as_what_they_were_made_from(spring, plugin, tmp_path, monkeypatch):
+    (tmp_path / "mine.toml").write_text(spring.text)
+    monkeypatch.chdir(tmp_path)
+    made = [spring.with_parameters(k=4.0), ds.load("knife_edge", g_sin_alpha=0.5), ds.load("mine.toml", k=4.0),
+            ds.parse(spring.text, tolerances={"x": 1e-12}), ds.load("knife_edge", plugins=[plugin])]
+    dumped = [pickle.dumps(scene) for scene in made]
+    monkeypatch.chdir("/")  # another process may stand elsewhere
+    for scene, bytes_of in zip(made, dumped):
+        for again in (copy.copy(scene) if scene is not made[2] else scene, pickle.loads(bytes_of)):
+            assert again.parameters == scene.parameters and again._tolerances == scene._tolerances
+            assert np.array_equal(again.run(steps=5, step=0.1).q, scene.run(steps=5, step=0.1).q)
+
+
+def test_runs_are_pickled_with_their_scene(spring):
+    for run in (spring.run(step=0.1), spring.run(error=1e-8), spring.run(at=[0.5, 1.0])):
+        again = pickled(run)
+        assert np.array_equal(again["v_x"], run["v_x"]) and again.search == run.search and again.statistics == run.statistics
+        assert again.scene.coordinates == ["x"] and again.names == run.names and copy.deepcopy(run).t is not run.t
+    run = pickled(spring.run(step=0.1))
+    assert run.gradient({"q": [1.0]}).q == pytest.approx(np.cos(6.0), abs=1e-6)
+    ends = pickled(spring.ensemble([[1.0], [2.0]], until=1.0))
+    assert ends.q[:, 0] == pytest.approx(np.cos(1.0) * np.array([1, 2]), abs=1e-6)
+
+
+def test_integrators_and_what_holds_functions_are_not_copied():
     scene = ds.load("knife_edge")
-    for thing in (scene, scene.integrator(step=0.1)):
+    with pytest.warns(ds.CallbackCost):
+        called = ds.Scene(["x"], lambda q, v: v[0] ** 2 / 2, callback=True)
+    for thing in (called, scene.integrator(step=0.1)):
         for how in (copy.copy, copy.deepcopy, pickle.dumps):
             with pytest.raises(TypeError, match="not copied"):
                 how(thing)
