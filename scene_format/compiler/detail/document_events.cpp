@@ -30,6 +30,10 @@ void DocumentReader::read_events(const toml::table& root) {
     stated.restitution = optional_formula(*event, "restitution");
     stated.on = row_names(*event, "on");
     stated.off = row_names(*event, "off");
+    for (const std::string& row : stated.on)
+      if (std::ranges::find(stated.off, row) != stated.off.end())
+        fail(place_of(event->get("off")->source()),
+             fmt::format("the row '{}' is switched on and off by the same event", row));
     stated.place = place;
     if (event->contains("set"))
       for (const Item& item : items(*event, "set")) stated.set.push_back(entry(item));

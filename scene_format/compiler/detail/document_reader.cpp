@@ -78,7 +78,7 @@ void DocumentReader::read_head(const toml::table& root) {
   document_.description = string(root, "description");
   document_.source = string(root, "source");
   document_.needs = string(root, "needs");
-  const std::string redundant = string(root, "redundant", "refuse");
+  const std::string redundant = string(root, "redundant", "drop");
   if (redundant != "drop" && redundant != "refuse")
     fail(place_of(root.get("redundant")->source()), "'redundant': expected \"drop\" or \"refuse\"");
   document_.drop_redundant_rows = redundant == "drop";
