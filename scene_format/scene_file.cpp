@@ -96,10 +96,33 @@ Event event_of(const CatalogueScene& entry, const LoadedScenePtr& loaded, const 
   return event;
 }
 
+/// Throws SceneError where the function of an event is no number at the start, forces of rows taken as 0, or
+/// the start lies behind a contact.
+void require_start_of_event(const Scene& scene, const Event& event, const SceneDocument& document,
+                            Place place) {
+  if (!event.at) return;
+  Start start = scene.start;
+  if (start.v.size() == 0) start.v = Vector::Zero(scene.dimension());
+  if (start.p.size() == 0) start.p = Vector::Zero(scene.dimension());
+  const double value = event.at({start.time, start.q, start.v, start.p, {}});
+  if (std::isnan(value))
+    throw SceneError(document.file, place,
+                     fmt::format("the function of event '{}' is not a number at the start", event.name));
+  if (event.restitution && event.direction == Event::Direction::falling && value < 0.0)
+    throw SceneError(document.file, place,
+                     fmt::format("event '{}': its function is {:g} at the start, behind the contact; it is "
+                                 "positive where there is none (direction)",
+                                 event.name, value));
+}
+
 void add_events(CatalogueScene& entry, const LoadedScenePtr& loaded) {
   const SceneProgram& program = *loaded->program;
-  for (std::size_t i = 0; i < program.events.size(); ++i)
-    entry.events.push_back(event_of(entry, loaded, program.document.events[i], program.events[i]));
+  for (std::size_t i = 0; i < program.events.size(); ++i) {
+    const SceneDocument::Event& stated = program.document.events[i];
+    entry.events.push_back(event_of(entry, loaded, stated, program.events[i]));
+    if (stated.when)
+      require_start_of_event(*entry.scene, entry.events.back(), program.document, stated.when->start);
+  }
 }
 
 /// Leaves out the rows that are off at the start; the scene with all of them where events switch some.
@@ -112,7 +135,7 @@ std::shared_ptr<const Scene> take_off_rows(const SceneDocument& document, Scene&
   if (!switched && off.empty()) return nullptr;
   auto all = std::make_shared<const Scene>(scene);
   scene = *without_rows(scene, off);
-  return all;
+  return switched ? all : nullptr;
 }
 
 /// Throws SceneError where an input ends before the span does.
@@ -146,7 +169,9 @@ CatalogueScene load(const std::shared_ptr<const CompiledScene>& compiled, const 
   entry.scene = std::make_shared<const Scene>(std::move(scene));
   project(*loaded, entry, stated);
   entry.stated_start = std::move(stated);
+  const auto switched_rows = entry.all_rows;
   if (document.drop_redundant_rows) drop_redundant_rows(entry);
+  if (!document.events.empty()) entry.all_rows = switched_rows;
   entry.kind = document.kind;
   entry.description = document.description;
   entry.source = document.source;
