@@ -37,6 +37,8 @@ class StudyInProgress {
                   const StudyOptions& options, const StudyObserver& observer)
       : entry_(scene), registry_(registry), solvers_(solvers), options_(options), observer_(observer) {
     entry_.scene = completed(scene.scene);
+    if (std::ranges::none_of(entry_.events, [](const Event& event) { return event.acts() || event.stop; }))
+      entry_.events.clear();  // what is only noted does not change the motion
     study_.scene = entry_.scene->name;
     study_.parameters = scene.parameters;
     study_.t_start = entry_.scene->start.time;
