@@ -189,7 +189,9 @@ void examine_events(const CatalogueScene& entry, const Registry& registry, const
   if (entry.events.empty()) return;
   constexpr long most_steps = 2000;
   Finding events{"motion with its events", false, ""};
-  const StepGrid grid = fit_steps(entry.scene->start.time, entry.t_end, entry.recommended.step);
+  const double start = entry.scene->start.time;
+  const StepGrid grid =
+      fit_steps(start, entry.t_end, std::copysign(entry.recommended.step, entry.t_end - start));
   try {
     EventSteps<Integrator> motion(
         entry.scene, entry.all_rows, entry.events, solvers, Momentum::projected,
