@@ -359,7 +359,7 @@ void require_files(const StudyArguments& options, const Session& session) {
 }
 
 PageEntry page_entry(const Study& study, const CatalogueScene& scene, const Session& session) {
-  History history = study.interrupted || !scene.events.empty()
+  History history = study.interrupted || !acting_events(scene).empty()
                         ? History{}
                         : record_history(scene, session.registry, session.solvers, study);
   return {study, std::move(history), scene.kind, scene.description, scene.source, time_unit(scene.notes)};
