@@ -46,7 +46,7 @@ constexpr int shown_coordinates = 40;
 constexpr int default_modes = 10;  // of a scene that is too large for full matrices
 
 Found find(const EquilibriumArguments& options, const CatalogueScene& entry) {
-  Found found{find_equilibrium(*entry.scene, entry.scene->start, options.along), {}, {}, {}};
+  Found found{find_equilibrium(*entry.scene, entry.scene->start, options.along), {}, {}, {}, {}};
   if (!found.at.ok()) return found;
   const Scene& scene = *entry.scene;
   double variation = 0.0;
