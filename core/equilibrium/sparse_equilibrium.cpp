@@ -44,6 +44,19 @@ Vector without_pattern(Eigen::Index size) {
   return numbers;
 }
 
+/// Scales the rows, or the columns, so that the largest entry of each is 1; returns by what.
+Vector balance(SparseMatrix& matrix, bool of_rows) {
+  Vector largest = Vector::Zero(matrix.rows());
+  for (Eigen::Index outer = 0; outer < matrix.outerSize(); ++outer)
+    for (SparseMatrix::InnerIterator at(matrix, outer); at; ++at) {
+      double& size = largest[of_rows ? at.row() : at.col()];
+      size = std::max(size, std::abs(at.value()));
+    }
+  const Vector scales = largest.unaryExpr([](double size) { return size > 0.0 ? 1.0 / size : 1.0; });
+  matrix = of_rows ? SparseMatrix(scales.asDiagonal() * matrix) : SparseMatrix(matrix * scales.asDiagonal());
+  return scales;
+}
+
 class SparseSearch {
  public:
   explicit SparseSearch(const Scene& scene)
@@ -141,20 +154,26 @@ class SparseSearch {
 
 SaddleFactors::SaddleFactors(const SparseMatrix& block, const SparseMatrix& one_forms,
                              const SparseMatrix& rows) {
-  const SparseMatrix matrix = saddle_matrix(block, one_forms, rows);
+  SparseMatrix matrix = saddle_matrix(block, one_forms, rows);
+  row_scales_ = Vector::Ones(matrix.rows());
+  column_scales_ = row_scales_;
+  for (int round = 0; round < 2; ++round) {  // rows and columns come in units of their own
+    row_scales_.array() *= balance(matrix, true).array();
+    column_scales_.array() *= balance(matrix, false).array();
+  }
   factors_.compute(matrix);
   if (factors_.info() != Eigen::Success) {
     singular_ = true;
     return;
   }
   const Vector probe = without_pattern(matrix.rows());
-  const double largest = matrix.nonZeros() > 0 ? matrix.coeffs().cwiseAbs().maxCoeff() : 0.0;
   const Vector answer = factors_.solve(probe);
-  singular_ =
-      !(answer.lpNorm<Eigen::Infinity>() * largest <= singular_matrix * probe.lpNorm<Eigen::Infinity>());
+  singular_ = !(answer.lpNorm<Eigen::Infinity>() <= singular_matrix);
 }
 
-Vector SaddleFactors::solve(const Vector& right) const { return factors_.solve(right); }
+Vector SaddleFactors::solve(const Vector& right) const {
+  return column_scales_.cwiseProduct(factors_.solve(row_scales_.cwiseProduct(right)));
+}
 
 Equilibrium find_sparse_equilibrium(const Scene& scene) { return SparseSearch(scene).find(); }
 

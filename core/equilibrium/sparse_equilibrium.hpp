@@ -11,12 +11,14 @@ class SaddleFactors {
  public:
   SaddleFactors(const SparseMatrix& block, const SparseMatrix& one_forms, const SparseMatrix& rows);
 
-  /// Whether rows depend on each other, or the block leaves a direction open on them, to 1e-14 of the size.
+  /// Whether rows depend on each other, or the block leaves a direction open on them, to 1e-14 of rows and
+  /// columns of like size.
   bool singular() const { return singular_; }
   Vector solve(const Vector& right) const;
 
  private:
-  Eigen::SparseLU<SparseMatrix> factors_;
+  Eigen::SparseLU<SparseMatrix> factors_;  ///< of the matrix with rows and columns of like size
+  Vector row_scales_, column_scales_;
   bool singular_ = false;
 };
 
