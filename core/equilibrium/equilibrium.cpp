@@ -76,12 +76,12 @@ class EquilibriumSearch {
     point.allowed = null_space(a);
     const Columns along = point.allowed.transpose();
     const Columns unmet = Columns::Identity(m, m) + a * following;
-    const Columns rates = following * balance_.row_derivative;  // ∂v/∂q
+    const Columns rates = following * Columns(balance_.row_derivative);  // ∂v/∂q
     const int h = balance_.on_positions;
     point.jacobian.resize(along.rows() + h + m, n);
-    point.jacobian << along * (Columns(balance_.stiffness) + balance_.damping * rates), a.topRows(h),
+    point.jacobian << along * (Columns(balance_.stiffness) + Columns(balance_.damping) * rates), a.topRows(h),
         unmet * Columns(balance_.row_derivative);
-    point.mass = along * balance_.mass;
+    point.mass = along * Columns(balance_.mass);
     point.residual.resize(n + h + m);
     Vector left = balance_.forces;
     if (m > 0) left -= a.transpose() * point.lambda;

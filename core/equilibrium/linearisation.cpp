@@ -100,9 +100,11 @@ Linearisation linearise(const Scene& given, const Equilibrium& at, double later)
   linear.velocities = mixed ? null_space(balance.one_forms) : linear.positions;
   linear.drift = drift_of(balance, linear.positions);
   const Columns &n = linear.positions, &s = linear.velocities;
-  linear.mass = s.transpose() * balance.mass * s;
-  linear.damping = s.transpose() * balance.damping * s;
-  linear.stiffness = s.transpose() * balance.stiffness * n;
+  // As full ones: their products leave exact zeros where the motion is free.
+  const Columns mass = balance.mass, damping = balance.damping, stiffness = balance.stiffness;
+  linear.mass = s.transpose() * mass * s;
+  linear.damping = s.transpose() * damping * s;
+  linear.stiffness = s.transpose() * stiffness * n;
   linear.rows = scene->rows();
   linear.redundant_rows = linear.rows - static_cast<int>(scene->dimension() - s.cols());
   const bool no_drift = linear.drift.size() == 0 || linear.drift.cwiseAbs().maxCoeff() == 0.0;
@@ -110,8 +112,8 @@ Linearisation linearise(const Scene& given, const Equilibrium& at, double later)
                         linear.damping.cwiseAbs().maxCoeff() == 0.0 &&
                         linear.mass.cwiseAbs().maxCoeff() > 0.0;
   if (s.cols() > 0)
-    set_state(linear, s.transpose() * balance.mass * linear.drift,
-              linear.stiffness + s.transpose() * balance.damping * linear.drift);
+    set_state(linear, s.transpose() * mass * linear.drift,
+              linear.stiffness + s.transpose() * damping * linear.drift);
   else
     linear.state = n.transpose() * linear.drift;  // rows alone determine the motion
   const double reach = std::max(given.start.q.lpNorm<Eigen::Infinity>(), at.q.lpNorm<Eigen::Infinity>());
