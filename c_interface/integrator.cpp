@@ -184,8 +184,10 @@ int diracstep_read(diracstep_integrator* integrator, int momentum, diracstep_sta
     write(sample.q, to.q);
     write(sample.v, to.v);
     write(sample.p, to.p);
-    write_forces(from.entry, sample, to.lambda);
-    write_numbers(from.entry, sample, to.invariants, to.outputs);
+    Sample shown = sample;
+    shown.lambda = shown_forces(from.entry, sample.time, sample.q, sample.lambda);
+    write_forces(from.entry, shown, to.lambda);
+    write_numbers(from.entry, shown, to.invariants, to.outputs);
   });
 }
 

@@ -28,7 +28,9 @@ void PointWriter::write(const Sample& point) {
   last_time_ = point.time;
 }
 
-void PointWriter::write(const Sample& point, long row) {
+void PointWriter::write(const Sample& of_run, long row) {
+  Sample point = of_run;
+  point.lambda = shown_forces(entry_, point.time, point.q, point.lambda);
   if (points_.t != nullptr) points_.t[row] = point.time;
   if (points_.energy != nullptr) points_.energy[row] = point.energy;
   write_row(point.q, points_.q, row);

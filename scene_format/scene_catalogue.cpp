@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <diracstep/core/equilibrium/force_balance.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/numerics/near_names.hpp>
 #include <diracstep/core/system/contradictory_rows.hpp>
@@ -13,6 +14,7 @@
 #include <diracstep/scene_format/scene_catalogue.hpp>
 #include <diracstep/scene_format/scene_file.hpp>
 #include <diracstep/scene_format/scene_text.hpp>
+#include <ranges>
 
 namespace diracstep {
 
@@ -36,10 +38,32 @@ void drop_redundant_rows(CatalogueScene& entry) {
   const std::vector<std::string> dependent = redundant_rows(*scene, scene->start);
   if (dependent.empty() || row_dependence(*scene, scene->start, dependent) != RowDependence::lasting) return;
   if (!contradiction(*scene, scene->start, dependent).empty()) return;  // refused by runs, with the reason
+  if (!entry.all_rows && entry.events.empty()) entry.all_rows = entry.scene;
   entry.scene = with_rows_left_out(entry.scene, dependent);
+  constexpr std::size_t most_names = 50;
   std::string names;
-  for (const std::string& name : dependent) names += (names.empty() ? "'" : ", '") + name + "'";
-  entry.changes.push_back("redundant constraints left out: " + names);
+  for (const std::string& name : dependent | std::views::take(most_names))
+    names += (names.empty() ? "'" : ", '") + name + "'";
+  if (dependent.size() > most_names)
+    names += " and " + std::to_string(dependent.size() - most_names) + " more";
+  entry.changes.push_back("redundant constraints left out: " + names +
+                          "; forces of rows are the least ones that act as theirs do");
+}
+
+Vector shown_forces(const CatalogueScene& entry, double t, const Vector& q, const Vector& lambda) {
+  constexpr Eigen::Index most_rows = 200;
+  if (!entry.all_rows || !entry.events.empty()) return lambda;
+  const std::vector<std::string> kept = entry.scene->row_names(), all = entry.all_rows->row_names();
+  const auto known = std::min(kept.size(), static_cast<std::size_t>(lambda.size()));
+  Vector forces = Vector::Zero(entry.all_rows->rows());
+  for (std::size_t row = 0, next = 0; row < all.size() && next < known; ++row)
+    if (all[row] == kept[next])
+      forces[static_cast<Eigen::Index>(row)] = lambda[static_cast<Eigen::Index>(next++)];
+  if (forces.size() > most_rows) return forces;
+  ConstraintsAtPoint rows(entry.all_rows->constraints, entry.all_rows->dimension());
+  rows.evaluate(t, q);
+  const Columns one_forms = rows.pattern().full(rows.coefficients());
+  return least_multipliers(one_forms, one_forms.transpose() * forces);
 }
 
 void set_tolerances(CatalogueScene& entry, const Parameters& tolerances) {

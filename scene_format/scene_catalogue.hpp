@@ -115,7 +115,8 @@ struct CatalogueScene {
   std::vector<InputRange> input_ranges = {};
   std::vector<Event> events = {};
   std::vector<DrawnBody> bodies = {};
-  /// The scene with the rows that are off at the start as well, where events switch some; else null.
+  /// The scene with the rows that are off at the start as well, where events switch some, or with the
+  /// redundant ones that are left out; else null.
   std::shared_ptr<const Scene> all_rows = {};
   /// Of the columns of its motions: all_rows or the scene itself.
   const Scene& shown() const { return all_rows ? *all_rows : *scene; }
@@ -139,8 +140,14 @@ CatalogueScene make_scene(const std::string& name, const Parameters& changes = {
 /// Throws Misuse where an input of the scene has no value at the end of a motion; `what` names the end.
 void require_inputs_until(const CatalogueScene& entry, double end, const std::string& what);
 
-/// Leaves out the redundant constraints (redundant_rows.hpp) and notes which.
+/// Leaves out the redundant constraints (redundant_rows.hpp) where they stay so, and notes which; without
+/// events their forces are still shown (shown_forces).
 void drop_redundant_rows(CatalogueScene& entry);
+
+/// The forces of the rows that are shown, of those of the rows of `scene` at a point: where redundant rows
+/// are left out and there are no events, of all that act alike, Aᵀ Λ = A_kᵀ Λ_k, the least in the Euclidean
+/// norm; of more than 200 rows those left out get 0.  Else they are as given.
+Vector shown_forces(const CatalogueScene& entry, double t, const Vector& q, const Vector& lambda);
 
 /// Sets Scene::tolerances of the coordinates named.  Throws Misuse for a name that is none, and for a value
 /// that is not above 0 and finite.

@@ -56,7 +56,10 @@ RecordedValue::RecordedValue(const CatalogueScene& entry, const std::string& nam
   }
 }
 
-double RecordedValue::at(const CatalogueScene& entry, const Sample& sample) const {
+double RecordedValue::at(const CatalogueScene& entry, const Sample& of_run) const {
+  Sample sample = of_run;
+  if (from_ == From::force || from_ == From::output)
+    sample.lambda = shown_forces(entry, sample.time, sample.q, sample.lambda);
   const auto i = static_cast<Eigen::Index>(index_);
   switch (from_) {
     case From::position:

@@ -63,6 +63,13 @@ TrajectoryFile::~TrajectoryFile() {
 }
 
 void TrajectoryFile::write(const Sample& sample) {
+  if (!forces_) return write_shown(sample);
+  Sample shown = sample;
+  shown.lambda = forces_(sample);
+  write_shown(shown);
+}
+
+void TrajectoryFile::write_shown(const Sample& sample) {
   std::string line = fmt::format("{:.17g}", sample.time);
   const auto add = [&line](const auto& column) {
     for (const double value : column) fmt::format_to(std::back_inserter(line), ",{:.17g}", value);

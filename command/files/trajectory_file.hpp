@@ -3,6 +3,7 @@
 #include <diracstep/core/integrator/integrator.hpp>
 #include <diracstep/files/output_file.hpp>
 #include <diracstep/scene_format/scene_catalogue.hpp>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -33,6 +34,9 @@ class TrajectoryFile {
   /// Writes what is still gathered where an exception ends the run; close() tells whether that was possible.
   ~TrajectoryFile();
 
+  /// What is written as forces of the rows, where the points of the run have those of some rows only.
+  void show_forces(std::function<Vector(const Sample&)> forces) { forces_ = std::move(forces); }
+
   /// All throw Error where the system refuses to write.
   void write(const Sample& sample);
   void close();
@@ -42,11 +46,13 @@ class TrajectoryFile {
   long lines() const { return mark_.lines; }
 
  private:
+  void write_shown(const Sample& sample);
   void put(const std::string& line);
   void flush();
 
   Eigen::Index rows_;  ///< of the scene; an integrator may know more, which are left out
   std::vector<Output> further_;
+  std::function<Vector(const Sample&)> forces_;
   OutputFile file_;
   std::string waiting_;
   Mark mark_;

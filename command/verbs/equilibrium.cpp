@@ -6,8 +6,11 @@
 #include <diracstep/command/arguments.hpp>
 #include <diracstep/command/verbs.hpp>
 #include <diracstep/core/equilibrium/eigenmodes.hpp>
+#include <diracstep/core/equilibrium/sparse_modes.hpp>
 #include <diracstep/reports/json.hpp>
+#include <diracstep/reports/modes_plot.hpp>
 #include <diracstep/reports/report.hpp>
+#include <diracstep/solvers/largest_eigenpairs.hpp>
 #include <memory>
 #include <numbers>
 #include <numeric>
@@ -20,6 +23,9 @@ namespace {
 struct EquilibriumArguments {
   std::string scene;
   bool along = false;
+  std::optional<int> modes;    ///< how many, by sparse matrices
+  std::optional<double> near;  ///< to which number
+  std::string picture;
   std::vector<std::string> set;
   bool json = false;
 };
@@ -27,7 +33,8 @@ struct EquilibriumArguments {
 /// What was found, and what it means for small motions where something was.
 struct Found {
   Equilibrium at;
-  std::optional<Linearisation> linear;
+  std::optional<Linearisation> linear;  ///< by full matrices
+  std::optional<NearestModes> nearest;  ///< by sparse ones
   std::optional<Eigenmodes> modes;
   std::string doubt;
 };
@@ -36,18 +43,30 @@ constexpr double steady = 1e-7;              // relative change of the linear eq
 constexpr std::size_t shown_components = 6;  // of a mode
 constexpr double shown_from = 1e-3;          // of its largest
 constexpr int shown_coordinates = 40;
+constexpr int default_modes = 10;  // of a scene that is too large for full matrices
 
 Found find(const EquilibriumArguments& options, const CatalogueScene& entry) {
-  Found found{find_equilibrium(*entry.scene, entry.scene->start, options.along), {}, {}, {}};
+  Found found{find_equilibrium(*entry.scene, entry.scene->start, options.along), {}, {}, {}, {}};
   if (!found.at.ok()) return found;
-  found.linear = linearise(*entry.scene, found.at, entry.t_end);
-  found.modes = eigenmodes(*found.linear);
-  if (!(found.linear->variation <= steady))
+  const Scene& scene = *entry.scene;
+  double variation = 0.0;
+  if (options.modes || options.near || needs_sparse_matrices(scene)) {
+    found.nearest = nearest_modes(scene, found.at, options.modes.value_or(default_modes), options.near,
+                                  entry.t_end, largest_eigenpairs);
+    found.modes = found.nearest->found;
+    variation = found.nearest->variation;
+  } else {
+    found.linear = linearise(scene, found.at, entry.t_end);
+    found.modes = eigenmodes(*found.linear);
+    variation = found.linear->variation;
+  }
+  if (found.nearest && !found.nearest->failure.empty())
+    found.doubt = found.nearest->failure;
+  else if (!(variation <= steady))
     found.doubt = fmt::format(
         "the linear equations change by {:.2g} of their size {} until t = {:g}: the eigenvalues hold at "
         "t = {:g} only",
-        found.linear->variation, options.along ? "along the motion" : "with the time", entry.t_end,
-        found.at.time);
+        variation, options.along ? "along the motion" : "with the time", entry.t_end, found.at.time);
   return found;
 }
 
@@ -91,7 +110,7 @@ std::string modes_text(const Scene& scene, const Eigenmodes& modes) {
   std::string text = modes.modes.empty() ? "" : aligned(rows);
   if (modes.zeros > 0)
     text += fmt::format("{} eigenvalues 0: motions that nothing draws back\n", modes.zeros);
-  return text + fmt::format("{}\n", describe(modes.stability));
+  return text;
 }
 
 std::string point_text(const CatalogueScene& entry, const Equilibrium& at) {
@@ -123,6 +142,10 @@ std::string as_text(const CatalogueScene& entry, const Found& found) {
                                  : moves        ? "a steady motion"
                                                 : "at rest",
                                  found.at.iterations, point_text(entry, found.at));
+  if (found.nearest)
+    text += fmt::format("the eigenvalues nearest to {:.6g}, by sparse matrices\n\n{}of these: {}\n",
+                        found.nearest->near, modes_text(*entry.scene, *found.modes),
+                        describe(found.modes->stability));
   if (!found.linear) return text;
   const Linearisation& linear = *found.linear;
   text += fmt::format("degrees of freedom: {} of position, {} of velocity\n", linear.positions.cols(),
@@ -130,7 +153,7 @@ std::string as_text(const CatalogueScene& entry, const Found& found) {
   if (linear.redundant_rows > 0)
     text += fmt::format("redundant constraints there: {}; the forces of rows are the least that hold it\n",
                         linear.redundant_rows);
-  return text + '\n' + modes_text(*entry.scene, *found.modes);
+  return text + '\n' + modes_text(*entry.scene, *found.modes) + describe(found.modes->stability) + '\n';
 }
 
 Json numbers_by_name(const std::vector<std::string>& names, const Vector& values,
@@ -180,6 +203,12 @@ std::string as_json(const CatalogueScene& entry, const Found& found) {
     json["mass"] = matrix_json(linear.mass);
     json["damping"] = matrix_json(linear.damping);
     json["stiffness"] = matrix_json(linear.stiffness);
+  }
+  if (found.nearest) {
+    json["near"] = found.nearest->near;
+    json["variation"] = found.nearest->variation;
+  }
+  if (found.modes) {
     json["zero_eigenvalues"] = found.modes->zeros;
     json["stability"] = describe(found.modes->stability);
     json["modes"] = Json::array();
@@ -188,11 +217,21 @@ std::string as_json(const CatalogueScene& entry, const Found& found) {
   return to_text(json, 2) + '\n';
 }
 
+void draw(const EquilibriumArguments& options, const CatalogueScene& entry, const Eigenmodes& modes,
+          Session& session) {
+  const std::string failure = draw_modes(entry.scene->name, entry.scene->coordinates, modes, options.picture);
+  if (failure.empty()) return;
+  say(failure);
+  session.exit_status = failed;
+}
+
 void equilibrium(const EquilibriumArguments& options, Session& session) {
-  const CatalogueScene entry = make_scene(session, options.scene, parameters(options.set));
+  CatalogueScene entry = make_scene(session, options.scene, parameters(options.set));
+  if (entry.events.empty() && entry.all_rows && !session.drop_redundant_rows) entry.scene = entry.all_rows;
   tell_events_left_out(entry);
   const Found found = find(options, entry);
   print(options.json ? as_json(entry, found) : as_text(entry, found));
+  if (found.modes && !options.picture.empty()) draw(options, entry, *found.modes, session);
   if (!found.at.ok()) {
     say(fmt::format("no equilibrium found: {}", found.at.failure));
     session.exit_status = failed;
@@ -211,6 +250,17 @@ void add_equilibrium(CLI::App& app, Session& session) {
   verb->add_option("SCENE", options->scene, "A scene; see diracstep list scenes")->required();
   verb->add_flag("--along", options->along,
                  "A steady motion: coordinates with a velocity at the start keep moving");
+  verb->add_option(
+          "--modes", options->modes,
+          "So many modes, the nearest to --near, by sparse matrices (default beyond 2000 coordinates: 10)")
+      ->check(CLI::Range(1, 1000))
+      ->type_name("COUNT");
+  verb->add_option("--near", options->near,
+                   "The number to which the eigenvalues of --modes are nearest (default: the slowest)")
+      ->type_name("S");
+  verb->add_option("--picture", options->picture,
+                   "Writes STEM.svg and STEM.png: eigenvalues and the first modes")
+      ->type_name("STEM");
   add_redundancy_option(*verb, session);
   add_set_option(*verb, options->set);
   verb->add_flag("--json", options->json, "One JSON document on standard output, reduced matrices included");

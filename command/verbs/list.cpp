@@ -52,6 +52,21 @@ std::string scene_table(const Session& session, bool with_parameters) {
                      with_parameters ? "" : "; --parameters tells what --set changes");
 }
 
+/// By the definition of the scene, which names the rates of states.
+std::vector<std::string> states_of(const CatalogueScene& entry) {
+  constexpr std::string_view rate = "rate of ";
+  std::vector<std::string> names;
+  for (const auto& [what, formula] : entry.definition)
+    if (what.starts_with(rate)) names.push_back(what.substr(rate.size()));
+  return names;
+}
+
+std::vector<std::string> names_of_events(const CatalogueScene& entry) {
+  std::vector<std::string> names;
+  for (const Event& event : entry.events) names.push_back(event.name);
+  return names;
+}
+
 Json scene_json(const Session& session) {
   Json scenes = Json::array();
   for (const auto& name : scene_names(session)) {
@@ -62,6 +77,8 @@ Json scene_json(const Session& session) {
                       {"class", entry.kind},
                       {"coordinates", entry.scene->coordinates},
                       {"rows", entry.scene->row_names()},
+                      {"states", states_of(entry)},
+                      {"events", names_of_events(entry)},
                       {"t_end", entry.t_end},
                       {"natural_step", entry.natural_step},
                       {"parameters", parameters},

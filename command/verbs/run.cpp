@@ -64,13 +64,15 @@ void open_trajectory(std::optional<TrajectoryFile>& file, const RunArguments& op
   if (!sensitivities.empty()) {
     std::vector<Output> columns = further_columns(entry);
     columns.insert(columns.end(), sensitivities.begin(), sensitivities.end());
-    return void(file.emplace(options.out, *entry.scene, columns));
-  }
-  if (saved)
+    file.emplace(options.out, entry.shown(), columns);
+  } else if (saved) {
     file.emplace(options.out, entry.shown(), TrajectoryFile::Mark{saved->points, saved->bytes},
                  further_columns(entry));
-  else
+  } else {
     file.emplace(options.out, entry.shown(), further_columns(entry));
+  }
+  file->show_forces(
+      [&entry](const Sample& sample) { return shown_forces(entry, sample.time, sample.q, sample.lambda); });
 }
 
 void go_on(const Checkpoint& saved, const RunArguments& options, EventSteps<Integrator>& motion) {
@@ -325,6 +327,7 @@ void require_events_found(const CatalogueScene& entry, const RunArguments& optio
 
 void take_outputs(const CatalogueScene& entry, RunResult& result) {
   if (!result.has_end()) return;
+  result.end.lambda = shown_forces(entry, result.end.time, result.end.q, result.end.lambda);
   for (const Output& output : entry.outputs)
     result.outputs.emplace_back(output.name, output.at(result.end.point()));
   for (const auto& [name, value] : result.outputs)

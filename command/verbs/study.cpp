@@ -176,8 +176,9 @@ void require_files(const StudyArguments& options, const Session& session) {
 }
 
 PageEntry page_entry(const Study& study, const CatalogueScene& scene, const Session& session) {
-  History history =
-      study.interrupted ? History{} : record_history(scene, session.registry, session.solvers, study);
+  History history = study.interrupted || !acting_events(scene).empty()
+                        ? History{}
+                        : record_history(scene, session.registry, session.solvers, study);
   return {study, std::move(history), scene.kind, scene.description, scene.source, time_unit(scene.notes)};
 }
 
@@ -207,10 +208,17 @@ class Screen {
   bool silent_, rows_, terminal_;
 };
 
+void tell_baselines_left_out(const CatalogueScene& entry) {
+  if (!acting_events(entry).empty())
+    say(fmt::format(
+        "scene '{}' is run through its events ({}), by steps of one size; the baselines know none",
+        entry.scene->name, acting_events(entry)));
+}
+
 void study(const StudyArguments& options, Session& session) {
   require_files(options, session);
   std::vector<CatalogueScene> scenes = chosen_scenes(options, session);
-  std::ranges::for_each(scenes, tell_events_left_out);
+  std::ranges::for_each(scenes, tell_baselines_left_out);
   const StudyOptions chosen = study_options(options);
   const std::string before = options.compare.empty() ? "" : earlier_study(options.compare);
   std::optional<OutputDirectory> out = report_directory(options);

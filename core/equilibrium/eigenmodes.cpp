@@ -135,15 +135,19 @@ Stability stability_of(const Eigenmodes& found) {
 
 }  // namespace
 
-Eigenmodes eigenmodes(const Linearisation& linear) {
-  if (linear.state.size() == 0) return {};
-  Eigenmodes found =
-      linear.conservative && positive_masses(linear.mass) ? of_conservative(linear) : of_state(linear);
+void finish(Eigenmodes& found) {
   std::ranges::sort(found.modes, [](const Mode& a, const Mode& b) {
     return std::pair(a.eigenvalue.imag(), a.eigenvalue.real()) <
            std::pair(b.eigenvalue.imag(), b.eigenvalue.real());
   });
   found.stability = stability_of(found);
+}
+
+Eigenmodes eigenmodes(const Linearisation& linear) {
+  if (linear.state.size() == 0) return {};
+  Eigenmodes found =
+      linear.conservative && positive_masses(linear.mass) ? of_conservative(linear) : of_state(linear);
+  finish(found);
   return found;
 }
 

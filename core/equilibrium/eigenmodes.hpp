@@ -31,6 +31,9 @@ struct Eigenmodes {
 /// their eigenvalues are real or imaginary.
 Eigenmodes eigenmodes(const Linearisation& linear);
 
+/// Puts modes in their order and reads the stability off them.
+void finish(Eigenmodes& found);
+
 const char* describe(Stability stability);
 
 }  // namespace diracstep

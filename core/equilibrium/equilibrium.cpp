@@ -4,6 +4,7 @@
 #include <cmath>
 #include <diracstep/core/equilibrium/equilibrium.hpp>
 #include <diracstep/core/equilibrium/force_balance.hpp>
+#include <diracstep/core/equilibrium/sparse_equilibrium.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <optional>
 
@@ -17,19 +18,6 @@ constexpr double near_the_end = 1e-8;      // of the largest coordinate; round-o
 constexpr double smallest_change = 1e-13;  // of the largest coordinate
 constexpr int max_path_steps = 400;
 constexpr double shortest_path_step = 1e-6;
-
-/// In the order of the scene's rows, of values in that of a balance.
-Vector in_order_of_rows(const Scene& scene, const ForceBalance& balance, const Vector& sorted) {
-  Vector values(scene.rows());
-  Eigen::Index on_positions = 0, other = balance.on_positions, at = 0;
-  for (const auto& block : scene.constraints) {
-    Eigen::Index& from = is_on_positions(*block) ? on_positions : other;
-    values.segment(at, block->rows()) = sorted.segment(from, block->rows());
-    at += block->rows();
-    from += block->rows();
-  }
-  return values;
-}
 
 /// Newton's method for q, with v and λ as functions of it.
 class EquilibriumSearch {
@@ -73,7 +61,7 @@ class EquilibriumSearch {
   Point evaluate(const Vector& q) {
     Point point{q, wanted_v_, {}, {}, {}, {}, {}};
     balance_.evaluate(time_, q, wanted_v_);
-    const Columns& a = balance_.one_forms;
+    const Columns a = balance_.one_forms;
     const auto n = q.size(), m = a.rows();
     const Columns of_moving = a(Eigen::all, moving_);
     Columns following = Columns::Zero(n, m);  // v of the moving coordinates that meets rows: −A_F⁺
@@ -88,12 +76,12 @@ class EquilibriumSearch {
     point.allowed = null_space(a);
     const Columns along = point.allowed.transpose();
     const Columns unmet = Columns::Identity(m, m) + a * following;
-    const Columns rates = following * balance_.row_derivative;  // ∂v/∂q
+    const Columns rates = following * Columns(balance_.row_derivative);  // ∂v/∂q
     const int h = balance_.on_positions;
     point.jacobian.resize(along.rows() + h + m, n);
-    point.jacobian << along * (balance_.stiffness + balance_.damping * rates), a.topRows(h),
-        unmet * balance_.row_derivative;
-    point.mass = along * balance_.mass;
+    point.jacobian << along * (Columns(balance_.stiffness) + Columns(balance_.damping) * rates), a.topRows(h),
+        unmet * Columns(balance_.row_derivative);
+    point.mass = along * Columns(balance_.mass);
     point.residual.resize(n + h + m);
     Vector left = balance_.forces;
     if (m > 0) left -= a.transpose() * point.lambda;
@@ -176,7 +164,7 @@ class EquilibriumSearch {
     const Vector change = Vector::Constant(q.size(), size_);
     Vector sizes(point.residual.size());
     sizes << balance_.sizes + balance_.stiffness.cwiseAbs() * change,
-        balance_.one_forms.topRows(balance_.on_positions).cwiseAbs() * (q + change),
+        Vector(balance_.one_forms.cwiseAbs() * (q + change)).head(balance_.on_positions),
         balance_.one_forms.cwiseAbs() * point.v.cwiseAbs() +
             balance_.row_derivative.cwiseAbs() * (q + change) +
             (balance_.velocity - balance_.one_forms * point.v).cwiseAbs();
@@ -201,7 +189,7 @@ class EquilibriumSearch {
   }
 
   Equilibrium result(const Point& point) const {
-    return {time_, point.q, point.v, in_order_of_rows(scene_, balance_, point.lambda), iterations_, {}};
+    return {time_, point.q, point.v, balance_.in_order_of_scene(point.lambda), iterations_, {}};
   }
 
   std::string left_at(const Point& point, Eigen::Index equation) const {
@@ -238,6 +226,12 @@ class EquilibriumSearch {
 }  // namespace
 
 Equilibrium find_equilibrium(const Scene& scene, const Start& start, bool along_start) {
+  if (needs_sparse_matrices(scene)) {
+    if (along_start)
+      throw Misuse("scene '" + scene.name +
+                   "': steady motions are looked for with full matrices, of 2000 at most");
+    return find_sparse_equilibrium(*with_start(scene, start));
+  }
   const auto extended = with_start_and_hidden_rows(scene, start);
   Equilibrium found = EquilibriumSearch(*extended, extended->start, along_start).find();
   found.lambda.conservativeResize(scene.rows());  // hidden rows stand behind and carry no force

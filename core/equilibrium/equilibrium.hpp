@@ -34,7 +34,12 @@ struct Equilibrium {
 /// depends on the moving coordinates; Linearisation::variation tells.
 ///
 /// Damped by following Newton's path: a step counts when the residual there is what the path predicts.
-/// Matrices are full.  Throws Misuse for more than 2000 coordinates or rows, and what completed() throws.
+/// Matrices are full up to 2000 coordinates and rows.  Beyond, they are sparse, all rows must be on positions
+/// and independent, the equilibrium isolated, and it cannot be asked for along_start.  Throws Misuse, and
+/// what completed() throws.
 Equilibrium find_equilibrium(const Scene& scene, const Start& start, bool along_start = false);
+
+/// Whether a scene is too large for full matrices.
+bool needs_sparse_matrices(const Scene& scene);
 
 }  // namespace diracstep

@@ -12,11 +12,10 @@ namespace {
 constexpr int most_full = 2000;  // coordinates, and rows
 constexpr double dependent_row = 1e-10;
 
-void require_full_size(const Scene& scene) {
-  if (scene.dimension() <= most_full && scene.rows() <= most_full) return;
-  throw Misuse("scene '" + scene.name + "' has " + std::to_string(scene.dimension()) + " coordinates and " +
-               std::to_string(scene.rows()) + " rows; equilibria are looked for with full matrices, of " +
-               std::to_string(most_full) + " at most");
+SparseMatrix with_values(const SparsityPattern& pattern, const Vector& values) {
+  return Eigen::Map<const SparseMatrix>(pattern.rows(), pattern.columns(), pattern.nonzeros(),
+                                        pattern.column_starts().data(), pattern.row_indices().data(),
+                                        values.data());
 }
 
 ConstraintBlocks positions_first(const ConstraintBlocks& blocks) {
@@ -56,21 +55,21 @@ void ForceBalance::evaluate(double t, const Vector& q, const Vector& v) {
   const Eigen::Index n = v.size();
   LagrangianDerivatives l(lagrangian);
   l.take_second(lagrangian, t, q, v);
-  const Columns lqv = pattern.full(l.qv);
+  const SparseMatrix lqv = with_values(pattern, l.qv);
   Vector lq(n), lv(n), rate(n), f = Vector::Zero(n);
   lagrangian.gradient(t, q, v, lq, lv);
   lagrangian.gradient_rate(t, q, v, rate);
   const Vector convective = lqv.transpose() * v;
-  mass = pattern.full(l.vv);
-  damping = lqv.transpose() - lqv;
-  free_stiffness_ = -pattern.full(l.qq);
+  mass = with_values(pattern, l.vv);
+  damping = SparseMatrix(lqv.transpose()) - lqv;
+  free_stiffness_ = -with_values(pattern, l.qq);
   if (scene_.force) {
     const SparsityPattern& of_force = scene_.force->pattern();
     Vector by_q(of_force.nonzeros()), by_v = by_q;
     scene_.force->value(t, q, v, f);
     scene_.force->derivatives(t, q, v, by_q, by_v);
-    damping -= of_force.full(by_v);
-    free_stiffness_ -= of_force.full(by_q);
+    damping -= with_values(of_force, by_v);
+    free_stiffness_ -= with_values(of_force, by_q);
   }
   forces = convective + rate - lq - f;
   free_sizes_ = convective.cwiseAbs() + rate.cwiseAbs() + lq.cwiseAbs() + f.cwiseAbs();
@@ -81,20 +80,22 @@ void ForceBalance::evaluate_rows() {
   const int m = rows_.rows();
   position.resize(on_positions);
   velocity.setZero(m);
-  one_forms = row_derivative = Columns::Zero(m, v_.size());
+  one_forms = row_derivative = SparseMatrix(m, v_.size());
   if (m == 0) return;
   rows_.evaluate(t_, q_);
-  one_forms = rows_.pattern().full(rows_.coefficients());
+  one_forms = with_values(rows_.pattern(), rows_.coefficients());
   velocity = rows_.offsets();
   // At rest the time stands still, and rows on positions that it moves ask for no velocity.
   const double passing = v_.lpNorm<Eigen::Infinity>() > 0.0 ? 1.0 : 0.0;
   velocity.head(on_positions) *= passing;
   velocity += one_forms * v_;
-  Vector derivative(rows_.pattern().nonzeros());
+  Vector derivative(rows_.pattern().nonzeros()), of_positions = derivative;
   rows_.distribution().derivative(t_, q_, v_, 1.0, derivative);
-  row_derivative = rows_.pattern().full(derivative);
-  rows_.distribution().derivative(t_, q_, v_, passing, derivative);
-  row_derivative.topRows(on_positions) = rows_.pattern().full(derivative).topRows(on_positions);
+  rows_.distribution().derivative(t_, q_, v_, passing, of_positions);
+  rows_.pattern().for_each([&](Eigen::Index k, int row, int) {
+    if (row < on_positions) derivative[k] = of_positions[k];
+  });
+  row_derivative = with_values(rows_.pattern(), derivative);
   const Vector kept = one_forms * (q_ - scene_.start.q) + (t_ - scene_.start.time) * rows_.offsets();
   int row = 0;
   for (const auto& block : blocks_) {
@@ -113,20 +114,49 @@ void ForceBalance::set_multipliers(const Vector& lambda) {
   for (const auto& block : blocks_) {
     Vector curvature(block->curvature_pattern().nonzeros());
     block->annihilator_derivative(t_, q_, lambda.segment(row, block->rows()), curvature);
-    stiffness -= block->curvature_pattern().full(curvature);
+    stiffness -= with_values(block->curvature_pattern(), curvature);
     row += block->rows();
   }
   sizes = free_sizes_ + stiffness.cwiseAbs() * q_.cwiseAbs();
   if (row > 0) sizes += one_forms.cwiseAbs().transpose() * lambda.cwiseAbs();
 }
 
-std::shared_ptr<const Scene> with_start_and_hidden_rows(const Scene& scene, const Start& start) {
-  require_full_size(scene);
+std::vector<Eigen::Index> ForceBalance::places() const {
+  std::vector<Eigen::Index> places;
+  Eigen::Index of_positions = 0, other = on_positions;
+  for (const auto& block : scene_.constraints) {
+    Eigen::Index& from = is_on_positions(*block) ? of_positions : other;
+    for (int r = 0; r < block->rows(); ++r) places.push_back(from++);
+  }
+  return places;
+}
+
+Vector ForceBalance::in_order_of_scene(const Vector& here) const { return here(places()); }
+
+Vector ForceBalance::in_order_here(const Vector& of_scene) const {
+  Vector here(of_scene.size());
+  here(places()) = of_scene;
+  return here;
+}
+
+bool needs_sparse_matrices(const Scene& scene) {
+  return scene.dimension() > most_full || scene.rows() > most_full;
+}
+
+std::shared_ptr<const Scene> with_start(const Scene& scene, const Start& start) {
   if (scene.space)
     throw Misuse("scene '" + scene.name + "': equilibria and linear equations are known in R^n only");
   auto copy = std::make_shared<Scene>(scene);
   copy->start = start;
-  return with_hidden_rows(with_lagrangian(*copy));
+  return with_lagrangian(*copy);
+}
+
+std::shared_ptr<const Scene> with_start_and_hidden_rows(const Scene& scene, const Start& start) {
+  if (needs_sparse_matrices(scene))
+    throw Misuse("scene '" + scene.name + "' has " + std::to_string(scene.dimension()) + " coordinates and " +
+                 std::to_string(scene.rows()) + " rows; the full matrices that this takes have " +
+                 std::to_string(most_full) + " at most");
+  return with_hidden_rows(with_start(scene, start));
 }
 
 Vector least_multipliers(const Columns& one_forms, const Vector& forces) {

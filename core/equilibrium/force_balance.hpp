@@ -1,12 +1,16 @@
 #pragma once
 
+#include <Eigen/SparseCore>
+#include <diracstep/core/equilibrium/equilibrium.hpp>
 #include <diracstep/core/system/constraint_distribution.hpp>
 #include <diracstep/core/system/scene.hpp>
 
 namespace diracstep {
 
-/// The equations of motion without acceleration, and their derivatives, as full matrices: what equilibria and
-/// linear equations about them are made of.  Third derivatives of L are left out; they vanish at rest and
+using SparseMatrix = Eigen::SparseMatrix<double>;
+
+/// The equations of motion without acceleration, and their derivatives: what equilibria and linear equations
+/// about them are made of.  Third derivatives of L are left out; they vanish at rest and
 /// along motions that nothing depends on.
 class ForceBalance {
  public:
@@ -20,31 +24,39 @@ class ForceBalance {
 
   Vector forces;  ///< (∂²L/∂v∂q) v + ∂²L/∂v∂t − ∂L/∂q − f, which is to be Aᵀλ
   Vector sizes;   ///< of its terms, and of what round-off in q makes of them
-  Vector position, velocity;         ///< φ of the holonomic rows; A v + b of all
-  Columns mass, damping, stiffness;  ///< M, C, K of linearise()
-  Columns one_forms;                 ///< A, holonomic rows first
-  Columns row_derivative;            ///< ∂(A v + b)/∂q
+  Vector position, velocity;              ///< φ of the holonomic rows; A v + b of all
+  SparseMatrix mass, damping, stiffness;  ///< M, C, K of linearise()
+  SparseMatrix one_forms;                 ///< A, holonomic rows first
+  SparseMatrix row_derivative;            ///< ∂(A v + b)/∂q
   /// How many rows are on positions: holonomic ones, and nonholonomic ones with constant A, which keep A q as
   /// it is at the scene's start.
   int on_positions = 0;
 
   /// The blocks in the order of the rows here.
   const ConstraintBlocks& blocks() const { return blocks_; }
+  /// Values of rows in the order of the scene's rows, of those in the order here, and back.
+  Vector in_order_of_scene(const Vector& here) const;
+  Vector in_order_here(const Vector& of_scene) const;
 
  private:
   void evaluate_rows();
+  /// For each row of the scene its place here.
+  std::vector<Eigen::Index> places() const;
 
   const Scene& scene_;
   ConstraintBlocks blocks_;
   ConstraintsAtPoint rows_;
   double t_ = 0.0;
   Vector q_, v_;
-  Columns free_stiffness_;  ///< without the rows
+  SparseMatrix free_stiffness_;  ///< without the rows
   Vector free_sizes_;
 };
 
-/// The scene with another start, completed, and with its hidden rows below its own (hidden_rows.hpp).  Throws
-/// Misuse where it is too large for full matrices.
+/// The scene with a Lagrangian and another start, completed.  Throws Misuse for scenes on groups.
+std::shared_ptr<const Scene> with_start(const Scene& scene, const Start& start);
+
+/// That with its hidden rows below its own (hidden_rows.hpp).  Throws Misuse where it is too large for full
+/// matrices.
 std::shared_ptr<const Scene> with_start_and_hidden_rows(const Scene& scene, const Start& start);
 
 /// The multiplier of least norm with Aᵀλ ≈ forces in least squares.

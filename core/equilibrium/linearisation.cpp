@@ -25,7 +25,11 @@ struct BalanceAt {
   Vector left;  ///< of the forces
 };
 
-double relative_change(const Columns& from, const Columns& to) {
+double largest_entry(const SparseMatrix& matrix) {
+  return matrix.nonZeros() > 0 ? matrix.coeffs().cwiseAbs().maxCoeff() : 0.0;
+}
+
+double relative_change(const SparseMatrix& from, const SparseMatrix& to) {
   const double size = from.norm();
   return size > 0.0 ? (to - from).norm() / size : to.norm();
 }
@@ -39,10 +43,11 @@ double variation_between(const BalanceAt& first, const BalanceAt& second, double
         std::pair{&a.one_forms, &b.one_forms}})
     largest = std::max(largest, relative_change(*from, *to));
   const double size = std::max(a.sizes.lpNorm<Eigen::Infinity>(), b.sizes.lpNorm<Eigen::Infinity>()) +
-                      reach * a.stiffness.lpNorm<Eigen::Infinity>();
+                      reach * largest_entry(a.stiffness);
   if (size > 0.0) largest = std::max(largest, second.left.lpNorm<Eigen::Infinity>() / size);
   if (b.on_positions == 0) return largest;
-  const double position = (b.one_forms.topRows(b.on_positions).cwiseAbs() * second.q.cwiseAbs()).maxCoeff();
+  const double position =
+      Vector(b.one_forms.cwiseAbs() * second.q.cwiseAbs()).head(b.on_positions).maxCoeff();
   const double moved = b.position.lpNorm<Eigen::Infinity>();
   return std::max(largest, position > 0.0 ? moved / position : moved > 0.0 ? 1.0 : 0.0);
 }
@@ -80,7 +85,7 @@ Columns drift_of(const ForceBalance& balance, const Columns& positions) {
   asked.topRows(balance.on_positions).setZero();
   if (asked.size() == 0 || asked.cwiseAbs().maxCoeff() == 0.0)
     return Columns::Zero(positions.rows(), positions.cols());
-  return -balance.one_forms.completeOrthogonalDecomposition().solve(asked * positions);
+  return -Columns(balance.one_forms).completeOrthogonalDecomposition().solve(asked * positions);
 }
 
 }  // namespace
@@ -90,14 +95,16 @@ Linearisation linearise(const Scene& given, const Equilibrium& at, double later)
   const BalanceAt here(*scene, at.time, at.q, at.v);
   const ForceBalance& balance = here.balance;
   Linearisation linear;
-  linear.positions = null_space(balance.one_forms.topRows(balance.on_positions));
+  linear.positions = null_space(Columns(balance.one_forms).topRows(balance.on_positions));
   const bool mixed = balance.on_positions < balance.one_forms.rows();
   linear.velocities = mixed ? null_space(balance.one_forms) : linear.positions;
   linear.drift = drift_of(balance, linear.positions);
   const Columns &n = linear.positions, &s = linear.velocities;
-  linear.mass = s.transpose() * balance.mass * s;
-  linear.damping = s.transpose() * balance.damping * s;
-  linear.stiffness = s.transpose() * balance.stiffness * n;
+  // As full ones: their products leave exact zeros where the motion is free.
+  const Columns mass = balance.mass, damping = balance.damping, stiffness = balance.stiffness;
+  linear.mass = s.transpose() * mass * s;
+  linear.damping = s.transpose() * damping * s;
+  linear.stiffness = s.transpose() * stiffness * n;
   linear.rows = scene->rows();
   linear.redundant_rows = linear.rows - static_cast<int>(scene->dimension() - s.cols());
   const bool no_drift = linear.drift.size() == 0 || linear.drift.cwiseAbs().maxCoeff() == 0.0;
@@ -105,8 +112,8 @@ Linearisation linearise(const Scene& given, const Equilibrium& at, double later)
                         linear.damping.cwiseAbs().maxCoeff() == 0.0 &&
                         linear.mass.cwiseAbs().maxCoeff() > 0.0;
   if (s.cols() > 0)
-    set_state(linear, s.transpose() * balance.mass * linear.drift,
-              linear.stiffness + s.transpose() * balance.damping * linear.drift);
+    set_state(linear, s.transpose() * mass * linear.drift,
+              linear.stiffness + s.transpose() * damping * linear.drift);
   else
     linear.state = n.transpose() * linear.drift;  // rows alone determine the motion
   const double reach = std::max(given.start.q.lpNorm<Eigen::Infinity>(), at.q.lpNorm<Eigen::Infinity>());

@@ -26,6 +26,10 @@ class EquilibriumVerb : public Command {
     EXPECT_EQ(outcome.status, 0) << outcome.err;
     return Json::parse(outcome.out);
   }
+  /// Whether Spectra was there when the command was built.
+  bool has_sparse_modes() const {
+    return run("equilibrium hanging_chain --set N=9 --modes 1").err.find("Spectra") == std::string::npos;
+  }
   void expect_eigenvalues(const Json& json, const std::vector<std::complex<double>>& published) const {
     const auto all = eigenvalues_in(json);
     ASSERT_EQ(all.size(), published.size()) << json["modes"];
@@ -130,6 +134,74 @@ TEST_F(EquilibriumVerb, AHangingChainVibratesAsAChainOfLinksDoes) {
   const double g = json["parameters"]["g"];
   EXPECT_NEAR(all[0].imag(), std::sqrt(2.0 * g * (2.0 - std::sqrt(2.0))), 1e-10);
   EXPECT_NEAR(all[1].imag(), std::sqrt(2.0 * g * (2.0 + std::sqrt(2.0))), 1e-10);
+}
+
+/// L_n(x) of Laguerre and its derivative.
+std::pair<double, double> laguerre(int n, double x) {
+  double last = 1.0, value = 1.0 - x;
+  for (int k = 1; k < n; ++k) {
+    const double next = ((2.0 * k + 1.0 - x) * value - k * last) / (k + 1.0);
+    last = value;
+    value = next;
+  }
+  return {value, n * (value - last) / x};
+}
+
+/// N equal links with masses at their ends: ω² N = x g/length with L_N(x) = 0 (Laguerre).
+TEST_F(EquilibriumVerb, SparseModesOfAChainBeyondFullMatricesAreZerosOfLaguerre) {
+  if (!has_sparse_modes()) GTEST_SKIP() << "built without Spectra";
+  constexpr int links = 1200;  // 2400 coordinates
+  const Json json = found("hanging_chain --set N=1200 --modes 4");
+  const auto all = eigenvalues_in(json);
+  ASSERT_GE(all.size(), 4U);
+  const std::vector<double> bessel_zeros{2.404825557695773, 5.520078110286311, 8.653727912911013,
+                                         11.79153443901428};  // of J_0, near which those of L_N begin
+  for (std::size_t k = 0; k < 4; ++k) {
+    double x = bessel_zeros[k] * bessel_zeros[k] / (4.0 * links + 2.0);
+    for (int i = 0; i < 8; ++i) {
+      const auto [value, slope] = laguerre(links, x);
+      x -= value / slope;
+    }
+    EXPECT_NEAR(all[k].imag(), std::sqrt(9.81 * x * links), 1e-8 * all[k].imag());
+    EXPECT_EQ(all[k].real(), 0.0);
+  }
+}
+
+TEST_F(EquilibriumVerb, AFewModesBySparseMatricesAreThoseOfFullOnes) {
+  if (!has_sparse_modes()) GTEST_SKIP() << "built without Spectra";
+  std::ofstream(path("damped.toml"))
+      << "name = \"damped\"\nlagrangian = \"sum(i = 1..N, v_x[i]^2/2) - sum(i = 2..N, (x[i] - x[i-1])^2/2) - "
+         "x[1]^2/2\"\ndissipation = \"sum(i = 2..N, 0.05*(v_x[i] - v_x[i-1])^2) + 0.3*v_x[N]^2\"\n"
+         "[sizes]\nN = 30\n[coordinates]\nx = { for = \"i = 1..N\" }\n[span]\nend = 1\nstep = 0.1\n";
+  for (const std::string& scene :
+       {std::string("hanging_chain --set N=20"), "'" + path("damped.toml") + "'"}) {
+    const auto full = eigenvalues_in(found(scene)), sparse = eigenvalues_in(found(scene + " --modes 5"));
+    ASSERT_GE(sparse.size(), 4U) << scene;
+    for (const std::complex<double> value : sparse) {
+      double nearest = 1e300;
+      for (const std::complex<double> known : full) nearest = std::min(nearest, std::abs(value - known));
+      EXPECT_LT(nearest, 1e-9 * std::abs(value)) << scene << value;
+    }
+    EXPECT_LT(std::abs(sparse.front() - full.front()), 1e-9 * std::abs(full.front())) << scene;
+  }
+}
+
+/// With nonholonomic rows, along a motion, near a negative number: capsize of the bicycle at 5 m/s.
+TEST_F(EquilibriumVerb, SparseModesKnowNonholonomicRows) {
+  if (!has_sparse_modes()) GTEST_SKIP() << "built without Spectra";
+  const auto all = eigenvalues_in(found("'" + examples + "bicycle.toml' --along --modes 2 --near=-0.3"));
+  double nearest = 1e300;
+  for (const std::complex<double> value : all) nearest = std::min(nearest, std::abs(value - at_5[1]));
+  EXPECT_LT(nearest, 1e-10);
+}
+
+TEST_F(EquilibriumVerb, APictureShowsEigenvaluesAndModes) {
+  const std::string stem = path("modes");
+  ASSERT_EQ(run("equilibrium hanging_chain --set N=4 --picture '" + stem + "'").status, 0);
+  const std::string svg = contents(stem + ".svg");
+  EXPECT_NE(svg.find("eigenvalues of hanging_chain"), std::string::npos);
+  EXPECT_NE(svg.find("x_4"), std::string::npos);
+  EXPECT_FALSE(contents(stem + ".png").empty());
 }
 
 TEST_F(EquilibriumVerb, FailuresDoubtsAndMisuseHaveTheirStatus) {

@@ -35,9 +35,7 @@ TEST_F(SensitivitiesOfRuns, AreThoseOfDifferences) {
 
 TEST_F(SensitivitiesOfRuns, AFitThroughEventsIsRefused) {
   std::ofstream(path("data.csv")) << "t,y\n0.1,0.9\n1,0.2\n";
-  expect_misuse(
-      "fit " DIRACSTEP_SOURCE "/examples/scenes/bouncing_ball.toml '" + path("data.csv") + "' --parameters g",
-      {"fit", "events"});
+  expect_misuse("fit bouncing_ball '" + path("data.csv") + "' --parameters g", {"fit", "events"});
 }
 
 /// x'' = 1 once t > w: dx(3)/dw = −(3 − w), of which the derivative of the formulas is 0.

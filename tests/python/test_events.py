@@ -145,7 +145,7 @@ def test_what_does_not_go_with_events_is_refused(ball):
 
 
 def test_rows_that_are_off_have_no_force():
-    scene = ds.load(os.path.join(os.path.dirname(__file__), "../../examples/scenes/rocking_block.toml"))
+    scene = ds.load(os.path.join(os.path.dirname(__file__), "../../scenes/rocking_block.toml"))
     run = scene.run()
     assert scene.rows == ["left_pin", "left_floor", "right_pin", "right_floor"] and run.lambda_.shape == (len(run), 4)
     assert np.array_equal(run["carried"], run["left_floor"] + run["right_floor"])

@@ -68,7 +68,8 @@ struct Tally {
 
 void examine(const std::string& name, Tally& tally) {
   const CatalogueScene scene = make_scene(name);
-  if (!scene.needs.empty() || scene.scene->dimension() + scene.scene->rows() > 15) return;
+  if (!scene.needs.empty() || !scene.events.empty()) return;
+  if (scene.scene->dimension() + scene.scene->rows() > 15) return;
   if (!scene.reference.at || !scene.reference.at(scene.t_end)) return;
   const ReferenceEnd reference = reference_end(scene, scene.t_end);
   for (double error = 1e-3; error > 0.9e-11; error /= 10.0) {

@@ -8,6 +8,8 @@
 #include <diracstep/core/integrator/point_reader.hpp>
 #include <diracstep/core/methods/default_method.hpp>
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/runs/event_steps.hpp>
+#include <diracstep/core/runs/run.hpp>
 #include <diracstep/core/steps/matrix_form.hpp>
 #include <diracstep/core/system/contradictory_rows.hpp>
 #include <diracstep/core/system/first_order_motions.hpp>
@@ -181,6 +183,39 @@ void examine_steps(const CatalogueScene& entry, const Registry& registry, const 
   if (reading) findings.push_back(std::move(*reading));
 }
 
+/// Of a scene with events: whether the motion goes through them, and what was met.
+void examine_events(const CatalogueScene& entry, const Registry& registry, const SolverFactory& solvers,
+                    const DefaultMethod& method, std::vector<Finding>& findings) {
+  if (entry.events.empty()) return;
+  constexpr long most_steps = 2000;
+  Finding events{"motion with its events", false, ""};
+  const double start = entry.scene->start.time;
+  const StepGrid grid =
+      fit_steps(start, entry.t_end, std::copysign(entry.recommended.step, entry.t_end - start));
+  try {
+    EventSteps<Integrator> motion(
+        entry.scene, entry.all_rows, entry.events, solvers, Momentum::projected,
+        [&](const std::shared_ptr<const Scene>& scene) {
+          return std::make_unique<Integrator>(
+              scene, registry, solvers,
+              IntegratorOptions{.method = method.method, .order = method.order, .step = grid.step});
+        });
+    StepReport report;
+    for (long k = 0; k < std::min(grid.steps, most_steps) && report.ok() && !motion.stopped(); ++k)
+      report = motion.step();
+    events.passed = report.ok();
+    events.detail = fmt::format("{} met until t = {:.6g}", motion.hits().size(), motion.time());
+    if (!motion.hits().empty())
+      events.detail +=
+          fmt::format(", the last '{}' at t = {:.10g}", motion.events()[motion.hits().back().event].name,
+                      motion.hits().back().sample.time);
+    if (!report.ok()) events.detail += "; " + report.failure;
+  } catch (const Misuse& misuse) {
+    events.detail = misuse.what();
+  }
+  findings.push_back(std::move(events));
+}
+
 /// With the velocities that are no data of a motion, or as it is where they are not found, which the steps
 /// tell.
 std::shared_ptr<const Scene> with_determined_start(std::shared_ptr<const Scene> scene,
@@ -251,6 +286,7 @@ Examination examine(const CatalogueScene& entry, const Registry& registry, const
     findings.push_back(examine_legendre_transform(*entry.scene, motion));
   findings.insert(findings.end(), steps.begin(), steps.end());
   examination.advice = advise(entry, method, examination);
+  examine_events(entry, registry, solvers, method, findings);
   return examination;
 }
 

@@ -11,7 +11,7 @@ namespace diracstep {
 
 /// What a run would meet: dimensions, rank of the rows, consistency of the start, derivatives at the start
 /// and along the motion, H against L, the first 16 steps with the recommended method or the library's choice,
-/// and the reading of velocities from momenta.
+/// the reading of velocities from momenta, and of a scene with events up to 2000 steps through them.
 struct Examination {
   std::vector<Finding> findings;
   std::vector<std::string> advice;  ///< on the method

@@ -2,6 +2,7 @@
 #include <array>
 #include <cmath>
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/runs/event_steps.hpp>
 #include <diracstep/core/runs/run.hpp>
 #include <diracstep/validation/references/published_cases.hpp>
 
@@ -15,16 +16,21 @@ double value_in(const KnownState::Component& component, const Sample& end) {
 
 std::string run_to_end(const CatalogueScene& entry, const Registry& registry, const SolverFactory& solvers,
                        double step, long steps, Sample& end) {
+  const IntegratorOptions options{
+      .method = entry.recommended.method, .order = entry.recommended.order, .step = step};
   try {
-    Integrator integrator(
-        entry.scene, registry, solvers,
-        {.method = entry.recommended.method, .order = entry.recommended.order, .step = step});
-    const RunReport report =
-        run_steps(integrator, steps, Momentum::projected, steps, [&](const Sample& sample) {
-          end = sample;
-          return true;
-        });
-    return report.last.failure;
+    EventSteps<Integrator> motion(entry.scene, entry.all_rows, entry.events, solvers, Momentum::projected,
+                                  [&](const std::shared_ptr<const Scene>& scene) {
+                                    return std::make_unique<Integrator>(scene, registry, solvers, options);
+                                  });
+    for (long k = 0; k < steps && !motion.stopped(); ++k)
+      if (const StepReport report = motion.step(); !report.ok()) return report.failure;
+    if (motion.stopped()) {
+      end = motion.end_of_stopped();
+      return {};
+    }
+    const SolveReport reading = motion.sample(end);
+    return reading.ok() ? "" : describe(reading.status);
   } catch (const Misuse& misuse) {
     return misuse.what();
   }

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/runs/event_steps.hpp>
 #include <diracstep/core/runs/run.hpp>
 #include <diracstep/core/runs/step_loop.hpp>
 #include <diracstep/validation/studies/converged_reference.hpp>
@@ -85,6 +86,16 @@ class Refinement {
  private:
   std::string run(const Ladder& by, double step, Sample& end) const {
     const StepGrid grid = fit_steps(scene_.scene->start.time, t_end_, step);
+    if (!scene_.events.empty()) {
+      EventSteps<Integrator> motion(
+          scene_.scene, scene_.all_rows, scene_.events, solvers_, Momentum::projected,
+          [&](const std::shared_ptr<const Scene>& scene) {
+            return std::make_unique<Integrator>(
+                scene, registry_, solvers_,
+                IntegratorOptions{.method = by.method, .order = by.order, .step = grid.step});
+          });
+      return step_through_events(motion, grid.steps, look_, end);
+    }
     Integrator integrator = made(by, grid.step);
     const StepReport last = step_while(
         integrator, [&](long k) { return k < grid.steps; },

@@ -37,6 +37,8 @@ class StudyInProgress {
                   const StudyOptions& options, const StudyObserver& observer)
       : entry_(scene), registry_(registry), solvers_(solvers), options_(options), observer_(observer) {
     entry_.scene = completed(scene.scene);
+    if (std::ranges::none_of(entry_.events, [](const Event& event) { return event.acts() || event.stop; }))
+      entry_.events.clear();  // what is only noted does not change the motion
     study_.scene = entry_.scene->name;
     study_.parameters = scene.parameters;
     study_.t_start = entry_.scene->start.time;
@@ -63,7 +65,7 @@ class StudyInProgress {
       study_.reference_how = reference_.how;
       study_.reference_error = reference_.self_error;
       for (; series_done_ < series_.size(); ++series_done_) run_series(series_[series_done_]);
-      for (std::size_t i = 0; i < options_.baselines.size(); ++i)
+      for (std::size_t i = 0; i < options_.baselines.size() && entry_.events.empty(); ++i)
         run_baseline_ladder(options_.baselines[i],
                             static_cast<double>(i) / static_cast<double>(options_.baselines.size()));
     } catch (const Interrupted&) {
@@ -85,7 +87,7 @@ class StudyInProgress {
 
   void add(const Series& series) {
     series_.push_back(series);
-    if (options_.adaptive) series_.push_back(series.with_variable_steps());
+    if (options_.adaptive && entry_.events.empty()) series_.push_back(series.with_variable_steps());
   }
 
   ReferenceEnd reference() const {
@@ -93,7 +95,8 @@ class StudyInProgress {
     ReferenceEnd ours =
         converged_reference(entry_, registry_, solvers_, study_.t_end, options_.reference_budget,
                             [&] { look(0.0, "a converged reference"); });
-    return ours.missing.empty() ? ours : reference_end(entry_, study_.t_end);
+    const bool by_ida = !ours.missing.empty() && entry_.events.empty();  // which knows no events
+    return by_ida ? reference_end(entry_, study_.t_end) : ours;
   }
 
   /// CPU seconds that the ladder which begins now may take: an even share of what is left.
@@ -174,6 +177,10 @@ class StudyInProgress {
     const std::string what = fmt::format("{} order {}, step {:.3g}", series.method, series.order, grid.step);
     const auto look_around = [&] { look(part, what); };
     look_around();
+    if (!entry_.events.empty())
+      return study_.rows.emplace_back(
+          run_with_events(entry_, registry_, solvers_, integrator_options(series, grid.step), grid.steps,
+                          options_.momentum, options_.repeats, reference_, look_around));
     Integrator ours = integrator(series, grid.step);
     return study_.rows.emplace_back(
         run_ours(ours, grid.steps, options_.momentum, options_.repeats, reference_, look_around));

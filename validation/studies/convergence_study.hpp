@@ -87,7 +87,8 @@ struct Study {
 /// way; false ends the study, which then holds the rows finished so far.
 using StudyObserver = std::function<bool(double part, const std::string& what)>;
 
-/// Error against CPU time at t_end for every (method, order), and for the baselines.
+/// Error against CPU time at t_end for every (method, order), and for the baselines.  A scene with events
+/// that act or stop is run through them, by steps of one size, and without the baselines, which know none.
 ///
 /// Errors are relative maximum norms, absolute where the reference is zero; that of p is taken against ∂L/∂v
 /// of the reference.  A scene without a reference at t_end is measured against converged_reference() or,

@@ -206,6 +206,50 @@ StudyRow run_ours(Integrator& integrator, long steps, Momentum momentum, int rep
   return row;
 }
 
+std::string step_through_events(EventSteps<Integrator>& motion, long steps, const Look& look, Sample& end) {
+  for (long k = 0; k < steps && !motion.stopped(); ++k) {
+    if (look && k % steps_between_looks == 0) look();
+    if (const StepReport report = motion.step(); !report.ok()) return report.failure;
+  }
+  if (motion.stopped()) {
+    end = motion.end_of_stopped();
+    return {};
+  }
+  const SolveReport reading = motion.sample(end);
+  return reading.ok() ? std::string() : fmt::format("reading the end: {}", describe(reading.status));
+}
+
+StudyRow run_with_events(const CatalogueScene& scene, const Registry& registry, const SolverFactory& solvers,
+                         const IntegratorOptions& options, long steps, Momentum momentum, int repeats,
+                         const ReferenceEnd& reference, const Look& look) {
+  Sample end;
+  std::string failure;
+  Work work;
+  std::shared_ptr<const Scene> last;
+  const auto once = [&] {
+    EventSteps<Integrator> motion(scene.scene, scene.all_rows, scene.events, solvers, momentum,
+                                  [&](const std::shared_ptr<const Scene>& of) {
+                                    return std::make_unique<Integrator>(of, registry, solvers, options);
+                                  });
+    double looking = 0.0;
+    const double before = thread_seconds();
+    const auto look_around = [&] {
+      const double pause = thread_seconds();
+      if (look) look();
+      looking += thread_seconds() - pause;
+    };
+    failure = step_through_events(motion, steps, look_around, end);
+    const double seconds = thread_seconds() - before - looking;
+    work = motion.work();
+    last = std::make_shared<const Scene>(motion.scene());
+    return failure.empty() ? seconds : -1.0;
+  };
+  StudyRow row{.method = options.method, .order = options.order, .step = options.step};
+  row.cpu_seconds = repeat(once, repeats);
+  conclude(row, work, failure, *last, end, reference);
+  return row;
+}
+
 StudyRow run_variable(AdaptiveIntegrator& integrator, double t_end, Momentum momentum, int repeats,
                       const ReferenceEnd& reference, const Look& look) {
   Sample end;

@@ -2,6 +2,7 @@
 
 #include <diracstep/core/adaptive/adaptive_integrator.hpp>
 #include <diracstep/core/integrator/integrator.hpp>
+#include <diracstep/core/runs/event_steps.hpp>
 #include <diracstep/scene_format/scene_catalogue.hpp>
 #include <diracstep/validation/references/reference_run.hpp>
 #include <functional>
@@ -88,6 +89,15 @@ using Look = std::function<void()>;
 /// above 0.03 s is repeated less often, and one above 0.1 s is its own warm-up.
 StudyRow run_ours(Integrator& integrator, long steps, Momentum momentum, int repeats,
                   const ReferenceEnd& reference, const Look& look = {});
+
+/// The same of a scene with its events (EventSteps), to the end of the steps or to the event that stops it.
+/// Rows that are on at the end are those whose violation is told.
+StudyRow run_with_events(const CatalogueScene& scene, const Registry& registry, const SolverFactory& solvers,
+                         const IntegratorOptions& options, long steps, Momentum momentum, int repeats,
+                         const ReferenceEnd& reference, const Look& look = {});
+
+/// Takes the steps of a scene with its events and reads the end.  Empty, or what failed; `look` as there.
+std::string step_through_events(EventSteps<Integrator>& motion, long steps, const Look& look, Sample& end);
 
 /// The same with variable steps to t_end; the survey of the rate belongs to the construction.  The row's
 /// method ends in `variable_steps` and its step is eps.

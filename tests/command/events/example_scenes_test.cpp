@@ -3,15 +3,14 @@
 
 #include "../run_command.hpp"
 
-/// Small scenes of inputs, states and events in examples/scenes, each against its closed form.
+/// Small scenes of inputs, states and events of the catalogue, each against its closed form.
 namespace diracstep::testing {
 namespace {
 
 class ExampleScenes : public Command {
  protected:
   nlohmann::json result(const std::string& name, const std::string& options = "") const {
-    const Outcome outcome =
-        run("run '" DIRACSTEP_SOURCE "/examples/scenes/" + name + ".toml' --json " + options);
+    const Outcome outcome = run("run " + name + " --json " + options);
     EXPECT_EQ(outcome.status, 0) << name << outcome.err;
     return outcome.status == 0 ? nlohmann::json::parse(outcome.out) : nlohmann::json::object();
   }
@@ -93,8 +92,7 @@ TEST_F(ExampleScenes, AnErrorAskedForGoesThroughEvents) {
   EXPECT_LE(search["estimate"].get<double>(), 4e-7);
   EXPECT_NEAR(search["observed_order"].get<double>(), 2.0, 0.5);
   EXPECT_GT(search["runs"].size(), 3U);
-  const Outcome zeno =
-      run("run '" DIRACSTEP_SOURCE "/examples/scenes/bouncing_ball.toml' --end 10 --error 1e-6");
+  const Outcome zeno = run("run bouncing_ball --end 10 --error 1e-6");
   EXPECT_EQ(zeno.status, 1);
   EXPECT_NE(zeno.err.find("Zeno"), std::string::npos) << zeno.err;
 }
@@ -145,12 +143,43 @@ TEST_F(ExampleScenes, AClutchClosesAndHolds) {
 }
 
 TEST_F(ExampleScenes, VerbsWithoutEventsSaySo) {
-  const std::string file = "'" DIRACSTEP_SOURCE "/examples/scenes/latch.toml'";
+  const std::string file = "latch";
   const Outcome plan = run("plan " + file);
   EXPECT_EQ(plan.status, 0) << plan.err;
   EXPECT_NE(plan.out.find("catch"), std::string::npos) << plan.out;
-  EXPECT_NE(run("check " + file).err.find("(catch) are not looked for"), std::string::npos);
+  const auto check = nlohmann::json::parse(run("check " + file + " --json").out);
+  const auto& finding = check["findings"].back();
+  EXPECT_EQ(finding["what"], "motion with its events");
+  EXPECT_EQ(finding["detail"], "1 met until t = 3, the last 'catch' at t = 0.5");
   EXPECT_NE(run("equilibrium " + file).err.find("(catch) are not looked for"), std::string::npos);
+}
+
+/// The order of the midpoint rule and of GL(2) across impacts and switched rows, against the closed form.
+TEST_F(ExampleScenes, AStudyGoesThroughEvents) {
+  const Outcome outcome = run("study stick_slip --methods type1/midpoint,type1/gl:2 --json --repeat 1");
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_NE(outcome.err.find("through its events (break, stick)"), std::string::npos) << outcome.err;
+  const auto study = nlohmann::json::parse(outcome.out)["studies"][0];
+  EXPECT_EQ(study["reference"]["kind"], "exact");
+  for (const auto& measured : study["measured_order"]) {
+    const int order = measured["order"];
+    if (order > 6) continue;
+    EXPECT_NEAR(measured["slope"].get<double>(), order, 0.3) << measured;
+  }
+  for (const auto& row : study["rows"]) EXPECT_NE(row["method"], "ida");
+}
+
+TEST_F(ExampleScenes, TheListNamesStatesAndEvents) {
+  const auto scenes = nlohmann::json::parse(run("list scenes --json").out)["scenes"];
+  for (const auto& scene : scenes) {
+    if (scene["name"] == "stick_slip") {
+      EXPECT_EQ(scene["events"], (std::vector<std::string>{"break", "stick"}));
+      EXPECT_EQ(scene["states"], std::vector<std::string>{"slips"});
+    }
+    if (scene["name"] == "kepler_e06") {
+      EXPECT_TRUE(scene["events"].empty() && scene["states"].empty());
+    }
+  }
 }
 
 }  // namespace

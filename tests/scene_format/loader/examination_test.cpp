@@ -160,6 +160,7 @@ TEST(Examination, DerivativesAreExaminedWhereTheMotionGoes) {
 TEST(Examination, NamesTheRowThatARunNames) {
   const Examination examination = examined(R"toml(
 name = "twice"
+redundant = "refuse"
 lagrangian = "(v_x^2 + v_y^2)/2 - y"
 [coordinates]
 x = {}

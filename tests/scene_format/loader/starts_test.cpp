@@ -231,15 +231,15 @@ double pendulum_angle(double angle, double end) {
 }
 
 TEST(RedundantRows, AreRefusedByNameWithTheOptionThatDropsThem) {
-  const std::string told = refusal(parallel_cranks(""));
+  const std::string told = refusal(parallel_cranks("redundant = \"refuse\""));
   EXPECT_NE(told.find("--drop-redundant"), std::string::npos) << told;
   EXPECT_NE(told.find("redundant = \"drop\""), std::string::npos) << told;
   const auto names = [&](const char* row) { return told.find(row) != std::string::npos; };
   EXPECT_TRUE(names("'crank_") || names("'apart_") || names("'level_")) << told;
 }
 
-TEST(RedundantRows, AreDroppedWhereTheFileSaysSoAndTheMotionIsRight) {
-  const CatalogueScene entry = scene_from_text("cranks.toml", parallel_cranks("redundant = \"drop\""));
+TEST(RedundantRows, AreDroppedAndTheMotionIsRight) {
+  const CatalogueScene entry = scene_from_text("cranks.toml", parallel_cranks(""));
   EXPECT_EQ(entry.scene->rows(), 5);
   ASSERT_EQ(entry.changes.size(), 1u);
   EXPECT_NE(entry.changes[0].find("redundant constraints left out"), std::string::npos);

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <Eigen/SparseLU>
+#include <diracstep/core/equilibrium/equilibrium.hpp>
+#include <diracstep/core/equilibrium/force_balance.hpp>
+
+namespace diracstep {
+
+/// Factors of a matrix [ block  −Aᵀ; rows  0 ] as a sparse one.
+class SaddleFactors {
+ public:
+  SaddleFactors(const SparseMatrix& block, const SparseMatrix& one_forms, const SparseMatrix& rows);
+
+  /// Whether rows depend on each other, or the block leaves a direction open on them, to 1e-14 of rows and
+  /// columns of like size.
+  bool singular() const { return singular_; }
+  Vector solve(const Vector& right) const;
+
+ private:
+  Eigen::SparseLU<SparseMatrix> factors_;  ///< of the matrix with rows and columns of like size
+  Vector row_scales_, column_scales_;
+  bool singular_ = false;
+};
+
+/// find_equilibrium() of a scene that is too large for full matrices: Newton's method for q and λ at once,
+/// damped by the natural monotonicity test (Deuflhard, Newton Methods for Nonlinear Problems, 2004, 3.3).
+/// Rows are on positions and independent, and the equilibrium is isolated; Equilibrium::failure tells where
+/// it is not.  Throws Misuse for rows on velocities.
+Equilibrium find_sparse_equilibrium(const Scene& scene);
+
+}  // namespace diracstep
