@@ -135,9 +135,9 @@ void SceneCompiler::compile_contact(const SceneDocument::Event& event, EventProg
   Context context = mechanics(what, program_.lagrangian ? 'v' : 'p');
   context.motion = true;
   Row row{{event.name, {}, event.when->start}, parser_.formula(*event.when, context)};
-    if (graph_.known(row.node) != Known::each_call)
-      fail(event.when->start,
-           what + " never happens: its 'when' holds neither the time nor anything of the motion");
+  if (graph_.known(row.node) != Known::each_call)
+    fail(event.when->start,
+         what + " never happens: its 'when' holds neither the time nor anything of the motion");
   bool gap = false;
   for (const Node node : graph_.reachable(std::span(&row.node, 1))) {
     const NodeData& data = graph_[node];
