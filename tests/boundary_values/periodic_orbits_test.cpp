@@ -109,6 +109,41 @@ TEST(BoundaryValues, PeriodicOrbitsOnHolonomicRows) {
   EXPECT_NEAR(4.0 * std::comp_ellint_1(std::sqrt(0.5 * (1.0 + energy))), 7.0, 1e-9);
 }
 
+ScenePointer harmonic() {
+  Scene scene;
+  scene.name = "harmonic";
+  scene.coordinates = {"x"};
+  scene.lagrangian =
+      lagrangian<1>([](const auto& q, const auto& v) { return 0.5 * (v[0] * v[0] - q[0] * q[0]); });
+  scene.start = {0.0, Vector::Ones(1), Vector::Zero(1)};
+  return std::make_shared<const Scene>(scene);
+}
+
+/// All motions of an oscillator have one period: there both directions are free, though the conditions leave
+/// nothing but round-off to judge that by.
+TEST(BoundaryValues, WhereEveryMotionIsPeriodicAllDirectionsAreFree) {
+  const IntegratorOptions options{.method = "type1/gl:4", .step = 2.0 * M_PI / 60};
+  const auto guess = samples_of(harmonic(), options, 60);
+  const BoundaryReport report = solved(harmonic(), options, periodic(1), through(guess, options.step), 60);
+  ASSERT_TRUE(report.converged) << report.ending;
+  EXPECT_EQ(report.free_directions, 2);
+  EXPECT_GT(report.q.norm(), 1.0);
+}
+
+/// At other times the rest at zero is the only periodic motion, where nothing is left to measure corrections
+/// by; also where other motions are all but periodic.
+TEST(BoundaryValues, ARestAtZeroIsFound) {
+  for (const double period : {2.0, 3.0, 6.28}) {
+    SCOPED_TRACE(period);
+    const IntegratorOptions options{.method = "type1/gl:4", .step = period / 60};
+    const auto guess = samples_of(harmonic(), options, 60);
+    const BoundaryReport report = solved(harmonic(), options, periodic(1), through(guess, options.step), 60);
+    ASSERT_TRUE(report.converged) << report.ending;
+    EXPECT_LT(report.q.norm(), 1e-9);
+    EXPECT_EQ(report.free_directions, 0);
+  }
+}
+
 /// A place of rest is periodic: numbers that are zero to round-off do not keep a search from ending.
 TEST(BoundaryValues, ARestIsFoundAsWell) {
   const ScenePointer scene = phase_space();

@@ -6,6 +6,7 @@ BEGIN {
   library["Eigen"] = "^Eigen/"
   library["SUNDIALS"] = "^(sundials|sunmatrix|sunlinsol|sunnonlinsol|nvector|kinsol|idas?|cvodes?|arkode)/"
   library["KLU"] = "^(suitesparse/|(klu|amd|btf|colamd)[.]h)"
+  library["Ipopt"] = "^Ip[A-Z]"
   library["fmt"] = "^fmt/"
   library["toml++"] = "^toml[+][+]/"
   library["CLI11"] = "^CLI/"
@@ -75,7 +76,7 @@ function check_library_include(path, room, included, name) {
   for (name in library) {
     if (included !~ library[name]) continue
     if (!((room, name) in sees)) fault(path ": " room " must not include " name " (" included ")")
-    else if (name ~ /^(SUNDIALS|KLU)$/ && path ~ /[.]hpp$/ && path !~ /\/detail\//)
+    else if (name ~ /^(SUNDIALS|KLU|Ipopt)$/ && path ~ /[.]hpp$/ && path !~ /\/detail\//)
       fault(path ": " name " is for sources and detail/ only (" included ")")
   }
 }
