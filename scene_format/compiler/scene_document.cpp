@@ -6,6 +6,7 @@
 #include <diracstep/files/csv_table.hpp>
 #include <diracstep/scene_format/compiler/body_reader.hpp>
 #include <diracstep/scene_format/compiler/circuit_reader.hpp>
+#include <diracstep/scene_format/compiler/control_reader.hpp>
 #include <diracstep/scene_format/compiler/netlist_reader.hpp>
 #include <diracstep/scene_format/compiler/scene_document.hpp>
 #include <diracstep/scene_format/compiler/size_limits.hpp>
@@ -47,7 +48,7 @@ class DocumentReader : TableReader {
         "rows",        "force",       "start",       "span",     "reference",      "invariants",
         "recommended", "inductor",    "capacitor",   "resistor", "source_voltage", "mutual",
         "redundant",   "outputs",     "states",      "inputs",   "events",         "source_current",
-        "diode",       "switch",      "transformer", "gyrator",  "opamp"};
+        "diode",       "switch",      "transformer", "gyrator",  "opamp",          "control"};
     known.insert(known.end(), body_tables().begin(), body_tables().end());
     check_keys(root, "the scene", known);
     read_head(root);
@@ -72,6 +73,7 @@ class DocumentReader : TableReader {
     read_invariants(root);
     read_outputs(root);
     for (const auto& output : bodies_.expansion.outputs) add_output(output.name, bodies_.formula(output));
+    document_.control = read_control(*this, root, document_.parameters);
     read_events(root);
     read_recommended(root);
     guess_currents(document_);

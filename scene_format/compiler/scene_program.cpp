@@ -41,6 +41,7 @@ class SceneCompiler {
     for (const auto& output : document_.outputs)
       program_.outputs.push_back(
           {output.name, motion_function(output.formula, "output '" + output.name + "'")});
+    if (document_.control && !program_.differentiated.empty()) compile_control(*document_.control);
     for (const auto& event : document_.events) compile_event(event);
     for (const auto& body : document_.bodies) compile_drawn(body);
     write_source();
@@ -549,6 +550,16 @@ class SceneCompiler {
     return function;
   }
 
+  void compile_control(const SceneDocument::Control& control) {
+    const auto compiled = [&](const std::optional<FormulaText>& formula,
+                              const std::string& what) -> std::optional<SceneFunction> {
+      if (!formula) return std::nullopt;
+      return phase_function(parser_.formula(*formula, mechanics(what, 'v')), what, formula->start);
+    };
+    program_.cost = compiled(control.cost, "the cost");
+    program_.end_cost = compiled(control.end_cost, "the cost of the end");
+  }
+
   void compile_event(const SceneDocument::Event& event) {
     const std::string what = "event '" + event.name + "'";
     EventProgram& program = program_.events.emplace_back();
@@ -664,7 +675,7 @@ class SceneCompiler {
 
 std::vector<const SceneFunction*> SceneProgram::functions() const {
   std::vector<const SceneFunction*> all;
-  for (const auto* function : {&lagrangian, &hamiltonian, &force})
+  for (const auto* function : {&lagrangian, &hamiltonian, &force, &cost, &end_cost})
     if (*function) all.push_back(&**function);
   for (const SceneFunction& function : rows) all.push_back(&function);
   return all;
