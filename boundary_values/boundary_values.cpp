@@ -226,12 +226,19 @@ BoundaryReport solve_boundary_values(const BoundaryProblem& problem) {
   const double end_time = equations.nodes(u).back().t;
   if (conditions.start_held) require_on_rows(scene, scene.start.time, conditions.value.head(n), "start");
   if (conditions.end_held) require_on_rows(scene, end_time, conditions.value.tail(n), "end");
+  double power = 1.0;
   const auto factor = [&](const Vector& at,
                           const Vector& sizes) -> std::unique_ptr<boundary::LinearisedEnds> {
     if (!conditions.families) return std::make_unique<boundary::DeterminedEnds>(equations, at);
-    return std::make_unique<boundary::FamilyOfEnds>(equations, at, sizes);
+    return std::make_unique<boundary::FamilyOfEnds>(equations, at, sizes, power);
   };
-  const boundary::NewtonReport search = boundary::newton(equations, u, problem.max_iterations, factor);
+  const Vector at_guess = u;
+  boundary::NewtonReport search = boundary::newton(equations, u, problem.max_iterations, factor);
+  if (conditions.families && !search.converged) {  // less damping, for conditions that are all but degenerate
+    power = 2.0;
+    u = at_guess;
+    search = boundary::newton(equations, u, problem.max_iterations, factor);
+  }
   BoundaryReport report;
   report.iterations = search.iterations;
   report.correction = search.correction;

@@ -12,12 +12,12 @@ bool optimal_control_available() {
 #endif
 }
 
-ControlReport solve_optimal_control(const ControlProblem& problem) {
+OptimalControlReport solve_optimal_control(const ControlProblem& problem) {
   boundary::ControlProgram program(problem);
   Vector u = program.start();
   const boundary::InteriorPointReport search =
       boundary::solve(program, problem.max_iterations, problem.tolerance, u);
-  ControlReport report;
+  OptimalControlReport report;
   report.iterations = search.iterations;
   program.describe(u, report);
   const double size = std::max(1.0, report.q.lpNorm<Eigen::Infinity>());

@@ -42,7 +42,7 @@ struct ControlProblem {
   double tolerance = 1e-9;  ///< of the optimality conditions, scaled as Ipopt scales them
 };
 
-struct [[nodiscard]] ControlReport {
+struct [[nodiscard]] OptimalControlReport {
   bool converged = false;
   std::string ending;
   int iterations = 0;
@@ -75,8 +75,8 @@ bool optimal_control_available();
 /// the Hessian of Lagrange's function, one block for each step, is a difference of these.  Solved by Ipopt,
 /// an interior-point method (Wächter, Biegler, Math. Program. 106, 2006): a local minimum near the guess.
 ///
-/// Steps are not divided where formulas have kinks.  Throws Misuse without Ipopt, for sizes that disagree, for Lagrangians linear in v, and where
-/// solve_boundary_values() does.
-ControlReport solve_optimal_control(const ControlProblem& problem);
+/// Steps are not divided where formulas have kinks.  Throws Misuse without Ipopt, for sizes that disagree,
+/// for Lagrangians linear in v, and where solve_boundary_values() does.
+OptimalControlReport solve_optimal_control(const ControlProblem& problem);
 
 }  // namespace diracstep

@@ -304,7 +304,7 @@ double ControlProgram::difference_of_run(const Vector& u) {
                   (integrator_->momentum() - nodes.back().p).lpNorm<Eigen::Infinity>());
 }
 
-void ControlProgram::describe(const Vector& u, ControlReport& report) {
+void ControlProgram::describe(const Vector& u, OptimalControlReport& report) {
   report.cost = cost(u);
   const Vector r = residual(u);
   report.residual = r.allFinite() ? r.lpNorm<Eigen::Infinity>() : unbounded;

@@ -34,7 +34,7 @@ class ControlProgram {
   Vector hessian(const Vector& u, double factor, const Vector& multipliers);
 
   /// The motion, the controls, and what the integrator makes of them.
-  void describe(const Vector& u, ControlReport& report);
+  void describe(const Vector& u, OptimalControlReport& report);
 
  private:
   void place_bounds();

@@ -80,7 +80,7 @@ Columns DeterminedEnds::by_conditions(int count) const {
   return refined(factor_, matrix_, right).topRows(unknowns_);
 }
 
-FamilyOfEnds::FamilyOfEnds(MotionEquations& equations, const Vector& u, const Vector& sizes)
+FamilyOfEnds::FamilyOfEnds(MotionEquations& equations, const Vector& u, const Vector& sizes, double power)
     : unknowns_(equations.unknowns()) {
   const MotionEquations::Jacobian j = equations.jacobian(u);
   const std::vector<int> start = equations.start_unknowns(), end = equations.end_unknowns();
@@ -108,7 +108,7 @@ FamilyOfEnds::FamilyOfEnds(MotionEquations& equations, const Vector& u, const Ve
   ends_ = row_sizes_.cwiseInverse().asDiagonal() * (j.ends * along_);
   start_rows_ = (j.ends * along_).topRows(equations.start_rows());
   const MotionEquations::Residual r = equations.residual(u);
-  damping_ = std::min(1.0, left(r, particular(r)).norm());
+  damping_ = std::pow(std::min(1.0, left(r, particular(r)).norm()), 0.5 * power);
   end_by_start_ = start_sizes_.cwiseInverse().asDiagonal() * along_(end, Eigen::all);
 }
 

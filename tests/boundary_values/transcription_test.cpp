@@ -117,7 +117,7 @@ TEST(Transcription, TheLinearQuadraticCaseIsTheRiccatiRecursionOfTheStep) {
       problem_of(oscillator(), {.method = "type1/gl:2", .step = h}, count,
                  conditions_on(1, {{0, 1.0}, {1, 0.5}}, {}), Vector::Zero(1), Vector::Zero(1));
   problem.tolerance = 1e-12;
-  const ControlReport report = solve_optimal_control(problem);
+  const OptimalControlReport report = solve_optimal_control(problem);
   ASSERT_TRUE(report.converged) << report.ending;
   const Vector start{{1.0, 0.5}};
   EXPECT_NEAR(report.cost, 0.5 * start.dot(s * start), 1e-12);
@@ -140,7 +140,7 @@ TEST(Transcription, ConvergesToTheContinuousOptimum) {
                    conditions_on(1, {{0, 1.0}, {1, 0.5}}, {}), Vector::Zero(1), Vector::Zero(1));
     problem.degree = degree;
     problem.tolerance = 1e-11;
-    const ControlReport report = solve_optimal_control(problem);
+    const OptimalControlReport report = solve_optimal_control(problem);
     EXPECT_TRUE(report.converged) << report.ending;
     return report.cost;
   };
@@ -173,10 +173,10 @@ TEST(Transcription, BoundsHold) {
     return problem_of(controlled, {.method = "type1/gl:2", .step = 0.25}, 20, to_rest, Vector::Ones(1),
                       Vector::Zero(1));
   };
-  const ControlReport free = solve_optimal_control(problem_with(oscillator()));
+  const OptimalControlReport free = solve_optimal_control(problem_with(oscillator()));
   ASSERT_TRUE(free.converged) << free.ending;
   const double least = 0.8 * free.controls.minCoeff(), greatest = 0.8 * free.controls.maxCoeff();
-  const ControlReport bounded = solve_optimal_control(problem_with(oscillator({least, greatest})));
+  const OptimalControlReport bounded = solve_optimal_control(problem_with(oscillator({least, greatest})));
   ASSERT_TRUE(bounded.converged) << bounded.ending;
   EXPECT_LE(bounded.controls.maxCoeff(), greatest);
   EXPECT_GE(bounded.controls.minCoeff(), least);
@@ -187,7 +187,7 @@ TEST(Transcription, BoundsHold) {
   ControlProblem narrow = problem_with(oscillator());
   narrow.lower_q = Vector{{0.5 * free.q.minCoeff()}};
   narrow.upper_q = Vector{{unbounded}};
-  const ControlReport above = solve_optimal_control(narrow);
+  const OptimalControlReport above = solve_optimal_control(narrow);
   ASSERT_TRUE(above.converged) << above.ending;
   EXPECT_GE(above.q.minCoeff(), narrow.lower_q[0]);
   EXPECT_GT(above.cost, free.cost);
@@ -223,7 +223,7 @@ TEST(Transcription, ALowThrustTransferCostsWhatStatesAndCostatesSay) {
                                                     {{0, far}, {1, 2.0 * M_PI}, {2, 0.0}, {3, slow}}),
                                       Vector{{1.0, 0.0}}, Vector{{far, 2.0 * M_PI}});
   problem.degree = 2;
-  const ControlReport report = solve_optimal_control(problem);
+  const OptimalControlReport report = solve_optimal_control(problem);
   ASSERT_TRUE(report.converged) << report.ending;
   EXPECT_LT(report.end_of_run, 1e-8);
   // The same by Pontryagin's principle: r' = a, φ' = w, a' = r w² − 1/r² , w' = (u − 2 a w)/r, u = l_w/(2r).
@@ -301,7 +301,7 @@ TEST(Transcription, AKnifeEdgeIsParkedSideways) {
       problem_of(knife_edge(), {.method = "type1/gl:2", .step = time / count}, count,
                  conditions_on(3, at_rest_start, at_rest_end), Vector::Zero(3), Vector{{1.0, 1.0, 0.0}});
   problem.degree = 1;
-  const ControlReport report = solve_optimal_control(problem);
+  const OptimalControlReport report = solve_optimal_control(problem);
   ASSERT_TRUE(report.converged) << report.ending;
   EXPECT_LT(report.end_of_run, 1e-8);
   EXPECT_LT(distance(report.q.rightCols(1), Vector{{1.0, 1.0, 0.0}}), 1e-9);
@@ -395,7 +395,7 @@ TEST(Transcription, ASnakeboardMovesByItsRotorAndWheels) {
     };
     return solve_optimal_control(problem);
   };
-  const ControlReport report = solved_with(18);
+  const OptimalControlReport report = solved_with(18);
   ASSERT_TRUE(report.converged) << report.ending;
   EXPECT_LT(report.end_of_run, 1e-6);
   EXPECT_NEAR(report.q(0, 18), 0.5, 1e-9);
@@ -431,7 +431,7 @@ TEST(Transcription, RefusesWhatItCannotDo) {
     return;
   }
   // More than two steps with one control each can reach.
-  const ControlReport report = solve_optimal_control(problem_of(
+  const OptimalControlReport report = solve_optimal_control(problem_of(
       oscillator(), {.method = "type1/gl:2", .step = 0.1}, 1,
       conditions_on(1, {{0, 1.0}, {1, 0.0}}, {{0, 5.0}, {1, 7.0}}), Vector::Zero(1), Vector::Zero(1)));
   EXPECT_FALSE(report.converged);
