@@ -4,6 +4,7 @@ get_filename_component(SOURCE_PATH "${CMAKE_CURRENT_LIST_DIR}/../../.." ABSOLUTE
 vcpkg_check_features(OUT_FEATURE_OPTIONS FEATURE_OPTIONS
     FEATURES
         klu DIRACSTEP_WITH_KLU
+        ipopt DIRACSTEP_WITH_IPOPT
         command DIRACSTEP_BUILD_VALIDATION
 )
 
