@@ -6,7 +6,7 @@
 #include <diracstep/files/csv_table.hpp>
 #include <diracstep/scene_format/compiler/body_reader.hpp>
 #include <diracstep/scene_format/compiler/circuit_reader.hpp>
-#include <diracstep/scene_format/compiler/control_reader.hpp>
+#include <diracstep/scene_format/compiler/input_table.hpp>
 #include <diracstep/scene_format/compiler/netlist_reader.hpp>
 #include <diracstep/scene_format/compiler/scene_document.hpp>
 #include <diracstep/scene_format/compiler/size_limits.hpp>

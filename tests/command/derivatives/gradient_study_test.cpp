@@ -1,7 +1,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "run_command.hpp"
+#include "../run_command.hpp"
 
 namespace diracstep::testing {
 namespace {
