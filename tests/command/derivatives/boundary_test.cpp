@@ -115,7 +115,7 @@ step = 0.1
 
 /// A pendulum over a step too large for it: the discrete equations have a solution that is near no motion.
 TEST_F(Boundary, SolutionsOfTheStepsAloneAreDoubted) {
-  std::ofstream(path("pendulum.toml")) << R"(
+  std::ofstream(path("pendulum.toml")) << R"toml(
 name = "pendulum"
 lagrangian = "v_a^2/2 + cos(a)"
 [coordinates]
@@ -125,7 +125,7 @@ a = 0.1
 [span]
 end = 12
 step = 4
-)";
+)toml";
   const Outcome coarse =
       run("boundary '" + path("pendulum.toml") + "' --from a=0 --to a=2 --method type1/midpoint");
   EXPECT_EQ(coarse.status, 3) << coarse.out << coarse.err;

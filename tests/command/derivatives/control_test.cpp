@@ -44,7 +44,9 @@ TEST_F(Control, FindsControlsWithinTheLimitsOfTheirParameters) {
   EXPECT_EQ(rows.size(), 22u);
   // Narrower bounds cost more; so narrow ones lead nowhere.
   const Outcome narrow = run("control " + file + " --to x=0 v_x=0 --at-most u=0.3 --at-least u=-0.3 --json");
-  if (narrow.status == 0) EXPECT_GT(Json::parse(narrow.out)["cost"].get<double>(), sum);
+  if (narrow.status == 0) {
+    EXPECT_GT(Json::parse(narrow.out)["cost"].get<double>(), sum);
+  }
   const Outcome none = run("control " + file + " --to x=0 v_x=0 --at-most u=0.01 --at-least u=-0.01");
   EXPECT_EQ(none.status, 1);
   EXPECT_NE(none.err.find("not converged"), std::string::npos) << none.err;
