@@ -136,6 +136,22 @@ std::string kink_on_the_way(Integrator& integrator, double size) {
          "compare with more steps";
 }
 
+/// The equations of a large step have several solutions, of which a run takes the one near its guess.
+std::string other_solution(Integrator& integrator, const MotionEquations::Node& from, const Vector& v,
+                           const MotionEquations::Node& to) {
+  constexpr double same = 1e-6;
+  integrator.restart(from.t, from.q, from.p, v);
+  const bool stepped = integrator.step(to.t - from.t).ok();
+  const Vector& q = integrator.position();
+  const double size = std::max(to.q.lpNorm<Eigen::Infinity>(), (to.q - from.q).lpNorm<Eigen::Infinity>());
+  const double apart = stepped ? (q - to.q).lpNorm<Eigen::Infinity>() : size;
+  constexpr double rest = 1e-12;  // of coordinates that are all zero
+  if (stepped && apart <= same * size + rest) return "";
+  return "a run from t = " + to_text(from.t) +
+         (stepped ? " steps elsewhere, off by " + to_text(apart) : std::string(" fails in its step")) +
+         ": steps are so large that their equations have several solutions; smaller ones are needed";
+}
+
 /// Positions, velocities and projected momenta at the ends of the steps.
 void add_points(const Solved& of, BoundaryReport& report) {
   const std::vector<MotionEquations::Node> nodes = of.equations.nodes(of.u);
@@ -152,13 +168,16 @@ void add_points(const Solved& of, BoundaryReport& report) {
     report.times[k] = node.t;
     report.q.col(k) = node.q;
     if (!node.q.allFinite() || !node.p.allFinite() || !other.q.allFinite()) continue;
-    of.integrator.restart(node.t, node.q, node.p, (other.q - node.q) / (other.t - node.t));
+    const Vector slope = (other.q - node.q) / (other.t - node.t);
+    of.integrator.restart(node.t, node.q, node.p, slope);
     if (!of.integrator.sample(Momentum::projected, sample).ok()) continue;
     report.v.col(k) = sample.v;
     report.p.col(k) = sample.p;
     energy.see(sample);
     if (report.doubt.empty() && k + 1 < count && of.equations.scene().kinks)
       report.doubt = kink_on_the_way(of.integrator, other.t - node.t);
+    if (report.doubt.empty() && k + 1 < count)
+      report.doubt = other_solution(of.integrator, node, sample.v.size() > 0 ? sample.v : slope, other);
   }
   if (report.doubt.empty()) report.doubt = energy.text();
 }
@@ -208,11 +227,19 @@ BoundaryReport solve_boundary_values(const BoundaryProblem& problem) {
   const double end_time = equations.nodes(u).back().t;
   if (conditions.start_held) require_on_rows(scene, scene.start.time, conditions.value.head(n), "start");
   if (conditions.end_held) require_on_rows(scene, end_time, conditions.value.tail(n), "end");
-  const auto factor = [&](const Vector& at) -> std::unique_ptr<boundary::LinearisedEnds> {
+  double power = 1.0;
+  const auto factor = [&](const Vector& at,
+                          const Vector& sizes) -> std::unique_ptr<boundary::LinearisedEnds> {
     if (!conditions.families) return std::make_unique<boundary::DeterminedEnds>(equations, at);
-    return std::make_unique<boundary::FamilyOfEnds>(equations, at, boundary::sizes_by_kind(equations, at));
+    return std::make_unique<boundary::FamilyOfEnds>(equations, at, sizes, power);
   };
-  const boundary::NewtonReport search = boundary::newton(equations, u, problem.max_iterations, factor);
+  const Vector at_guess = u;
+  boundary::NewtonReport search = boundary::newton(equations, u, problem.max_iterations, factor);
+  if (conditions.families && !search.converged) {  // less damping, for conditions that are all but degenerate
+    power = 2.0;
+    u = at_guess;
+    search = boundary::newton(equations, u, problem.max_iterations, factor);
+  }
   BoundaryReport report;
   report.iterations = search.iterations;
   report.correction = search.correction;

@@ -75,7 +75,7 @@ struct [[nodiscard]] BoundaryReport {
   double correction = 0.0;  ///< the last one, in parts of the largest number of its kind
   double residual = 0.0;    ///< of the conditions, largest entry
   /// Empty, or why the motion is not to be believed though it solves the equations: its energy changes
-  /// (EnergyCheck), as where steps are too large.
+  /// (EnergyCheck), or a run takes another step from one of its points, as where steps are too large.
   std::string doubt;
 
   /// At the ends of all steps, 0 … N: a column for each, p projected.

@@ -7,7 +7,8 @@ configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/DiracStepConfig.cmake.
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/DiracStepConfigVersion.cmake
   COMPATIBILITY SameMinorVersion)
 install(FILES ${PROJECT_BINARY_DIR}/DiracStepConfig.cmake ${PROJECT_BINARY_DIR}/DiracStepConfigVersion.cmake
-              ${PROJECT_SOURCE_DIR}/cmake/DiracStepKLU.cmake DESTINATION ${cmake_dir})
+              ${PROJECT_SOURCE_DIR}/cmake/DiracStepKLU.cmake ${PROJECT_SOURCE_DIR}/cmake/DiracStepIpopt.cmake
+        DESTINATION ${cmake_dir})
 
 # pkg_config_file(<file> <description> LIBS <ours>... [REQUIRES <files>...]
 #                 [PRIVATE_LIBS <theirs>...] [PRIVATE_REQUIRES <files>...])
@@ -42,6 +43,9 @@ endfunction()
 sundials_libraries(solver_libraries ${DIRACSTEP_SOLVERS_SUNDIALS})
 if(DIRACSTEP_WITH_KLU)
   list(APPEND solver_libraries klu)
+endif()
+if(DIRACSTEP_WITH_IPOPT)
+  list(APPEND solver_libraries ipopt)
 endif()
 pkg_config_file(diracstep "${PROJECT_DESCRIPTION}" REQUIRES eigen3
   LIBS diracstep_boundary_values diracstep_sensitivities diracstep_solvers diracstep_constraints diracstep_core PRIVATE_LIBS ${solver_libraries} pthread)

@@ -160,6 +160,7 @@ int with_all_verbs(int count, char** arguments, bool run_verbs, const Processes&
   add_help(app);
   add_boundary(app, session);
   add_check(app, session);
+  add_control(app, session);
   add_equilibrium(app, session);
   add_expand(app, session);
   add_fit(app, session);

@@ -9,6 +9,7 @@ namespace diracstep::command {
 /// status in the session, which must outlive the parser.
 void add_boundary(CLI::App& app, Session& session);
 void add_check(CLI::App& app, Session& session);
+void add_control(CLI::App& app, Session& session);
 void add_equilibrium(CLI::App& app, Session& session);
 void add_expand(CLI::App& app, Session& session);
 void add_fit(CLI::App& app, Session& session);

@@ -7,6 +7,7 @@
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/files/csv_table.hpp>
 #include <diracstep/files/input_file.hpp>
+#include <limits>
 #include <optional>
 #include <string_view>
 
@@ -14,26 +15,29 @@ namespace diracstep {
 
 namespace {
 
-std::string_view trimmed(std::string_view text) {
-  const auto blank = [](char c) { return c == ' ' || c == '\t' || c == '\r'; };
-  while (!text.empty() && blank(text.front())) text.remove_prefix(1);
-  while (!text.empty() && blank(text.back())) text.remove_suffix(1);
-  return text;
+std::string_view trimmed(std::string_view text, std::string_view of = " \t\r") {
+  const std::size_t first = text.find_first_not_of(of);
+  if (first == std::string_view::npos) return {};
+  return text.substr(first, text.find_last_not_of(of) + 1 - first);
 }
 
 std::vector<std::string> fields_of(std::string_view line) {
   std::vector<std::string> fields;
   for (std::size_t begin = 0; begin <= line.size();) {
     const std::size_t end = std::min(line.find(',', begin), line.size());
-    fields.emplace_back(trimmed(line.substr(begin, end - begin)));
+    fields.emplace_back(trimmed(line.substr(begin, end - begin), " \t\r\""));
     begin = end + 1;
   }
   return fields;
 }
 
-std::optional<std::vector<double>> numbers_of(const std::vector<std::string>& fields) {
+std::optional<std::vector<double>> numbers_of(const std::vector<std::string>& fields, EmptyFields empty) {
   std::vector<double> numbers;
   for (const std::string& field : fields) {
+    if (field.empty() && empty == EmptyFields::missing) {
+      numbers.push_back(std::numeric_limits<double>::quiet_NaN());
+      continue;
+    }
     double value = 0.0;
     const char* const end = field.data() + field.size();
     const auto [stop, error] = std::from_chars(field.data(), end, value);
@@ -54,7 +58,7 @@ std::size_t CsvTable::column(const std::string& name) const {
 }
 
 CsvTable read_csv(const std::string& path, const std::string& what, std::size_t limit,
-                  std::size_t least_columns) {
+                  std::size_t least_columns, EmptyFields empty) {
   const std::string text = read_file(path, what, limit);
   CsvTable table;
   std::size_t width = 0;
@@ -68,7 +72,7 @@ CsvTable read_csv(const std::string& path, const std::string& what, std::size_t 
     ++number;
     if (line.empty() || line.front() == '#') continue;
     const std::vector<std::string> fields = fields_of(line);
-    auto numbers = numbers_of(fields);
+    auto numbers = numbers_of(fields, empty);
     if (width == 0 && fields.size() < least_columns)
       throw Misuse(
           fmt::format("{}: '{}', line {}: expected {} columns or more", what, path, number, least_columns));

@@ -15,10 +15,13 @@ struct CsvTable {
   std::size_t column(const std::string& name) const;
 };
 
+/// Whether a field may be empty, which then is NaN.
+enum class EmptyFields { refused, missing };
+
 /// Reads numbers separated by commas, `least_columns` or more, the same in each line; a first line that is
-/// none of numbers names the columns.  Empty lines and lines that begin with # are skipped.  Throws Misuse as
-/// read_file() does, and for anything else, with the line.
+/// none of numbers names the columns.  Fields may stand in quotes.  Empty lines and lines that begin with #
+/// are skipped.  Throws Misuse as read_file() does, and for anything else, with the line.
 CsvTable read_csv(const std::string& path, const std::string& what, std::size_t limit,
-                  std::size_t least_columns = 2);
+                  std::size_t least_columns = 2, EmptyFields empty = EmptyFields::refused);
 
 }  // namespace diracstep

@@ -20,7 +20,7 @@ _diracstep() {
         *,) words="$(diracstep --help 2>/dev/null | sed -n '/^Subcommands:/,/^$/s/^  \([a-z]\{1,\}\) .*/\1/p')" ;;
         *,list) words="scenes methods plugins" ;;
         *,sweep) compopt -o default 2>/dev/null && return ;;
-        *,boundary | *,check | *,equilibrium | *,expand | *,fit | *,plan | *,run | *,start | *,study)
+        *,boundary | *,check | *,control | *,equilibrium | *,expand | *,fit | *,plan | *,run | *,start | *,study)
           compopt -o default 2>/dev/null # and scene files
           words="$(diracstep list scenes 2>/dev/null | awk '/^$/ { exit } NR > 1 && /^[^ ]/ { print $1 }')"
           ;;

@@ -5,8 +5,10 @@
 #include <diracstep/scene_format/detail/start_of_file.hpp>
 #include <diracstep/scene_format/loader/named_values.hpp>
 #include <diracstep/scene_format/loader/parameter_values.hpp>
+#include <diracstep/scene_format/loader/scene_functions.hpp>
 #include <diracstep/scene_format/parametric_scene_file.hpp>
 #include <diracstep/sensitivities/moved_start.hpp>
+#include <limits>
 
 namespace diracstep {
 
@@ -76,7 +78,7 @@ std::string doubt_of_switches(const SceneProgram& program) {
 
 ParametricScene load_parametric(const std::string& file, const std::string& text, const CatalogueScene& entry,
                                 const std::vector<std::string>& parameters, const Parameters& changes,
-                                bool as_written) {
+                                bool as_written, SceneControl* control = nullptr) {
   const auto compiled =
       std::make_shared<const CompiledScene>(compile_scene(file, text, as_written, parameters));
   ParameterValues values = parameter_values(compiled->program->document, changes);
@@ -108,7 +110,25 @@ ParametricScene load_parametric(const std::string& file, const std::string& text
                                 result.start_q, result.start_v);
   }
   move_start(*loaded, entry, result);
+  if (control != nullptr) {
+    control->cost = file_cost(loaded);
+    control->end_cost = file_end_cost(loaded);
+  }
   return result;
+}
+
+void require_in_force_alone(const ParametricScene& scene) {
+  const int n = scene.scene->dimension();
+  const auto require = [&](const SparsityPattern& pattern, const std::string& where) {
+    pattern.for_each([&](Eigen::Index, int i, int j) {
+      if (i < n && j >= n)
+        throw Misuse("control '" + scene.names()[static_cast<std::size_t>(j - n)] + "' stands in " + where +
+                     "; controls stand in forces and in the cost");
+    });
+  };
+  if (scene.extended->lagrangian) require(scene.extended->lagrangian->pattern(), "the Lagrangian");
+  for (const auto& rows : scene.extended->constraints) require(rows->pattern(), "a row");
+  if (!scene.extended->force) throw Misuse("the controls stand in no force");
 }
 
 }  // namespace
@@ -124,6 +144,38 @@ ParametricScene parametric_scene_from_text(const std::string& file, const std::s
   } catch (const ConstantOutOfRange&) {
     return load_parametric(file, text, entry, parameters, changes, true);
   }
+}
+
+SceneControl scene_control_from_text(const std::string& file, const std::string& text,
+                                     const CatalogueScene& entry, const Parameters& changes) {
+  const SceneDocument document = read_document(file, text);
+  if (!document.control)
+    throw Misuse("scene '" + entry.scene->name +
+                 "' has no table [control], which names the parameters that are chosen and their cost");
+  SceneControl control{document.control->names, nullptr, nullptr, nullptr, {}, {}, {}};
+  const auto load = [&](bool as_written) {
+    return load_parametric(file, text, entry, control.names, changes, as_written, &control);
+  };
+  const ParametricScene scene = [&] {
+    try {
+      return load(false);
+    } catch (const ConstantOutOfRange&) {
+      return load(true);
+    }
+  }();
+  require_in_force_alone(scene);
+  control.force = scene.extended->force;
+  control.values = scene.parameters;
+  control.lower = Vector::Constant(control.values.size(), -std::numeric_limits<double>::infinity());
+  control.upper = -control.lower;
+  for (std::size_t k = 0; k < control.names.size(); ++k) {
+    const Limits& limits =
+        std::ranges::find(document.parameters, control.names[k], &SceneDocument::Parameter::name)->limits;
+    const auto i = static_cast<Eigen::Index>(k);
+    control.lower[i] = limits.min.value_or(limits.above.value_or(control.lower[i]));
+    control.upper[i] = limits.max.value_or(limits.below.value_or(control.upper[i]));
+  }
+  return control;
 }
 
 }  // namespace diracstep

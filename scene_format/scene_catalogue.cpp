@@ -112,4 +112,9 @@ ParametricScene parametric_scene(const std::string& name, const CatalogueScene& 
   return parametric_scene_from_text(name, scene_text(name), entry, parameters, changes);
 }
 
+SceneControl scene_control(const std::string& name, const CatalogueScene& entry, const Parameters& changes) {
+  if (!entry.stated_start) throw Misuse("scene '" + name + "' is not from a file: it has no [control]");
+  return scene_control_from_text(name, scene_text(name), entry, changes);
+}
+
 }  // namespace diracstep

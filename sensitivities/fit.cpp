@@ -166,7 +166,20 @@ class Residuals {
       const auto [k, c] = measured_[static_cast<std::size_t>(i)];
       jacobian.row(i) = motion_.derivatives[static_cast<std::size_t>(k)].row(c) / sigma(c);
     }
+    clear_round_off(parameters, jacobian);
     return 0;
+  }
+
+  /// A parameter that cancels out of the motion, as the mass of a pendulum, has derivatives that are
+  /// round-off of the motion: they determine nothing.
+  void clear_round_off(const Vector& parameters, Columns& jacobian) const {
+    constexpr double round_off = 1e-10;
+    double size = 0.0;
+    for (const auto& [k, c] : measured_) size = std::hypot(size, motion_.values(k, c) / sigma(c));
+    for (Eigen::Index i = 0; i < parameters.size(); ++i) {
+      const double unit = parameters[i] != 0.0 ? std::abs(parameters[i]) : 1.0;
+      if (jacobian.col(i).norm() * unit <= round_off * size) jacobian.col(i).setZero();
+    }
   }
 
   /// The motion there, once for the residuals and their derivatives.

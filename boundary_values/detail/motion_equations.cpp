@@ -17,15 +17,18 @@ Sparse transposed(const Sparse& matrix) { return matrix.transpose(); }
 }  // namespace
 
 MotionEquations::MotionEquations(const Integrator& integrator, const Registry& registry, long steps,
-                                 BoundaryConditions conditions)
-    : conditions_(std::move(conditions)) {
+                                 BoundaryConditions conditions, std::optional<StepParameters> parameters)
+    : conditions_(std::move(conditions)),
+      parameters_(std::move(parameters)),
+      step_size_(integrator.options().step) {
   sensitivity::require_lagrangian(integrator);
   prepared_ = std::shared_ptr<const Scene>(std::shared_ptr<const Scene>{}, &integrator.scene());
   n_ = prepared_->dimension();
   nv_ = prepared_->lagrangian->structure().phase_space() ? 0 : n_;
   m_ = prepared_->rows();
   m_h_ = row_count(only_holonomic(prepared_->constraints));
-  scene_ = std::make_shared<sensitivity::ExtendedScene>(prepared_, n_, Vector());
+  scene_ = parameters_ ? parameters_->scene
+                       : std::make_shared<sensitivity::ExtendedScene>(prepared_, n_, Vector());
   parts_ = sensitivity::stage_equations<Sparse>(integrator, registry, scene_, false);
   start_time_ = integrator.time();
   place_stages(integrator, registry, steps);
@@ -57,7 +60,7 @@ void MotionEquations::place_stages(const Integrator& integrator, const Registry&
       double t = piece.start;
       for (const auto& [fraction, part] : design.stages) {
         const double h = fraction * piece.size;
-        Stage stage{part, {t, h}, node, 0, 0, row};
+        Stage stage{part, {t, h}, node, 0, 0, row, k};
         const int unknowns = parts_[part]->unknowns();
         stage.x = take(unknown_kind, unknowns);
         stage.next = node = take_node();
@@ -77,7 +80,19 @@ void MotionEquations::place_stages(const Integrator& integrator, const Registry&
   unknowns_ = place;
 }
 
+Interval MotionEquations::step(long k) const {
+  return {start_time_ + static_cast<double>(k) * step_size_, step_size_};
+}
+
+void MotionEquations::use_parameters(long step_number, const Vector& u) {
+  if (!parameters_) return;
+  const auto values = u.segment(parameters_at(step_number), parameter_count());
+  scene_->set_parameters(values);
+  parameters_->use(step(step_number), values);
+}
+
 SolvedStage MotionEquations::at(const Stage& stage, const Vector& u) {
+  use_parameters(stage.number, u);
   const Vector q = u.segment(stage.node, n_), p = u.segment(stage.node + n_, n_);
   const int own = equations(stage).problem().size();
   const int all = equations(stage).unknowns();
@@ -102,7 +117,7 @@ Vector MotionEquations::rows_residual(double t, const Vector& q, const Vector& v
 Sparse MotionEquations::holonomic(double t, const Vector& q) {
   sensitivity::BlockSum<Sparse> all(m_h_, n_);
   int row = 0;
-  for (const auto& block : holonomic_blocks()) {
+  for (const auto& block : only_holonomic(scene_->scene().constraints)) {
     all.add(row, 0, scene_->coefficients<Sparse>(*block, t, q));
     row += block->rows();
   }
@@ -110,7 +125,9 @@ Sparse MotionEquations::holonomic(double t, const Vector& q) {
 }
 
 Vector MotionEquations::guess(const GuessedMotion& path) {
-  Vector u = Vector::Zero(unknowns_);
+  Vector u = Vector::Zero(parameters_at(steps()));
+  for (long k = 0; parameters_ && k < steps(); ++k)
+    u.segment(parameters_at(k), parameter_count()) = parameters_->start;
   const auto put_node = [&](int node, double t) {
     const GuessedPoint point = path(t);
     require_size("the guess: positions", point.q.size(), n_);
@@ -163,7 +180,7 @@ MotionEquations::Residual MotionEquations::residual(const Vector& u) {
     r.ends.head(m_) = rows_residual(start_time_, q0, v0);
   }
   int row = m_;
-  for (const auto& block : holonomic_blocks()) {
+  for (const auto& block : only_holonomic(scene().constraints)) {
     block->position(start_time_, q0, r.ends.segment(row, block->rows()));
     row += block->rows();
   }
@@ -175,10 +192,21 @@ MotionEquations::Residual MotionEquations::residual(const Vector& u) {
   return r;
 }
 
+/// By z = (q, θ, p): q and p stand together, θ behind all.
+void MotionEquations::add_by_start(const Stage& stage, int row, const Sparse& by_start, double factor,
+                                   sensitivity::BlockSum<Sparse>& to) const {
+  const int count = parameter_count();
+  if (count == 0) return to.add(row, stage.node, by_start, factor);
+  to.add(row, stage.node, Sparse(by_start.leftCols(n_)), factor);
+  to.add(row, parameters_at(stage.number), Sparse(by_start.middleCols(n_, count)), factor);
+  to.add(row, stage.node + n_, Sparse(by_start.rightCols(n_)), factor);
+}
+
 MotionEquations::Jacobian MotionEquations::jacobian(const Vector& u) {
   const auto conditions = static_cast<int>(conditions_.value.size());
-  sensitivity::BlockSum<Sparse> motion(unknowns_ - freedom(), unknowns_),
-      ends(start_rows() + conditions, unknowns_);
+  const auto columns = static_cast<int>(u.size());
+  sensitivity::BlockSum<Sparse> motion(unknowns_ - freedom(), columns),
+      ends(start_rows() + conditions, columns);
   sensitivity::ExtendedScene::LagrangianAt<Sparse> point;
   const Vector q0 = u.segment(nv_, n_), qN = u.segment(end_, n_);
   Vector v0 = Vector::Zero(n_), vN = v0;
@@ -193,10 +221,10 @@ MotionEquations::Jacobian MotionEquations::jacobian(const Vector& u) {
     equations(stage).take(at(stage, u), stage_jacobians);
     const int defects = stage.row + equations(stage).unknowns();
     motion.add(stage.row, stage.x, stage_jacobians.by_unknowns);
-    motion.add(stage.row, stage.node, stage_jacobians.by_start);
+    add_by_start(stage, stage.row, stage_jacobians.by_start, 1.0, motion);
     motion.add_identity(defects, stage.next, 2 * n_);
     motion.add(defects, stage.x, stage_jacobians.end_by_unknowns, -1.0);
-    motion.add(defects, stage.node, stage_jacobians.end_by_start, -1.0);
+    add_by_start(stage, defects, stage_jacobians.end_by_start, -1.0, motion);
   }
   // Of what the conditions name at the end, by q, p and μ there: p + Aᵀμ.
   const Sparse by_p = sparse(conditions_.at_end.rightCols(n_));
@@ -269,7 +297,7 @@ Vector MotionEquations::end_momentum(const Vector& u) {
   if (nv_ == 0 || m_ == 0) return p;
   ConstraintsAtPoint rows(scene().constraints, n_);
   rows.evaluate(end_time_, u.segment(end_, n_));
-  rows.add_annihilator(u.tail(m_), p);
+  rows.add_annihilator(u.segment(end_ + 3 * n_, m_), p);
   return p;
 }
 

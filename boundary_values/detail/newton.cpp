@@ -38,6 +38,7 @@ constexpr double round_off = 1e-14;       // corrections that mean nothing
 constexpr double near_round_off = 1e-10;  // from here on a correction that no longer falls is round-off
 constexpr double smallest_damping = 1e-6;
 constexpr double rank_tolerance = 1e-7;
+constexpr double least_part_of_guess = 1e-2;
 
 }  // namespace
 
@@ -79,7 +80,7 @@ Columns DeterminedEnds::by_conditions(int count) const {
   return refined(factor_, matrix_, right).topRows(unknowns_);
 }
 
-FamilyOfEnds::FamilyOfEnds(MotionEquations& equations, const Vector& u, const Vector& sizes)
+FamilyOfEnds::FamilyOfEnds(MotionEquations& equations, const Vector& u, const Vector& sizes, double power)
     : unknowns_(equations.unknowns()) {
   const MotionEquations::Jacobian j = equations.jacobian(u);
   const std::vector<int> start = equations.start_unknowns(), end = equations.end_unknowns();
@@ -107,7 +108,7 @@ FamilyOfEnds::FamilyOfEnds(MotionEquations& equations, const Vector& u, const Ve
   ends_ = row_sizes_.cwiseInverse().asDiagonal() * (j.ends * along_);
   start_rows_ = (j.ends * along_).topRows(equations.start_rows());
   const MotionEquations::Residual r = equations.residual(u);
-  damping_ = std::sqrt(std::min(1.0, left(r, particular(r)).norm()));
+  damping_ = std::pow(std::min(1.0, left(r, particular(r)).norm()), 0.5 * power);
   end_by_start_ = start_sizes_.cwiseInverse().asDiagonal() * along_(end, Eigen::all);
 }
 
@@ -137,9 +138,12 @@ Vector FamilyOfEnds::correction(const MotionEquations::Residual& r) const {
 }
 
 int FamilyOfEnds::free_directions() const {
-  Eigen::ColPivHouseholderQR<Columns> qr(ends_);
-  qr.setThreshold(rank_tolerance);
-  return static_cast<int>(ends_.cols() - qr.rank());
+  const Eigen::ColPivHouseholderQR<Columns> qr(ends_);
+  // In parts of the terms that the conditions are made of: where all directions are free, nothing is left of
+  // them but round-off.
+  const double least = rank_tolerance * std::max(1.0, qr.maxPivot());
+  const auto diagonal = qr.matrixQR().diagonal().cwiseAbs();
+  return static_cast<int>(ends_.cols() - (diagonal.array() > least).count());
 }
 
 Columns FamilyOfEnds::transition() const {
@@ -152,23 +156,24 @@ Columns FamilyOfEnds::transition() const {
   return basis.transpose() * end_by_start_ * basis;
 }
 
-NewtonReport newton(MotionEquations& equations, Vector& u, int max_iterations,
-                    const std::function<std::unique_ptr<LinearisedEnds>(const Vector& u)>& factor) {
+NewtonReport newton(MotionEquations& equations, Vector& u, int max_iterations, const FactorEnds& factor) {
   NewtonReport report;
   double damping = 1.0;
+  // Where all comes to rest at zero, corrections are measured by the guess.
+  const Vector least = least_part_of_guess * sizes_by_kind(equations, u);
   MotionEquations::Residual r = equations.residual(u);
   while (report.iterations < max_iterations) {
     ++report.iterations;
+    const Vector sizes = sizes_by_kind(equations, u).cwiseMax(least);
     std::unique_ptr<LinearisedEnds> linear;
     try {
-      linear = factor(u);
+      linear = factor(u, sizes);
     } catch (const Misuse&) {
       throw;
     } catch (const Error&) {
       report.failure = "its Jacobian is singular";
       return report;
     }
-    const Vector sizes = sizes_by_kind(equations, u);
     const Vector correction = linear->correction(r);
     const double length = norm_of(equations, correction, sizes);
     report.correction = length;

@@ -37,13 +37,13 @@ class DeterminedEnds final : public LinearisedEnds {
 /// Conditions that leave families of solutions, or depend on each other.  With the start held, the equations
 /// of the motion are one sparse matrix, solved for the residual and for the derivatives Z by each number of
 /// the start; what is then left is min ‖G ė + g‖² + μ ‖ė‖² for the 2n numbers ė of the start, in parts of
-/// their size, with G the derivatives of the ends' equations along Z.  With μ = ‖g‖ that is Levenberg and
-/// Marquardt's method, of second order also where solutions are not isolated (Yamashita, Fukushima, Computing
-/// Suppl. 15, 2001).
+/// their size, with G the derivatives of the ends' equations along Z.  With μ = ‖g‖ or ‖g‖² that is Levenberg
+/// and Marquardt's method, of second order also where solutions are not isolated (Yamashita, Fukushima,
+/// Computing Suppl. 15, 2001).
 class FamilyOfEnds final : public LinearisedEnds {
  public:
-  /// `sizes` of each kind of unknown.
-  FamilyOfEnds(MotionEquations& equations, const Vector& u, const Vector& sizes);
+  /// `sizes` of each kind of unknown; μ = ‖g‖^power.
+  FamilyOfEnds(MotionEquations& equations, const Vector& u, const Vector& sizes, double power = 1.0);
   Vector correction(const MotionEquations::Residual& r) const override;
   /// How many directions of the start the equations of the ends leave free.
   int free_directions() const;
@@ -65,6 +65,9 @@ class FamilyOfEnds final : public LinearisedEnds {
   Columns start_rows_, end_by_start_;
 };
 
+/// `sizes` of each kind of unknown.
+using FactorEnds = std::function<std::unique_ptr<LinearisedEnds>(const Vector& u, const Vector& sizes)>;
+
 struct NewtonReport {
   bool converged = false;
   std::string failure;
@@ -74,8 +77,7 @@ struct NewtonReport {
 
 /// Newton's method from u on; `factor` makes the linear systems at an iterate, and throws Error where it
 /// cannot.
-NewtonReport newton(MotionEquations& equations, Vector& u, int max_iterations,
-                    const std::function<std::unique_ptr<LinearisedEnds>(const Vector& u)>& factor);
+NewtonReport newton(MotionEquations& equations, Vector& u, int max_iterations, const FactorEnds& factor);
 
 /// The largest number of each Kind of unknown, 1 where all are zero.
 Vector sizes_by_kind(const MotionEquations& equations, const Vector& u);

@@ -5,10 +5,9 @@
 #include <cmath>
 #include <diracstep/boundary_values/boundary_values.hpp>
 #include <diracstep/command/arguments.hpp>
-#include <diracstep/command/files/data_table.hpp>
+#include <diracstep/command/end_conditions.hpp>
 #include <diracstep/command/verbs.hpp>
 #include <diracstep/core/numerics/errors.hpp>
-#include <diracstep/core/numerics/near_names.hpp>
 #include <diracstep/core/runs/run.hpp>
 #include <diracstep/files/output_file.hpp>
 #include <diracstep/reports/json.hpp>
@@ -32,126 +31,12 @@ struct BoundaryArguments {
 constexpr int most_conditions_shown = 40;  // coordinates, multipliers
 constexpr long most_boundary_steps = 10'000'000;
 
-/// Columns of q, v and p as conditions name them: x, v_x, p_x.
-std::vector<std::string> names_at_an_end(const Scene& scene) {
-  std::vector<std::string> known;
-  for (const char* prefix : {"", "v_", "p_"})
-    for (const std::string& name : scene.coordinates) known.push_back(prefix + name);
-  return known;
-}
-
-/// What is asked of one end, by columns of (q, v, p).
-using Asked = std::vector<std::pair<Eigen::Index, double>>;
-
-Asked asked(const Scene& scene, const std::vector<std::string>& assignments, const std::string& option) {
-  const std::vector<std::string> known = names_at_an_end(scene);
-  Asked result;
-  for (const auto& [name, value] : parameters(assignments, option)) {
-    const auto found = std::ranges::find(known, name);
-    if (found == known.end())
-      throw Misuse(fmt::format("{}: '{}' is no coordinate of scene '{}', nor v_ or p_ before one{}", option,
-                               name, scene.name, did_you_mean(name, known)));
-    result.emplace_back(found - known.begin(), value);
-  }
-  std::ranges::sort(result);  // places first
-  return result;
-}
-
-bool holds_all_places(const Asked& at, int n) {
-  return std::ranges::count_if(at, [n](const auto& one) { return one.first < n; }) == n;
-}
-
-/// Conditions in the order of BoundaryConditions: where all of a place is given, q0 first and qN last.
-BoundaryConditions conditions_of(const Asked& start, const Asked& end, int n) {
-  const auto rows = static_cast<Eigen::Index>(start.size() + end.size());
-  BoundaryConditions conditions{Columns::Zero(rows, 3 * n), Columns::Zero(rows, 3 * n), Vector(rows),
-                                holds_all_places(start, n), holds_all_places(end, n),   false};
-  Eigen::Index row = 0;
-  for (const auto& [column, value] : start) {
-    conditions.at_start(row, column) = 1.0;
-    conditions.value[row++] = value;
-  }
-  const auto places = std::ranges::partition_point(end, [n](const auto& one) { return one.first < n; });
-  const auto put = [&](const auto& one) {
-    conditions.at_end(row, one.first) = 1.0;
-    conditions.value[row++] = one.second;
-  };
-  std::for_each(places, end.end(), put);
-  std::for_each(end.begin(), places, put);
-  return conditions;
-}
-
-/// Between the points of a table, straight.
-GuessedMotion through(Vector times, Columns q, Columns v) {
-  return [=](double t) {
-    const Eigen::Index last = times.size() - 1;
-    if (last == 0) return GuessedPoint{q.col(0), v.col(0)};
-    const double sign = times[last] > times[0] ? 1.0 : -1.0;
-    Eigen::Index k = 0;
-    while (k < last - 1 && sign * (times[k + 1] - t) < 0.0) ++k;
-    const double part = std::clamp((t - times[k]) / (times[k + 1] - times[k]), 0.0, 1.0);
-    return GuessedPoint{q.col(k) + part * (q.col(k + 1) - q.col(k)),
-                        v.col(k) + part * (v.col(k + 1) - v.col(k))};
-  };
-}
-
-GuessedMotion guess_from_file(const std::string& path, const Scene& scene) {
-  const DataTable table = read_table(path);
-  const int n = scene.dimension();
-  const auto count = static_cast<Eigen::Index>(table.rows.size());
-  Vector times(count);
-  Columns states = Columns::Zero(2 * n, count);
-  const std::vector<std::string> known = names_at_an_end(scene);
-  const auto read = [&](const std::string& name, const auto& put) {
-    const auto found = std::ranges::find(table.names, name);
-    if (found == table.names.end()) return false;
-    for (Eigen::Index k = 0; k < count; ++k) {
-      const double number =
-          table.rows[static_cast<std::size_t>(k)][static_cast<std::size_t>(found - table.names.begin())];
-      if (!std::isfinite(number))
-        throw Misuse(fmt::format("--guess: '{}': a field of the column '{}' is empty", path, name));
-      put(k, number);
-    }
-    return true;
-  };
-  if (!read("t", [&](Eigen::Index k, double t) { times[k] = t; }))
-    throw Misuse(fmt::format("--guess: '{}' has no column t", path));
-  for (Eigen::Index k = 1; k < count; ++k)
-    if (!((times[k] - times[k - 1]) * (times[count - 1] - times[0]) > 0.0))
-      throw Misuse(fmt::format("--guess: '{}': t = {:g} does not follow {:g}", path, times[k], times[k - 1]));
-  for (int i = 0; i < 2 * n; ++i) {
-    const std::string& name = known[static_cast<std::size_t>(i)];
-    if (!read(name, [&](Eigen::Index k, double value) { states(i, k) = value; }))
-      throw Misuse(fmt::format("--guess: '{}' has no column '{}'", path, name));
-  }
-  return through(times, states.topRows(n), states.bottomRows(n));
-}
-
-/// The motion from the start of the scene.
-GuessedMotion guess_from_start(const BoundaryProblem& problem) {
-  Integrator integrator(problem.scene, problem.registry, problem.solvers, problem.options);
-  const int n = problem.scene->dimension();
-  Vector times(problem.steps + 1);
-  Columns q(n, problem.steps + 1), v(n, problem.steps + 1);
-  Eigen::Index k = 0;
-  const RunReport run =
-      run_steps(integrator, problem.steps, Momentum::projected, 1, [&](const Sample& sample) {
-        times[k] = sample.time;
-        q.col(k) = sample.q;
-        v.col(k) = sample.v.size() > 0 ? sample.v : Vector::Zero(n);
-        return ++k <= problem.steps;
-      });
-  if (k <= problem.steps)
-    throw Error(
-        fmt::format("the motion from the start, which is the guess, fails: {}; --guess FILE gives another",
-                    run.last.failure));
-  return through(times, q, v);
-}
-
-GuessedMotion guess_of(const BoundaryArguments& arguments, const BoundaryProblem& problem) {
+GuessedMotion guess_of(const BoundaryArguments& arguments, const BoundaryProblem& problem,
+                       const Session& session) {
   if (!arguments.guess.empty()) return guess_from_file(arguments.guess, *problem.scene);
   const BoundaryConditions& conditions = problem.conditions;
-  if (!conditions.start_held || !conditions.end_held) return guess_from_start(problem);
+  if (!conditions.start_held || !conditions.end_held)
+    return guess_from_start(problem.scene, session, problem.options, problem.steps);
   const int n = problem.scene->dimension();
   const double t0 = problem.scene->start.time;
   return straight_line(t0, conditions.value.head(n),
@@ -264,10 +149,50 @@ BoundaryConditions conditions_of(const BoundaryArguments& arguments, const Scene
   }
   if (arguments.to.empty())
     throw Misuse("--to NAME=VALUE says what is asked of the end, or --periodic that it is as the start");
-  Asked start = asked(scene, arguments.from, "--from");
-  if (arguments.from.empty())
-    for (int i = 0; i < n; ++i) start.emplace_back(i, scene.start.q[i]);
-  return conditions_of(start, asked(scene, arguments.to, "--to"), n);
+  return conditions_at_ends(scene, arguments.from, arguments.to);
+}
+
+double apart(const BoundaryReport& one, const BoundaryReport& other, double& size) {
+  const Eigen::Index stride = (other.times.size() - 1) / (one.times.size() - 1);
+  double off = 0.0;
+  size = one.q.lpNorm<Eigen::Infinity>();
+  for (Eigen::Index k = 0; k < one.times.size(); ++k)
+    off = std::max(off, (one.q.col(k) - other.q.col(k * stride)).lpNorm<Eigen::Infinity>());
+  return off;
+}
+
+/// Between two places: a solution of the discrete equations that is near no motion changes with the steps.
+std::string doubt_of_steps(BoundaryProblem problem, const BoundaryReport& found) {
+  constexpr double far = 0.02;  // of the largest coordinate
+  problem.steps *= 2;
+  problem.options.step *= 0.5;
+  problem.guess = through_points(found.times, found.q, found.v);
+  const BoundaryReport finer = solve_boundary_values(problem);
+  if (!finer.converged)
+    return "with steps of half the size no motion is found near it: it is that of the steps";
+  double size = 0.0;
+  const double off = apart(found, finer, size);
+  if (off <= far * size) return "";
+  return fmt::format(
+      "with steps of half the size the motion is another, up to {:.2g} off: steps are too large", off);
+}
+
+/// A second guess, and what it leads to.
+std::string other_motion(BoundaryProblem problem, const BoundaryReport& found, const Session& session) {
+  const BoundaryConditions& conditions = problem.conditions;
+  if (!conditions.start_held || !conditions.end_held) return "";
+  try {
+    problem.guess = guess_from_start(problem.scene, session, problem.options, problem.steps);
+  } catch (const Error&) {
+    return "";
+  }
+  const BoundaryReport other = solve_boundary_values(problem);
+  double size = 0.0;
+  constexpr double same = 1e-6;
+  if (!other.converged || apart(found, other, size) <= same * size) return "";
+  return fmt::format(
+      "another motion fulfils the conditions{}: the guess chooses; --guess FILE leads to others",
+      other.action ? fmt::format(", of the action {:.6g}", other.action->value) : "");
 }
 
 void run_boundary(BoundaryArguments arguments, Session& session) {
@@ -288,12 +213,16 @@ void run_boundary(BoundaryArguments arguments, Session& session) {
                           conditions_of(arguments, *entry.scene),
                           {}};
   problem.options.step = grid.step;
-  problem.guess = guess_of(arguments, problem);
-  const BoundaryReport report = solve_boundary_values(problem);
+  problem.guess = guess_of(arguments, problem, session);
+  BoundaryReport report = solve_boundary_values(problem);
+  const bool places = report.converged && problem.conditions.start_held && problem.conditions.end_held;
+  if (places && report.doubt.empty()) report.doubt = doubt_of_steps(problem, report);
   if (!arguments.out.empty()) write_motion(arguments.out, report, *entry.scene);
   const std::string method =
       Integrator(entry.scene, session.registry, session.solvers, problem.options).method().name;
   print(arguments.json ? boundary_json(report, problem, method) : boundary_text(report, problem, method));
+  if (places && arguments.guess.empty())
+    if (const std::string other = other_motion(problem, report, session); !other.empty()) say(other);
   if (report.converged && !report.doubt.empty()) {
     say("doubted: " + report.doubt);
     session.exit_status = doubted;

@@ -5,10 +5,10 @@
 #include <array>
 #include <cmath>
 #include <diracstep/command/arguments.hpp>
-#include <diracstep/command/files/data_table.hpp>
 #include <diracstep/command/verbs.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/numerics/near_names.hpp>
+#include <diracstep/files/csv_table.hpp>
 #include <diracstep/files/output_file.hpp>
 #include <diracstep/reports/json.hpp>
 #include <diracstep/reports/plot.hpp>
@@ -21,6 +21,8 @@
 namespace diracstep::command {
 
 namespace {
+
+constexpr std::size_t most_data_bytes = 100'000'000;
 
 struct FitArguments {
   std::string scene, data, parameters, residuals, picture;
@@ -39,9 +41,11 @@ bool is_left_alone(const std::string& name) {
 }
 
 /// The columns that are coordinates, velocities v_NAME or outputs; any other name is a mistake.
-FitData data_of(const DataTable& table, const std::string& path, const CatalogueScene& entry,
+FitData data_of(const CsvTable& table, const std::string& path, const CatalogueScene& entry,
                 const Parameters& sigma) {
   const Scene& scene = *entry.scene;
+  if (table.lines.empty()) throw Misuse(fmt::format("'{}' has no lines of data", path));
+  if (table.names.empty()) throw Misuse(fmt::format("'{}': the first line does not name the columns", path));
   if (table.names.front() != "t")
     throw Misuse(fmt::format("'{}': the first column is '{}'; expected t", path, table.names.front()));
   std::vector<std::string> known;
@@ -75,11 +79,11 @@ FitData data_of(const DataTable& table, const std::string& path, const Catalogue
                              scene.name));
   if (!left.empty())
     throw Misuse(fmt::format("--sigma: '{}' is no column of '{}'", left.begin()->first, path));
-  const auto rows = static_cast<Eigen::Index>(table.rows.size());
+  const auto rows = static_cast<Eigen::Index>(table.lines.size());
   data.times.resize(rows);
   data.values.resize(rows, static_cast<Eigen::Index>(used.size()));
   for (Eigen::Index k = 0; k < rows; ++k) {
-    const auto& row = table.rows[static_cast<std::size_t>(k)];
+    const auto& row = table.lines[static_cast<std::size_t>(k)];
     data.times[k] = row[0];
     for (std::size_t c = 0; c < used.size(); ++c) data.values(k, static_cast<Eigen::Index>(c)) = row[used[c]];
   }
@@ -215,7 +219,7 @@ void run_fit(FitArguments arguments, Session& session) {
                                parameters_fitted[k]));
     begin[static_cast<Eigen::Index>(k)] = found->second;
   }
-  const DataTable table = read_table(arguments.data);
+  const CsvTable table = read_csv(arguments.data, "the data", most_data_bytes, 2, EmptyFields::missing);
   const FitData data = data_of(table, arguments.data, entry, parameters(arguments.sigma, "--sigma"));
   take_recommendation(entry, arguments.method, arguments.step);
   IntegratorOptions steps = integrator_options(session, arguments.method);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <diracstep/command/arguments.hpp>
 #include <diracstep/command/files/written_file.hpp>
+#include <diracstep/command/gradient_study.hpp>
 #include <diracstep/command/interrupt.hpp>
 #include <diracstep/command/progress.hpp>
 #include <diracstep/command/scene_selection.hpp>
@@ -216,6 +217,8 @@ void tell_baselines_left_out(const CatalogueScene& entry) {
 }
 
 void study(const StudyArguments& options, Session& session) {
+  if (options.sensitivities)
+    return study_gradients({options.scenes, options.set, options.end, options.out, options.json}, session);
   require_files(options, session);
   std::vector<CatalogueScene> scenes = chosen_scenes(options, session);
   std::ranges::for_each(scenes, tell_baselines_left_out);
@@ -283,6 +286,9 @@ void add_study(CLI::App& app, Session& session) {
   verb->add_flag("--without-erk", options->without_erk, "No runs of the explicit Runge–Kutta method");
   verb->add_flag("--full", options->full,
                  "More methods, tolerances, repeats and, where none are named, scenes; no limit of time");
+  verb->add_flag("--sensitivities", options->sensitivities,
+                 "Instead of motions their derivatives by the start, beside forward sensitivities by IDAS;\n"
+                 "takes SCENE, --end, --set, --out and --json");
   verb->add_option("--repeat", options->repeat, "Timed runs of each row; 3, and 5 with --full");
   verb->add_option("--budget", options->budget,
                    "CPU seconds that a run of a ladder may take; 0.1, and 1 with --full");

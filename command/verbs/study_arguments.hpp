@@ -24,7 +24,7 @@ struct StudyArguments {
   std::string momentum = "projected";
   std::string out, compare, more_scenes, table;
   std::vector<std::string> set;
-  bool json = false;
+  bool json = false, sensitivities = false;
 };
 
 /// Where the person said how far the ladders go, they go so far.

@@ -50,7 +50,7 @@ html_copy_source = False
 html_show_sphinx = False
 
 NAVIGATION = {
-    "Use": ["getting_started", "choosing_a_method", "scene_format", "bodies", "inputs_and_states", "events", "circuits", "fields", "parts", "manifolds", "equilibria", "sensitivities", "boundary_values", "python",
+    "Use": ["getting_started", "choosing_a_method", "scene_format", "bodies", "inputs_and_states", "events", "circuits", "fields", "parts", "manifolds", "equilibria", "sensitivities", "boundary_values", "optimal_control", "python",
             "solver_backend", "plugins", "adaptive", "sweeps", "safety"],
     "Understand": ["mathematics", "measuring", "orders", "at_error", "stability"],
     "More": ["Front page </README>", "/api/index", "/api/python", "/core/README", "/CONTRIBUTING", "/SECURITY", "/CHANGELOG"],

@@ -54,8 +54,12 @@ debian_package(library ${library} libs "discrete Dirac mechanics, C interface"
   "This is libdiracstep, for programs in C and languages that can call C.")
 debian_package(development libdiracstep-dev libdevel "discrete Dirac mechanics, development files"
   "These are the headers, the C++ libraries, CMake and pkg-config files,\nand examples.")
+set(ipopt "")
+if(DIRACSTEP_WITH_IPOPT)
+  set(ipopt ", coinor-libipopt-dev")
+endif()
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS "${library} (= ${version}), libeigen3-dev (>= 3.4), \
-libsundials-dev (>= 6.4), libsuitesparse-dev, libfmt-dev, libtomlplusplus-dev")
+libsundials-dev (>= 6.4), libsuitesparse-dev, libfmt-dev, libtomlplusplus-dev${ipopt}")
 debian_package(command diracstep math "discrete Dirac mechanics, the command"
   "This is the command diracstep: scenes, runs, convergence and stability\nstudies.")
 set(CPACK_DEBIAN_COMMAND_PACKAGE_RECOMMENDS "gcc, libc6-dev, gnuplot-nox")  # scene files are compiled, studies plotted

@@ -98,6 +98,12 @@ struct SceneDocument {
     FormulaText formula;
     Place place;
   };
+  /// [control]: parameters that are chosen at each time, and what they cost.
+  struct Control {
+    std::vector<std::string> names;
+    std::optional<FormulaText> cost, end_cost;  ///< an integral over the time, and of the end
+    Place place;
+  };
   /// A node of a circuit; of repeated nodes, "n[k-1]", with its index.
   struct NodeName {
     std::string name;
@@ -178,6 +184,7 @@ struct SceneDocument {
   std::vector<Reference> references;
   std::vector<Invariant> invariants;
   std::vector<Output> outputs;  ///< in the order of the file
+  std::optional<Control> control;
   std::vector<Branch> branches;
   std::vector<Mutual> mutuals;
   std::vector<TwoPort> two_ports;

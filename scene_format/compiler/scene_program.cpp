@@ -21,6 +21,7 @@ void SceneCompiler::compile() {
   for (const auto& output : document_.outputs)
     program_.outputs.push_back(
         {output.name, motion_function(output.formula, "output '" + output.name + "'")});
+  if (document_.control && !program_.differentiated.empty()) compile_control(*document_.control);
   for (const auto& event : document_.events) compile_event(event);
   for (const auto& body : document_.bodies) compile_drawn(body);
   write_source();
@@ -145,7 +146,7 @@ void SceneCompiler::write_source() {
 
 std::vector<const SceneFunction*> SceneProgram::functions() const {
   std::vector<const SceneFunction*> all;
-  for (const auto* function : {&lagrangian, &hamiltonian, &force})
+  for (const auto* function : {&lagrangian, &hamiltonian, &force, &cost, &end_cost})
     if (*function) all.push_back(&**function);
   for (const SceneFunction& function : rows) all.push_back(&function);
   return all;

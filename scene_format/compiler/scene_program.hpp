@@ -123,6 +123,7 @@ struct SceneProgram {
   Symbols symbols;
   Constants known;
   std::optional<SceneFunction> lagrangian, hamiltonian, force;
+  std::optional<SceneFunction> cost, end_cost;  ///< of [control], where parameters are differentiated
   std::vector<SceneFunction> rows;  ///< holonomic and nonholonomic, in the order they first appear
   std::vector<NamedValue> start;
   std::vector<NamedValue> guesses;  ///< without values of use: the components of the start that may be moved

@@ -325,6 +325,16 @@ std::shared_ptr<const Hamiltonian> file_hamiltonian(const LoadedScenePtr& scene)
       LoadedFunction(scene, *scene->program->hamiltonian));
 }
 
+std::shared_ptr<const Lagrangian> file_cost(const LoadedScenePtr& scene) {
+  if (!scene->program->cost) return nullptr;
+  return std::make_shared<FilePhaseFunction<Lagrangian>>(LoadedFunction(scene, *scene->program->cost));
+}
+
+std::shared_ptr<const Lagrangian> file_end_cost(const LoadedScenePtr& scene) {
+  if (!scene->program->end_cost) return nullptr;
+  return std::make_shared<FilePhaseFunction<Lagrangian>>(LoadedFunction(scene, *scene->program->end_cost));
+}
+
 std::shared_ptr<const Force> file_force(const LoadedScenePtr& scene) {
   if (!scene->program->force || vanishes(*scene, *scene->program->force)) return nullptr;
   return std::make_shared<FileForce>(LoadedFunction(scene, *scene->program->force));

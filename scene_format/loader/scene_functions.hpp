@@ -11,6 +11,8 @@ namespace diracstep {
 /// The functions of a loaded scene as the library takes them; null where the scene has none.
 std::shared_ptr<const Lagrangian> file_lagrangian(const LoadedScenePtr& scene);
 std::shared_ptr<const Hamiltonian> file_hamiltonian(const LoadedScenePtr& scene);
+std::shared_ptr<const Lagrangian> file_cost(const LoadedScenePtr& scene);
+std::shared_ptr<const Lagrangian> file_end_cost(const LoadedScenePtr& scene);
 std::shared_ptr<const Force> file_force(const LoadedScenePtr& scene);
 ConstraintBlocks file_constraints(const LoadedScenePtr& scene);
 

@@ -10,6 +10,11 @@ ExtendedScene::ExtendedScene(std::shared_ptr<const Scene> scene, int n, Vector p
   velocity_.setZero(size());
 }
 
+void ExtendedScene::set_parameters(ConstVectorRef values) {
+  parameters_ = values;
+  point_.tail(parameters_.size()) = parameters_;
+}
+
 const Vector& ExtendedScene::point(ConstVectorRef q) {
   point_.head(n_) = q;
   return point_;

@@ -16,6 +16,7 @@ class ExtendedScene {
   int size() const { return n_ + static_cast<int>(parameters_.size()); }
   const Scene& scene() const { return *scene_; }
   int rows() const { return scene_->rows(); }
+  void set_parameters(ConstVectorRef values);
 
   /// (q, θ), and (v, 0).
   const Vector& point(ConstVectorRef q);

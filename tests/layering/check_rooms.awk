@@ -7,6 +7,7 @@ BEGIN {
   library["SUNDIALS"] = "^(sundials|sunmatrix|sunlinsol|sunnonlinsol|nvector|kinsol|idas?|cvodes?|arkode)/"
   library["KLU"] = "^(suitesparse/|(klu|amd|btf|colamd)[.]h)"
   library["Spectra"] = "^Spectra/"
+  library["Ipopt"] = "^Ip[A-Z]"
   library["fmt"] = "^fmt/"
   library["toml++"] = "^toml[+][+]/"
   library["CLI11"] = "^CLI/"
@@ -76,7 +77,7 @@ function check_library_include(path, room, included, name) {
   for (name in library) {
     if (included !~ library[name]) continue
     if (!((room, name) in sees)) fault(path ": " room " must not include " name " (" included ")")
-    else if (name ~ /^(SUNDIALS|KLU|Spectra)$/ && path ~ /[.]hpp$/ && path !~ /\/detail\//)
+    else if (name ~ /^(SUNDIALS|KLU|Spectra|Ipopt)$/ && path ~ /[.]hpp$/ && path !~ /\/detail\//)
       fault(path ": " name " is for sources and detail/ only (" included ")")
   }
 }

@@ -5,6 +5,7 @@ vcpkg_check_features(OUT_FEATURE_OPTIONS FEATURE_OPTIONS
     FEATURES
         klu DIRACSTEP_WITH_KLU
         spectra DIRACSTEP_WITH_SPECTRA
+        ipopt DIRACSTEP_WITH_IPOPT
         command DIRACSTEP_BUILD_VALIDATION
 )
 

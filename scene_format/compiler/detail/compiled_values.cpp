@@ -112,6 +112,16 @@ SceneFunction SceneCompiler::value_function(const FormulaText& formula, const st
   return function;
 }
 
+void SceneCompiler::compile_control(const SceneDocument::Control& control) {
+  const auto compiled = [&](const std::optional<FormulaText>& formula,
+                            const std::string& what) -> std::optional<SceneFunction> {
+    if (!formula) return std::nullopt;
+    return phase_function(parser_.formula(*formula, mechanics(what, 'v')), what, formula->start);
+  };
+  program_.cost = compiled(control.cost, "the cost");
+  program_.end_cost = compiled(control.end_cost, "the cost of the end");
+}
+
 void SceneCompiler::compile_event(const SceneDocument::Event& event) {
   const std::string what = "event '" + event.name + "'";
   EventProgram& program = program_.events.emplace_back();

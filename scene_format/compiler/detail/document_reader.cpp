@@ -4,6 +4,7 @@
 #include <cmath>
 #include <diracstep/scene_format/compiler/circuit_reader.hpp>
 #include <diracstep/scene_format/compiler/detail/document_reader.hpp>
+#include <diracstep/scene_format/compiler/input_table.hpp>
 
 namespace diracstep::scene_compiler {
 
@@ -18,7 +19,7 @@ SceneDocument DocumentReader::read(const toml::table& root) {
       "rows",        "force",       "start",       "span",     "reference",      "invariants",
       "recommended", "inductor",    "capacitor",   "resistor", "source_voltage", "mutual",
       "redundant",   "outputs",     "states",      "inputs",   "events",         "source_current",
-      "diode",       "switch",      "transformer", "gyrator",  "opamp"};
+      "diode",       "switch",      "transformer", "gyrator",  "opamp",          "control"};
   known.insert(known.end(), body_tables().begin(), body_tables().end());
   check_keys(root, "the scene", known);
   read_head(root);
@@ -43,6 +44,7 @@ SceneDocument DocumentReader::read(const toml::table& root) {
   read_invariants(root);
   read_outputs(root);
   for (const auto& output : bodies_.expansion.outputs) add_output(output.name, bodies_.formula(output));
+  document_.control = read_control(*this, root, document_.parameters);
   read_events(root);
   read_recommended(root);
   guess_currents(document_);

@@ -83,6 +83,7 @@ class SceneCompiler {
   SceneFunction value_function(const FormulaText& formula, const std::string& what);
   SceneFunction motion_function(const FormulaText& formula, const std::string& what);
   SceneFunction value_function(const FormulaText& formula, const std::string& what, const Context& context);
+  void compile_control(const SceneDocument::Control& control);
   void compile_event(const SceneDocument::Event& event);
   void compile_contact(const SceneDocument::Event& event, EventProgram& program, const std::string& what);
   void compile_drawn(const SceneDocument::DrawnBody& body);

@@ -45,9 +45,10 @@ TEST(Schema, HasTheKeysOfTheReader) {
         "recommended", "inductor",    "capacitor",   "resistor", "source_voltage", "mutual",
         "redundant",   "inputs",      "states",      "outputs",  "events",         "source_current",
         "diode",       "switch",      "transformer", "gyrator",  "opamp",          "field",
-        "gravity",     "body",        "joint",       "wheel",    "rolling",        "spring"})
+        "gravity",     "body",        "joint",       "wheel",    "rolling",        "spring",
+        "control"})
     EXPECT_TRUE(schema.contains(key)) << key;
-  EXPECT_EQ(schema.size(), 42u);
+  EXPECT_EQ(schema.size(), 43u);
 }
 
 }  // namespace

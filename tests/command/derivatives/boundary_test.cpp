@@ -2,7 +2,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "run_command.hpp"
+#include "../run_command.hpp"
 
 namespace diracstep::testing {
 namespace {
@@ -111,6 +111,29 @@ step = 0.1
   const Outcome outcome = run("boundary '" + file + "' --from x=1 --to x=-0.5 --end 2.7");
   EXPECT_EQ(outcome.status, 3) << outcome.out;
   EXPECT_NE(outcome.err.find("kink"), std::string::npos) << outcome.err;
+}
+
+/// A driven pendulum, which keeps no energy, over steps too large for it: the discrete equations have a
+/// solution that is near no motion.
+TEST_F(Boundary, SolutionsOfTheStepsAloneAreDoubted) {
+  std::ofstream(path("pendulum.toml")) << R"toml(
+name = "pendulum"
+lagrangian = "v_a^2/2 + cos(a) + 0.1*a*sin(t)"
+[coordinates]
+a = {}
+[start]
+a = 0.1
+[span]
+end = 12
+step = 4
+)toml";
+  const Outcome coarse =
+      run("boundary '" + path("pendulum.toml") + "' --from a=0 --to a=2 --method type1/midpoint");
+  EXPECT_EQ(coarse.status, 3) << coarse.out << coarse.err;
+  EXPECT_NE(coarse.err.find("several solutions"), std::string::npos) << coarse.err;
+  const Outcome fine =
+      run("boundary '" + path("pendulum.toml") + "' --from a=0 --to a=2 --method type1/gl:4 --step 0.1");
+  EXPECT_EQ(fine.status, 0) << fine.err;
 }
 
 }  // namespace

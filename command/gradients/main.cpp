@@ -1,10 +1,12 @@
-/// The error of a gradient against what it takes: the derivatives of the end of a motion by its start, along
-/// what the rows allow, by Sensitivities for the Gauss-Lobatto steps, and by forward sensitivities of
-/// SUNDIALS IDAS for the continuous system, to which the derivatives of the steps must converge.
+/// The program diracstep-gradients, which `diracstep study --sensitivities` runs: the error of a gradient
+/// over what it takes.  Derivatives of the end of a motion by its start, along what the rows allow, by
+/// Sensitivities for the Gauss-Lobatto steps, and by forward sensitivities of SUNDIALS IDAS for the
+/// continuous system, to which the derivatives of the steps must converge.
 ///
 /// Both by exact derivatives of the equations; IDAS with the sensitivities in its error test, all at once
-/// with the motion (IDA_SIMULTANEOUS).  The truth is GL(6) with small steps; how far IDAS at its smallest
-/// tolerance is from it is printed with each scene.
+/// with the motion and one after the other.  The truth is GL(6) with small steps.
+///
+///   diracstep-gradients OUT.csv SCENE END [NAME=VALUE]…     END 0: that of the scene
 ///
 /// A program of its own: IDAS has the functions of IDA under the same names, and one program holds either.
 #include <idas/idas.h>
@@ -14,14 +16,18 @@
 #include <sunmatrix/sunmatrix_dense.h>
 
 #include <Eigen/LU>
+#include <array>
 #include <cmath>
 #include <cstdio>
+#include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/system/saddle_point.hpp>
+#include <diracstep/files/output_file.hpp>
 #include <diracstep/scene_format/scene_catalogue.hpp>
 #include <diracstep/sensitivities/sensitivities.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
 #include <diracstep/validation/references/ida_reference.hpp>
 #include <diracstep/validation/references/implicit_lagrangian_dae.hpp>
+#include <exception>
 #include <limits>
 #include <string>
 #include <vector>
@@ -223,33 +229,61 @@ double error_of(const Measured& measured, const Columns& truth) {
   return (measured.derivatives - truth).lpNorm<Eigen::Infinity>() / truth.lpNorm<Eigen::Infinity>();
 }
 
-void compare(const std::string& name, double end) {
-  const CatalogueScene entry = make_scene(name);
+/// Columns: side (0 IDAS at once, 1 IDAS one after the other, s GL(s)), its tolerance or number of steps,
+/// seconds, error in parts of the largest derivative; empty where a run fails.
+void compare(const std::string& file, const std::string& name, double stated_end, const Parameters& changes) {
+  const CatalogueScene entry = make_scene(name, changes);
   const auto shared = completed(entry.scene);
   const Scene& scene = *shared;
+  if (!scene.lagrangian || scene.space || scene.lagrangian->structure().phase_space())
+    throw Misuse("scene '" + scene.name +
+                 "': gradients are compared in R^n, with a Lagrangian not linear in v");
+  if (!entry.events.empty())
+    throw Misuse("scene '" + scene.name + "' has events, which are not differentiated");
+  const double end = stated_end != 0.0 ? stated_end : entry.t_end;
   const auto base = static_cast<long>(std::ceil((end - scene.start.time) / entry.natural_step));
   const Columns truth = by_steps(scene, shared, "type1/gl:6", end, 4 * base).derivatives;
-  std::printf("\n%s to t = %g: %d directions\n%-24s %10s %10s\n", name.c_str(), end,
-              static_cast<int>(truth.cols()), "", "ms", "error");
-  for (const auto& [kind, word] : {std::pair{IDA_SIMULTANEOUS, "simultaneous"}, {IDA_STAGGERED, "staggered"}})
-    for (const double tolerance : {1e-4, 1e-6, 1e-8, 1e-10, 1e-12}) {
-      const Measured measured = Idas(scene, tolerance, kind).run(end);
-      std::printf("IDAS %-12s %-6g %10.2f %10.1e\n", word, tolerance, 1e3 * measured.seconds,
-                  error_of(measured, truth));
-    }
-  for (const char* method : {"type1/gl:2", "type1/gl:3", "type1/gl:4"})
+  if (truth.size() == 0) throw Error("scene '" + scene.name + "': the motion that is the truth fails");
+  std::string text = "side,setting,seconds,error\n";
+  const auto add = [&](int side, double setting, const Measured& measured) {
+    std::array<char, 120> line{};
+    const double error = error_of(measured, truth);
+    if (std::isfinite(error) && std::isfinite(measured.seconds))
+      std::snprintf(line.data(), line.size(), "%d,%.17g,%.6g,%.6g\n", side, setting, measured.seconds, error);
+    else
+      std::snprintf(line.data(), line.size(), "%d,%.17g,,\n", side, setting);
+    text += line.data();
+  };
+  for (const int side : {0, 1})
+    for (const double tolerance : {1e-4, 1e-6, 1e-8, 1e-10, 1e-12})
+      add(side, tolerance, Idas(scene, tolerance, side == 0 ? IDA_SIMULTANEOUS : IDA_STAGGERED).run(end));
+  for (const int s : {2, 3, 4})
     for (const long steps : {base / 4, base / 2, base, 2 * base}) {
-      const Measured measured = by_steps(scene, shared, method, end, std::max(1L, steps));
-      std::printf("%s, %-4ld steps  %10.2f %10.1e\n", method, steps, 1e3 * measured.seconds,
-                  error_of(measured, truth));
+      const long taken = std::max(1L, steps);
+      add(s, static_cast<double>(taken),
+          by_steps(scene, shared, "type1/gl:" + std::to_string(s), end, taken));
     }
+  OutputFile out(file, OutputFile::Mode::fresh);
+  out.write(text);
+  out.close();
 }
 
 }  // namespace
 
-int main() {
-  compare("kepler_e06", 10.0);
-  compare("chaplygin_sleigh", 10.0);
-  compare("pendulum_cartesian", 5.0);
-  compare("double_pendulum", 3.0);
+int main(int count, char** arguments) {
+  try {
+    if (count < 4) throw Misuse("diracstep-gradients OUT.csv SCENE END [NAME=VALUE]...");
+    Parameters changes;
+    for (int i = 4; i < count; ++i) {
+      const std::string change = arguments[i];
+      const std::size_t at = change.find('=');
+      if (at == std::string::npos) throw Misuse("'" + change + "' is not NAME=VALUE");
+      changes[change.substr(0, at)] = std::stod(change.substr(at + 1));
+    }
+    compare(arguments[1], arguments[2], std::stod(arguments[3]), changes);
+    return 0;
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "%s\n", error.what());
+    return 1;
+  }
 }
