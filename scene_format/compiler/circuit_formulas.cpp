@@ -12,6 +12,7 @@ namespace {
 
 constexpr double usual_capacitance = 1e-12;        // F, of a diode
 constexpr double least_conductance = 1e-12;        // A/V, of a diode without capacitance; SPICE's GMIN
+constexpr double usual_breakdown = 1e-3;           // A, SPICE's IBV
 constexpr double usual_thermal_voltage = 0.02585;  // V, kT/e at 300 K
 
 }  // namespace
@@ -133,9 +134,16 @@ Node CircuitFormulas::conducted(const Branch& branch, Node index) {
     return parser_.formula(branch.values.find("current")->second, where);
   }
   if (branch.has("saturation")) {  // I_s (exp(u/u_T) − 1)
-    const Node x = graph_.divide(u, value_or(branch, index, "thermal_voltage", usual_thermal_voltage));
-    const Node own = graph_.multiply(value(branch, index, "saturation"),
-                                     graph_.subtract(graph_.apply(Op::exp, x), graph_.number(1.0)));
+    const Node thermal = value_or(branch, index, "thermal_voltage", usual_thermal_voltage);
+    Node own = graph_.multiply(
+        value(branch, index, "saturation"),
+        graph_.subtract(graph_.apply(Op::exp, graph_.divide(u, thermal)), graph_.number(1.0)));
+    if (branch.has("breakdown_voltage")) {  // − I_b exp(−(u + u_b)/u_T)
+      const Node beyond = graph_.negative(graph_.add(u, value(branch, index, "breakdown_voltage")));
+      own =
+          graph_.subtract(own, graph_.multiply(value_or(branch, index, "breakdown_current", usual_breakdown),
+                                               graph_.apply(Op::exp, graph_.divide(beyond, thermal))));
+    }
     if (!has_flux(branch)) return own;
     return graph_.add(own, graph_.multiply(graph_.number(least_conductance), u));
   }

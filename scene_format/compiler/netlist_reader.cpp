@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <diracstep/scene_format/compiler/circuit_reader.hpp>
+#include <diracstep/scene_format/compiler/detail/netlist_models.hpp>
+#include <diracstep/scene_format/compiler/detail/netlist_paths.hpp>
+#include <diracstep/scene_format/compiler/detail/netlist_starts.hpp>
 #include <diracstep/scene_format/compiler/detail/netlist_text.hpp>
 #include <diracstep/scene_format/compiler/detail/netlist_waveforms.hpp>
 #include <diracstep/scene_format/compiler/netlist_reader.hpp>
@@ -12,10 +15,6 @@
 namespace diracstep::scene_compiler {
 
 namespace {
-
-constexpr double kelvin_at_27_degrees = 300.15;
-constexpr double boltzmann_by_charge = 8.617333262e-5;  // V/K, k/e of the SI of 2019
-constexpr double usual_junction = 1e-12;                // F
 
 class NetlistReader {
  public:
@@ -30,6 +29,11 @@ class NetlistReader {
     for (const Words& line : text_.lines())
       if (line[0].text[0] != '.') read_element(line);
     for (const Words& line : controlled_by_current_) read_controlled_by_current(line);
+    starts_.fill(document_);
+    if (!given_start_ && !document_.start.empty())
+      text_.fail(document_.start[0].key.start,
+                 "a start is read with 'uic' in .tran; without it the motion starts at the operating point");
+    note_floating_nodes(document_);
     note_title();
     require_whole();
     document_.operating_point = !given_start_;
@@ -83,12 +87,37 @@ class NetlistReader {
   void read_directive(const Words& line) {
     const std::string name = lower(line[0].text);
     if (name == ".param") return read_parameters(line);
-    if (name == ".model") return read_model(line);
+    if (name == ".model") return models_.read(line, document_.notes);
     if (name == ".tran") return read_transient(line);
-    if (name == ".print") return read_print(line);
+    if (name == ".print" || name == ".plot" || name == ".probe" || name == ".save") return read_print(line);
+    if (name == ".ic") return starts_.read(line);
+    if (name == ".temp") return read_temperature(line);
+    if (const std::string why = why_left_out(name); !why.empty()) {
+      document_.notes.push_back(
+          fmt::format("line {}: {} is left out: {}", line[0].place.line, line[0].text, why));
+      return;
+    }
+    if (name == ".subckt" || name == ".ends")
+      text_.fail(line[0].place, "subcircuits are not supported: write out their elements");
     text_.fail(
         line[0].place,
-        fmt::format("unknown directive '{}'; known are .param, .model, .tran, .print, .end", line[0].text));
+        fmt::format(
+            "unknown directive '{}'; known are .param, .model, .tran, .ic, .print, .plot, .save, .temp, .end",
+            line[0].text));
+  }
+
+  /// Directives that change nothing in the motion of a circuit.
+  static std::string why_left_out(const std::string& name) {
+    if (name == ".options" || name == ".option") return "tolerances are those of --eps and --step";
+    if (name == ".control") return "commands are those of the command line";
+    for (const char* other : {".op", ".ac", ".dc", ".noise", ".tf", ".four", ".meas", ".measure"})
+      if (name == other) return "what is run is .tran";
+    return "";
+  }
+
+  void read_temperature(const Words& line) {
+    if (text_.number(text_.word(line, 1, "a temperature")) != 27.0)
+      text_.fail(line[1].place, "models are those at 27 degrees");
   }
 
   void read_parameters(const Words& line) {
@@ -101,36 +130,14 @@ class NetlistReader {
         text_.fail(line[k].place, fmt::format("the name '{}' is taken; choose another", name));
       if (!names_.insert(name).second)
         text_.fail(line[k].place, fmt::format("the name '{}' is used twice", name));
-      if (line[k + 2].expression)
-        document_.definitions.emplace(name, text_.value(line[k + 2]));
+      Word given = line[k + 2];
+      given.expression = given.expression || !text_.is_number(given);
+      if (given.expression)
+        document_.definitions.emplace(name, text_.value(given));
       else
         document_.parameters.push_back(
             {name, "", "", {text_.number(line[k + 2])}, false, false, {}, line[k].place});
     }
-  }
-
-  /// .model NAME D(IS=… N=… CJO=…)
-  void read_model(const Words& line) {
-    const std::string name = lower(text_.word(line, 1, "a name").text);
-    const Word& type = text_.word(line, 2, "a type, D");
-    if (lower(type.text) != "d")
-      text_.fail(type.place, fmt::format("a model of type '{}'; only diodes, D, are known", type.text));
-    Model model;
-    for (std::size_t k = 3; k < line.size(); k += 3) {
-      const std::string key = lower(line[k].text);
-      if (k + 2 >= line.size() || line[k + 1].text != "=") text_.fail(line[k].place, "expected KEY=VALUE");
-      if (key == "is")
-        model.saturation = text_.value(line[k + 2]);
-      else if (key == "n")
-        model.emission = text_.value(line[k + 2]);
-      else if (key == "cjo" || key == "cj0")
-        model.capacitance = text_.value(line[k + 2]);
-      else
-        text_.fail(line[k].place,
-                   fmt::format("unknown parameter '{}' of a diode; known are IS, N, CJO", line[k].text));
-    }
-    if (!models_.emplace(name, model).second)
-      text_.fail(line[1].place, fmt::format("two models are named '{}'", line[1].text));
   }
 
   /// .tran STEP STOP [0 [MAX]] [uic]
@@ -147,7 +154,9 @@ class NetlistReader {
     document_.t_end = document_.study_end = text_.number(rest[1]);
     if (!(document_.step > 0.0) || !(document_.t_end > 0.0))
       text_.fail(line[0].place, ".tran needs a step and an end above 0");
-    if (rest.size() > 2 && text_.number(rest[2]) != 0.0) text_.fail(rest[2].place, "output from 0 on only");
+    if (rest.size() > 2 && text_.number(rest[2]) != 0.0)
+      document_.notes.push_back(
+          fmt::format("line {}: output begins at 0, not at {}", line[0].place.line, rest[2].text));
     if (rest.size() > 3) document_.step = std::min(document_.step, text_.number(rest[3]));
     transient_ = line[0].place;
   }
@@ -155,7 +164,12 @@ class NetlistReader {
   /// .print [tran] V(a) V(a,b) I(R1): the quantity and its names are words.
   void read_print(const Words& line) {
     std::size_t k = 1;
-    if (k < line.size() && lower(line[k].text) == "tran") ++k;
+    const bool listing = lower(line[0].text) == ".save" || lower(line[0].text) == ".probe";
+    const std::string analysis = k < line.size() ? lower(line[k].text) : "";
+    if (analysis == "ac" || analysis == "dc" || analysis == "noise" ||
+        (listing && (k >= line.size() || analysis == "all")))
+      return;
+    if (analysis == "tran") ++k;
     if (k >= line.size()) text_.fail(line[0].place, ".print needs V(node), V(a,b) or I(element)");
     while (k < line.size()) {
       const std::string quantity = upper(line[k].text);
@@ -165,7 +179,7 @@ class NetlistReader {
       const Place place = line[k].place;
       std::vector<std::string> names;
       for (++k; k < line.size() && !starts_quantity(line, k); ++k)
-        names.push_back(quantity == "V" ? node(line[k]) : upper(line[k].text));
+        names.push_back(quantity == "V" ? text_.node(line[k]) : upper(line[k].text));
       if (names.empty() || names.size() > (quantity == "V" ? 2u : 1u))
         text_.fail(place, fmt::format("{}(…) with {} names", quantity, names.size()));
       document_.outputs.push_back({fmt::format("{}({})", quantity, fmt::join(names, "-")),
@@ -185,28 +199,14 @@ class NetlistReader {
 
   // Elements.
 
-  struct Model {
-    std::optional<FormulaText> saturation, emission, capacitance;
-  };
-
-  std::string node(const Word& word) const {
-    const std::string name = lower(word.text);
-    if (word.expression || word.text == "=") text_.fail(word.place, "expected the name of a node");
-    const bool plain =
-        std::ranges::all_of(name, [](char c) { return in_word(c) || in_number(c) || c == '_'; });
-    if (!plain)
-      text_.fail(word.place, fmt::format("'{}' is no node: expected letters, digits and _", word.text));
-    return name == "gnd" || name == "ground" ? "0" : name;
-  }
-
   SceneDocument::Branch& add_branch(const Words& line, const char* kind) {
     const std::string name = upper(line[0].text);
     if (!is_name(name))
       text_.fail(line[0].place, fmt::format("'{}' is no name for an element", line[0].text));
     if (!elements_.insert(name).second)
       text_.fail(line[0].place, fmt::format("two elements are named '{}'", name));
-    const std::string from = node(text_.word(line, 1, "two nodes")),
-                      to = node(text_.word(line, 2, "two nodes"));
+    const std::string from = text_.node(text_.word(line, 1, "two nodes")),
+                      to = text_.node(text_.word(line, 2, "two nodes"));
     if (from == to) text_.fail(line[1].place, fmt::format("{} joins a node to itself", name));
     document_.branches.push_back({kind, name, {from}, {to}, {}, {}, line[0].place});
     return document_.branches.back();
@@ -214,9 +214,6 @@ class NetlistReader {
 
   void start_at(const std::string& key, const FormulaText& value) {
     document_.start.push_back({{key, value.start}, {value}, false});
-    if (!given_start_)
-      text_.fail(value.start,
-                 "IC= is read with 'uic' in .tran; without it the motion starts at the operating point");
   }
 
   void read_element(const Words& line) {
@@ -233,6 +230,8 @@ class NetlistReader {
         return read_source(line, "source_current");
       case 'd':
         return read_diode(line);
+      case 's':
+        return read_switch(line);
       case 'k':
         return read_coupling(line);
       case 'e':
@@ -245,7 +244,7 @@ class NetlistReader {
       default:
         text_.fail(
             line[0].place,
-            fmt::format("unknown element '{}'; known are R, L, C, V, I, D, K, E, F, G, H", line[0].text));
+            fmt::format("unknown element '{}'; known are R, L, C, V, I, D, S, K, E, F, G, H", line[0].text));
     }
   }
 
@@ -272,19 +271,33 @@ class NetlistReader {
   static FormulaText negative(const FormulaText& text) { return {"-(" + text.text + ")", text.start}; }
 
   void read_diode(const Words& line) {
-    SceneDocument::Branch& branch = add_branch(line, "diode");
-    const Word& name = text_.word(line, 3, "a model");
+    SceneDocument::Branch diode = add_branch(line, "diode");
+    const auto series = models_.fill_diode(text_.word(line, 3, "a model"), diode);
     text_.require_end(line, 4);
-    const auto found = models_.find(lower(name.text));
-    if (found == models_.end()) text_.fail(name.place, fmt::format("there is no .model '{}'", name.text));
-    const Model& model = found->second;
-    const double thermal = boltzmann_by_charge * kelvin_at_27_degrees;
-    const std::string emission = model.emission ? "(" + model.emission->text + ")" : "1";
-    branch.values.emplace("saturation", model.saturation.value_or(FormulaText{"1e-14", line[0].place}));
-    branch.values.emplace("thermal_voltage",
-                          FormulaText{fmt::format("{:.17g}*{}", thermal, emission), line[0].place});
-    branch.values.emplace("capacitance", model.capacitance.value_or(FormulaText{
-                                             fmt::format("{:g}", usual_junction), line[0].place}));
+    if (series) {
+      const std::string name = diode.name + "_RS";
+      const SceneDocument::NodeName between{lower(name)};
+      if (!elements_.insert(name).second)
+        text_.fail(line[0].place, fmt::format("'{}' is the series resistance of {}", name, diode.name));
+      document_.branches.push_back(
+          {"resistor", name, diode.from, between, {{"value", *series}}, {}, line[0].place});
+      diode.from = between;
+    }
+    *std::ranges::find(document_.branches, diode.name, &SceneDocument::Branch::name) = diode;
+  }
+
+  /// S n+ n- nc+ nc- MODEL
+  void read_switch(const Words& line) {
+    SceneDocument::Branch& branch = add_branch(line, "switch");
+    const std::string voltage = controlling_voltage(line);
+    models_.fill_switch(text_.word(line, 5, "a model"), voltage, branch);
+    text_.require_end(line, 6);
+  }
+
+  std::string controlling_voltage(const Words& line) const {
+    const std::string plus = text_.node(text_.word(line, 3, "two nodes that control it")),
+                      minus = text_.node(text_.word(line, 4, "two nodes that control it"));
+    return fmt::format("V({}, {})", plus, minus);
   }
 
   void read_coupling(const Words& line) {
@@ -297,11 +310,10 @@ class NetlistReader {
 
   void read_controlled_by_voltage(const Words& line) {
     const bool voltage = lower(line[0].text)[0] == 'e';
-    const Word& name = text_.word(line, 3, "two nodes that control it");
-    const std::string plus = node(name), minus = node(text_.word(line, 4, "two nodes that control it"));
+    const std::string controlling = controlling_voltage(line);
     const FormulaText gain = text_.value(text_.word(line, 5, "a gain"));
     text_.require_end(line, 6);
-    const FormulaText given{fmt::format("({})*V({}, {})", gain.text, plus, minus), name.place};
+    const FormulaText given{fmt::format("({})*{}", gain.text, controlling), line[3].place};
     SceneDocument::Branch& branch = add_branch(line, voltage ? "source_voltage" : "source_current");
     branch.values.emplace("value", voltage ? negative(given) : given);
   }
@@ -331,7 +343,8 @@ class NetlistReader {
   const NetlistText& text_;
   SceneDocument document_;
   std::vector<Words> controlled_by_current_;
-  std::map<std::string, Model> models_;
+  NetlistModels models_{text_};
+  NetlistStarts starts_{text_};
   std::set<std::string> names_, elements_;
   std::optional<Place> transient_;
   bool given_start_ = false;

@@ -60,7 +60,7 @@ void NetlistText::fail(Place place, const std::string& message) const {
 void NetlistText::split() {
   int number = 0;
   std::size_t begin = 0;
-  bool ended = false;
+  bool ended = false, commands = false;
   while (begin <= text_.size() && !ended) {
     const std::size_t end = std::min(text_.find('\n', begin), text_.size());
     const std::string line = text_.substr(begin, end - begin);
@@ -75,12 +75,19 @@ void NetlistText::split() {
     const bool continued = line[first] == '+';
     Words words = words_of(line, continued ? first + 1 : first, number);
     if (words.empty()) continue;
+    const std::string begins = lower(words[0].text);
+    if (begins == ".endc") {
+      commands = false;
+      continue;
+    }
+    if (commands) continue;
+    commands = begins == ".control";
     if (continued && lines_.empty()) fail(words[0].place, "there is no line that this one could continue");
     if (continued) {
       lines_.back().insert(lines_.back().end(), words.begin(), words.end());
       continue;
     }
-    ended = lower(words[0].text) == ".end";
+    ended = begins == ".end";
     if (!ended) lines_.push_back(std::move(words));
   }
 }
@@ -142,15 +149,18 @@ std::string NetlistText::formula_text(const Word& word) const {
   return formula;
 }
 
+bool NetlistText::is_number(const Word& word) {
+  const bool sign = word.text[0] == '-' || word.text[0] == '+';
+  const std::size_t begin = sign ? 1 : 0, length = number_length(word.text, begin);
+  return !word.expression && length > 0 &&
+         std::all_of(word.text.begin() + static_cast<std::ptrdiff_t>(begin + length), word.text.end(),
+                     in_word);
+}
+
 /// A number or an expression in braces.
 FormulaText NetlistText::value(const Word& word) const {
   if (word.expression) return {formula_text(word), word.place};
-  const bool sign = word.text[0] == '-' || word.text[0] == '+';
-  const std::size_t begin = sign ? 1 : 0, length = number_length(word.text, begin);
-  const bool number =
-      length > 0 &&
-      std::all_of(word.text.begin() + static_cast<std::ptrdiff_t>(begin + length), word.text.end(), in_word);
-  if (!number)
+  if (!is_number(word))
     fail(word.place, fmt::format("'{}': expected a number such as 4.7k, or an expression in braces such as "
                                  "{{2*rl}}",
                                  word.text));
@@ -181,6 +191,14 @@ std::string NetlistText::line_text(int number) const {
   std::size_t begin = 0;
   for (int k = 1; k < number; ++k) begin = text_.find('\n', begin) + 1;
   return text_.substr(begin, text_.find('\n', begin) - begin);
+}
+
+std::string NetlistText::node(const Word& word) const {
+  const std::string name = lower(word.text);
+  if (word.expression || word.text == "=") fail(word.place, "expected the name of a node");
+  const bool plain = std::ranges::all_of(name, [](char c) { return in_word(c) || in_number(c) || c == '_'; });
+  if (!plain) fail(word.place, fmt::format("'{}' is no node: expected letters, digits and _", word.text));
+  return name == "gnd" || name == "ground" ? "0" : name;
 }
 
 }  // namespace diracstep::scene_compiler

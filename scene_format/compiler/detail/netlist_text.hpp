@@ -30,7 +30,8 @@ class NetlistText {
   const std::string& file() const { return file_; }
   /// The first line.
   const std::string& title() const { return title_; }
-  /// Those behind the title and up to .end, without comments.
+  /// Those behind the title and up to .end, without comments and what stands
+  /// between .control and .endc.
   const std::vector<Words>& lines() const { return lines_; }
   /// As it stands in the file.
   std::string line_text(int number) const;
@@ -39,7 +40,10 @@ class NetlistText {
 
   /// A number or an expression in braces, with suffixes as powers of ten and names in small letters.
   FormulaText value(const Word& word) const;
+  static bool is_number(const Word& word);
   double number(const Word& word) const;
+  /// The name of a node, "0" for all names of the ground.
+  std::string node(const Word& word) const;
   /// Word k of a line, which is to be there.
   const Word& word(const Words& line, std::size_t k, const char* what) const;
   /// Refuses what stands in a line from word k on.

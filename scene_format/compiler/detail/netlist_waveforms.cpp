@@ -5,20 +5,46 @@
 namespace diracstep::scene_compiler {
 
 FormulaText NetlistWaveforms::waveform(const Words& line) {
-  std::size_t k = 3;
-  if (k < line.size() && lower(line[k].text) == "dc") ++k;
-  const Word& first = text_.word(line, k, "a value, PULSE(…), SIN(…) or PWL(…)");
-  const std::string form = first.expression ? "" : lower(first.text);
-  const bool named = form == "pulse" || form == "sin" || form == "pwl";
-  if (!named) {
-    text_.require_end(line, k + 1);
-    return text_.value(first);
+  std::optional<FormulaText> steady, wave;
+  for (std::size_t k = 3; k < line.size();) {
+    const std::string form = line[k].expression ? "" : lower(line[k].text);
+    if (form == "ac") {  // of the analysis of small signals
+      for (++k; k < line.size() && is_value(line[k]);) ++k;
+    } else if (is_wave(form)) {
+      std::vector<Word> words;
+      const Word& name = line[k];
+      for (++k; k < line.size() && is_value(line[k]); ++k) words.push_back(line[k]);
+      if (wave) text_.fail(name.place, "a second waveform");
+      wave = named(form, line, words, name.place);
+    } else {
+      if (form == "dc") ++k;
+      if (steady) text_.require_end(line, k);
+      steady = text_.value(text_.word(line, k, "a value"));
+      ++k;
+    }
   }
-  std::vector<Word> words(line.begin() + static_cast<std::ptrdiff_t>(k) + 1, line.end());
+  if (!wave && !steady && line.size() < 4)
+    (void)text_.word(line, 3, "a value, PULSE(…), SIN(…), EXP(…), SFFM(…) or PWL(…)");
+  return wave ? *wave : steady.value_or(FormulaText{"0", line[0].place});
+}
+
+bool NetlistWaveforms::is_wave(const std::string& form) {
+  return form == "pulse" || form == "sin" || form == "pwl" || form == "exp" || form == "sffm";
+}
+
+bool NetlistWaveforms::is_value(const Word& word) {
+  return word.expression || in_number(word.text[0]) || word.text[0] == '+' || word.text[0] == '-' ||
+         word.text[0] == '.';
+}
+
+FormulaText NetlistWaveforms::named(const std::string& form, const Words& line,
+                                    const std::vector<Word>& words, Place place) {
   if (form == "pwl") return piecewise(line, words);
   std::vector<std::string> values;
   for (const Word& one : words) values.push_back("(" + text_.value(one).text + ")");
-  return {form == "pulse" ? pulse(line, words, values) : sine(line, values), first.place};
+  if (form == "pulse") return {pulse(line, words, values), place};
+  if (form == "exp") return {exponential(line, values), place};
+  return {form == "sin" ? sine(line, values) : modulated(line, values), place};
 }
 
 void NetlistWaveforms::require_count(const Words& line, std::size_t count, std::size_t least,
@@ -53,6 +79,20 @@ std::string NetlistWaveforms::sine(const Words& line, const std::vector<std::str
   const std::string factor = v.size() > 4 ? fmt::format("*exp(-{}*{})", since, damping) : "";
   const std::string shift = v.size() > 5 ? fmt::format(" + pi*{}/180", phase) : "";
   return fmt::format("{} + {}*sin(2*pi*{}*{}{}){}", v[0], v[1], frequency, since, shift, factor);
+}
+
+std::string NetlistWaveforms::exponential(const Words& line, const std::vector<std::string>& v) const {
+  require_count(line, v.size(), 2, 6, "EXP(V1 V2 [TD1 TAU1 TD2 TAU2])");
+  const std::string usual = fmt::format("{:.17g}", step());
+  const auto given = [&](std::size_t k, const std::string& absent) { return k < v.size() ? v[k] : absent; };
+  const std::string rise = given(2, "0"), fall = given(4, fmt::format("({} + {})", rise, usual));
+  return fmt::format("{0} + ({1} - {0})*((1 - exp(-max(0, t - {2})/{3})) - (1 - exp(-max(0, t - {4})/{5})))",
+                     v[0], v[1], rise, given(3, usual), fall, given(5, usual));
+}
+
+std::string NetlistWaveforms::modulated(const Words& line, const std::vector<std::string>& v) const {
+  require_count(line, v.size(), 5, 5, "SFFM(VO VA FC MDI FS)");
+  return fmt::format("{} + {}*sin(2*pi*{}*t + {}*sin(2*pi*{}*t))", v[0], v[1], v[2], v[3], v[4]);
 }
 
 FormulaText NetlistWaveforms::piecewise(const Words& line, const std::vector<Word>& words) {

@@ -4,7 +4,8 @@
 
 namespace diracstep::scene_compiler {
 
-/// What an independent source drives as a function of t: "5", "dc 5", "{v}", "PULSE(…)", "SIN(…)", "PWL(…)".
+/// What an independent source drives as a function of t: "5", "dc 5", "{v}", "PULSE(…)", "SIN(…)",
+/// "EXP(…)", "SFFM(…)", "PWL(…)"; a waveform counts where a value stands beside it, and AC is passed over.
 class NetlistWaveforms {
  public:
   /// Both outlive this.  The document has the step and the end of .tran, and takes the points of PWL as
@@ -17,6 +18,11 @@ class NetlistWaveforms {
  private:
   void require_count(const Words& line, std::size_t count, std::size_t least, std::size_t most,
                      const char* form) const;
+  static bool is_wave(const std::string& form);
+  static bool is_value(const Word& word);
+  FormulaText named(const std::string& form, const Words& line, const std::vector<Word>& words, Place place);
+  std::string exponential(const Words& line, const std::vector<std::string>& v) const;
+  std::string modulated(const Words& line, const std::vector<std::string>& v) const;
   std::string pulse(const Words& line, const std::vector<Word>& words,
                     const std::vector<std::string>& v) const;
   std::string sine(const Words& line, const std::vector<std::string>& v) const;
