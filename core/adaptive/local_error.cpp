@@ -15,7 +15,7 @@ constexpr std::size_t most_instants = 200;
 constexpr double below_eps = 0.9, most_growth = 10.0, most_shrinking = 0.1, after_failure = 0.25;
 constexpr double of_the_rate = 1e-6;  // of T ẏ, which counts as a size
 // Errors that are round-off, and what is allowed beside them.
-constexpr double hardly_less = 0.5, erratic = 0.2, above_errors = 10.0;
+constexpr double hardly_less = 0.5, erratic = 0.2, above_errors = 100.0;
 constexpr double of_the_largest = 1e-10, above_round_off = 4e-16;
 
 }  // namespace
@@ -101,15 +101,22 @@ LocalErrorControl::Worst LocalErrorControl::error(const Integrator& fine, const 
   return worst;
 }
 
-/// Takes the step again with a size that hardly differs; what is allowed grows where it is round-off.
+/// Takes the step again with a size that hardly differs; what is allowed grows where differences are
+/// round-off.
 bool LocalErrorControl::is_round_off(Integrator& fine, Integrator& whole, double start, double size,
                                      const Worst& worst) {
+  const Vector first = differences(fine, whole);
   StepReport report;
   fine.restart(start, q_, p_, v_);
   if (!take_both(fine, whole, 0.999 * size, report)) return false;
-  const double other = differences(fine, whole)[worst.component];
-  if (!(std::abs(other - worst.difference) > erratic * std::abs(worst.difference))) return false;
-  least_[worst.component] = above_errors * std::max(std::abs(other), std::abs(worst.difference)) / eps_;
+  const Vector other = differences(fine, whole);
+  const auto jumps = [&](Eigen::Index i) {
+    return std::abs(other[i] - first[i]) > erratic * std::abs(first[i]);
+  };
+  if (!jumps(worst.component)) return false;
+  for (Eigen::Index i = 0; i < first.size(); ++i)
+    if (jumps(i))
+      least_[i] = std::max(least_[i], above_errors * std::max(std::abs(other[i]), std::abs(first[i])) / eps_);
   return true;
 }
 

@@ -177,7 +177,7 @@ TEST_F(Circuits, DiodesWithoutCapacitanceAreAlgebra) {
 TEST_F(Circuits, WhatANetlistDoesNotKnowIsRefusedByItsLine) {
   const std::string head = "title\nV1 a 0 SIN(0 1 1k)\nR1 a 0 1k\n", tail = ".tran 1u 1m\n";
   expect_refused(head + "Q1 a b 0 QX\n" + tail, 4, {"unknown element 'Q1'", "R, L, C"});
-  expect_refused(head + ".options reltol=1\n" + tail, 4, {"unknown directive '.options'", ".tran"});
+  expect_refused(head + ".nodeset V(a)=1\n" + tail, 4, {"unknown directive '.nodeset'", ".tran"});
   expect_refused(head + "R2 a 0 1k tc=1\n" + tail, 4, {"'tc' is not known"});
   expect_refused(head + "R2 a 0 many\n" + tail, 4, {"'many'", "4.7k"});
   expect_refused(head + "R1 a 0 1k\n" + tail, 4, {"two elements are named 'R1'"});
