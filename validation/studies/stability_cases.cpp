@@ -104,12 +104,15 @@ step = 0.01
                                 : make_scene("stiff_spring_pendulum", {{"k", k}}).reference;
   const Eigen::Index n = entry.scene->dimension();  // with the extension of the spring behind x and y
   entry.reference = plain;
-  entry.reference.at = [plain, n](double time) -> std::optional<ReferencePoint> {
+  entry.reference.at = [plain, n, rigid](double time) -> std::optional<ReferencePoint> {
     const auto known = plain.at ? plain.at(time) : std::nullopt;
     if (!known) return std::nullopt;
     ReferencePoint point{Vector::Zero(n), Vector::Zero(n)};
     point.q.head(2) = known->q.head(2);
     point.v.head(2) = known->v.head(2);
+    const double length = known->q.head(2).norm();  // the extension of the spring
+    if (!rigid) point.q[2] = length - 1.0;
+    if (!rigid) point.v[2] = known->q.head(2).dot(known->v.head(2)) / length;
     return point;
   };
   if (rigid) {
