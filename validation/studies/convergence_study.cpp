@@ -48,12 +48,12 @@ class StudyInProgress {
     natural_step_ = std::copysign(scene.natural_step, study_.t_end - study_.t_start);
     require_options();
     if (!options_.series.empty() || options_.rtols.size() > 0)
-      sizes_ = sizes_where_damped(entry_.scene, registry_, solvers_, study_.t_end, natural_step_);
-    if (sizes_ && !options_.series.empty())
+      surveyed_ = surveyed_motion(entry_.scene, registry_, solvers_, study_.t_end, natural_step_);
+    if (damped() && !options_.series.empty())
       for (const char* method : {"damped/radau:3", "damped/radau:5"})
         series_.push_back({method, registry_.method(method).info.order, true});
     for (const auto& [method, order] : options_.series)
-      if (!sizes_ || method == "type1/gl:3") add(chosen(method, order));
+      if (!damped() || method == "type1/gl:3") add(chosen(method, order));
     if (options_.series.empty())
       for (const auto& method : options_.methods)
         for (const int order : orders_of(method)) add(chosen(method, order));
@@ -96,6 +96,9 @@ class StudyInProgress {
     if (options_.adaptive) series_.push_back(series.with_variable_steps());
   }
 
+  bool damped() const { return surveyed_ && surveyed_->damped; }
+  Vector sizes() const { return surveyed_ ? surveyed_->sizes : Vector(); }
+
   /// With steps by their local error, whose ladder is one of eps.
   bool by_local_error(const Series& series) const {
     return series.variable && registry_.method(series.method).info.damped;
@@ -105,7 +108,7 @@ class StudyInProgress {
     if (auto known = known_point(entry_, study_.t_end)) return *std::move(known);
     ReferenceEnd ours = converged_reference(
         entry_, registry_, solvers_, study_.t_end, options_.reference_budget,
-        [&] { look(0.0, "a converged reference"); }, sizes_.has_value());
+        [&] { look(0.0, "a converged reference"); }, damped());
     return ours.missing.empty() ? ours : reference_end(entry_, study_.t_end);
   }
 
@@ -275,7 +278,7 @@ class StudyInProgress {
     return best_formulations(
         *entry_.scene, study_.t_end, rtols, reference_,
         std::min(options_.run_budget, of_a_share * share_of_time()),
-        [&] { look(part, "the formulations of IDA"); }, sizes_.value_or(Vector()));
+        [&] { look(part, "the formulations of IDA"); }, sizes());
   }
 
   void run_baseline_ladder(const std::string& baseline, double part) {
@@ -292,8 +295,7 @@ class StudyInProgress {
     const double time = share_of_time();
     std::vector<Sample> ends(rtols.size());
     const auto run = [&](double rtol, int repeats, Sample& end) {
-      ReferenceOptions reference{
-          .rtol = rtol, .sizes = sizes_.value_or(Vector()), .formulation = formulation};
+      ReferenceOptions reference{.rtol = rtol, .sizes = sizes(), .formulation = formulation};
       if (std::isfinite(options_.time_limit)) reference.max_steps = most_steps_in_limited_time;
       return run_baseline(baseline, *entry_.scene, study_.t_end, reference, repeats, reference_, end);
     };
@@ -323,7 +325,7 @@ class StudyInProgress {
   const StudyOptions& options_;
   const StudyObserver& observer_;
   double natural_step_ = 0.0;
-  std::optional<Vector> sizes_;  ///< of a motion that the damping family is the default for
+  std::optional<SurveyedMotion> surveyed_;
   std::vector<Series> series_;
   std::size_t series_done_ = 0;
   ReferenceEnd reference_;

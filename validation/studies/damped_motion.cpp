@@ -6,12 +6,13 @@
 
 namespace diracstep {
 
-std::optional<Vector> sizes_where_damped(const std::shared_ptr<const Scene>& scene, const Registry& registry,
-                                         const SolverFactory& solvers, double t_end, double step) {
+std::optional<SurveyedMotion> surveyed_motion(const std::shared_ptr<const Scene>& scene,
+                                              const Registry& registry, const SolverFactory& solvers,
+                                              double t_end, double step) {
   constexpr double coarse = 1e-4;
   try {
     const DampingSurvey survey = survey_damping(scene, registry, solvers, t_end, std::abs(step));
-    if (!(survey.strong() || survey.switching() || survey.switched())) return std::nullopt;
+    if (!survey.failure.empty()) return std::nullopt;
     AdaptiveIntegrator integrator(scene, registry, solvers, {.method = "damped/radau:3", .step = step},
                                   {.eps = coarse, .end = t_end});
     const Eigen::Index n = scene->dimension();
@@ -21,7 +22,8 @@ std::optional<Vector> sizes_where_damped(const std::shared_ptr<const Scene>& sce
       sizes = sizes.cwiseMax(here.cwiseAbs());
       return true;
     });
-    return report.ok() ? std::optional(sizes) : std::nullopt;
+    if (!report.ok()) return std::nullopt;
+    return SurveyedMotion{sizes, survey.strong() || survey.switching() || survey.switched()};
   } catch (const Misuse&) {  // told by the rows of the study
     return std::nullopt;
   }

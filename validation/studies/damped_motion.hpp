@@ -8,11 +8,17 @@
 
 namespace diracstep {
 
-/// Where the motion to `t_end` is damped so that damped/radau:3 is the default (DampingSurvey): the largest
-/// |q|, |v| and |p| of each coordinate along it, one below the other, from steps by local errors of 1e-4.
-/// Absolute tolerances of a baseline are parts of these: charges of 1e-6 C beside rtol = 1e-6 would not be
-/// solved for at all.  Empty for other motions, and where that run does not come to the end.
-std::optional<Vector> sizes_where_damped(const std::shared_ptr<const Scene>& scene, const Registry& registry,
-                                         const SolverFactory& solvers, double t_end, double step);
+/// Of a motion whose damping can be surveyed, as those of circuits with resistors.
+struct SurveyedMotion {
+  Vector sizes;         ///< the largest |q|, |v| and |p| of each coordinate, one below the other
+  bool damped = false;  ///< so that damped/radau:3 is the default (DampingSurvey)
+};
+
+/// The motion to `t_end` by steps of Radau IIA with local errors of 1e-4.  Absolute tolerances of a baseline
+/// are parts of its sizes: charges of 1e-6 C beside rtol = 1e-6 would not be solved for at all.  Empty where
+/// nothing is surveyed, as without a force, and where that run does not come to the end.
+std::optional<SurveyedMotion> surveyed_motion(const std::shared_ptr<const Scene>& scene,
+                                              const Registry& registry, const SolverFactory& solvers,
+                                              double t_end, double step);
 
 }  // namespace diracstep

@@ -62,10 +62,9 @@ TEST(DampedStudies, IdaIsSolvedToPartsOfWhatTheMotionIsLarge) {
   EXPECT_EQ(gl4, 1.0) << "a method that does not damp";
 }
 
-TEST(DampedStudies, ConservativeMotionsHaveNoSizes) {
+TEST(DampedStudies, WithoutAForceNothingIsSurveyed) {
   const CatalogueScene entry = make_scene("double_pendulum");
-  EXPECT_FALSE(
-      sizes_where_damped(entry.scene, Registry::with_built_ins(), kinsol(), 1.0, entry.natural_step));
+  EXPECT_FALSE(surveyed_motion(entry.scene, Registry::with_built_ins(), kinsol(), 1.0, entry.natural_step));
 }
 
 /// One step for every stiffness, conservative and damped.
