@@ -18,6 +18,9 @@ struct DampingSurvey {
   /// How many of the steps by their local error that a larger one was refused for fit into one of the fixed
   /// steps it is compared with; 1 where none was, or no fixed step is given.
   double finer = 1.0;
+  /// Where a force that is not linear in v determines velocities (FirstOrderMotions::by_force), the largest
+  /// ratio of the sizes that an entry of ∂f/∂v has at two nodes.
+  double resistance_ratio = 1.0;
   std::string failure = {};  ///< empty, or why nothing is known
 
   /// Above it GL(s) leaves a third and more of what should have died out, with a sign that alternates from
@@ -32,6 +35,10 @@ struct DampingSurvey {
     return failure.empty() && ((product > switching_from && finer > finer_from) ||
                                (product > begins_from && finer > far_finer_from && covered < step));
   }
+  /// Velocities that nothing stores are found by forces that switch, as those of diodes without capacitance:
+  /// GL(s) loses Newton's method where they do, with any step.
+  static constexpr double switched_from = 1e3;
+  bool switched() const { return failure.empty() && resistance_ratio > switched_from; }
 };
 
 /// Measures the damping along the motion to `end`: at the nodes of a coarse run of damped/radau:3, at most

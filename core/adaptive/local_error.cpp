@@ -14,18 +14,9 @@ namespace {
 constexpr std::size_t most_instants = 200;
 constexpr double below_eps = 0.9, most_growth = 10.0, most_shrinking = 0.1, after_failure = 0.25;
 constexpr double of_the_rate = 1e-6;  // of T ẏ, which counts as a size
+// Errors that are round-off, and what is allowed beside them.
+constexpr double hardly_less = 0.5, erratic = 0.2, above_errors = 100.0;
 constexpr double of_the_largest = 1e-10, above_round_off = 4e-16;
-
-/// |e_i| / s_i, the largest.
-double largest_ratio(const Vector& fine, const Vector& whole, const Vector& sizes, double least) {
-  double largest = 0.0;
-  for (Eigen::Index i = 0; i < fine.size(); ++i) {
-    const double difference = std::abs(fine[i] - whole[i]);
-    if (difference > 0.0) largest = std::max(largest, difference / std::max(sizes[i], least));
-    if (!std::isfinite(difference)) return HUGE_VAL;
-  }
-  return largest;
-}
 
 }  // namespace
 
@@ -69,6 +60,7 @@ LocalErrorControl::LocalErrorControl(double eps, int order, double span, double 
 
 void LocalErrorControl::start(const Integrator& at) {
   seen_ = {at.position().cwiseAbs(), at.momentum().cwiseAbs()};
+  least_ = Vector::Zero(seen_.q.size() + seen_.p.size());
   refused_ = 0;
 }
 
@@ -83,18 +75,49 @@ bool LocalErrorControl::take_both(Integrator& fine, Integrator& whole, double si
   return report.ok();
 }
 
-/// In parts of eps.
-double LocalErrorControl::error(const Integrator& fine, const Integrator& whole, double size) {
-  double largest = 0.0;
-  const auto add = [&](const Vector& start, const Vector& end, const Vector& other, const Vector& seen) {
+Vector LocalErrorControl::differences(const Integrator& fine, const Integrator& whole) const {
+  Vector all(q_.size() + p_.size());
+  all << fine.position() - whole.position(), fine.momentum() - whole.momentum();
+  return all;
+}
+
+LocalErrorControl::Worst LocalErrorControl::error(const Integrator& fine, const Integrator& whole,
+                                                  double size) {
+  const Vector difference = differences(fine, whole);
+  Worst worst;
+  const auto add = [&](const Vector& start, const Vector& end, const Vector& seen, Eigen::Index first) {
     const double rate = of_the_rate * span_ / std::abs(size);
     sizes_ = seen.cwiseMax(end.cwiseAbs()).cwiseMax(rate * (end - start).cwiseAbs());
     const double least = std::max(of_the_largest, above_round_off / eps_) * max_norm(sizes_);
-    largest = std::max(largest, largest_ratio(end, other, sizes_, least) / eps_);
+    for (Eigen::Index i = 0; i < start.size(); ++i) {
+      const double e = difference[first + i];
+      const double allowed = eps_ * std::max({sizes_[i], least, least_[first + i]});
+      if (!std::isfinite(e)) worst.part = HUGE_VAL;
+      if (e != 0.0 && std::abs(e) / allowed > worst.part) worst = {std::abs(e) / allowed, e, first + i};
+    }
   };
-  add(q_, fine.position(), whole.position(), seen_.q);
-  add(p_, fine.momentum(), whole.momentum(), seen_.p);
-  return largest;
+  add(q_, fine.position(), seen_.q, 0);
+  add(p_, fine.momentum(), seen_.p, q_.size());
+  return worst;
+}
+
+/// Takes the step again with a size that hardly differs; what is allowed grows where differences are
+/// round-off.
+bool LocalErrorControl::is_round_off(Integrator& fine, Integrator& whole, double start, double size,
+                                     const Worst& worst) {
+  const Vector first = differences(fine, whole);
+  StepReport report;
+  fine.restart(start, q_, p_, v_);
+  if (!take_both(fine, whole, 0.999 * size, report)) return false;
+  const Vector other = differences(fine, whole);
+  const auto jumps = [&](Eigen::Index i) {
+    return std::abs(other[i] - first[i]) > erratic * std::abs(first[i]);
+  };
+  if (!jumps(worst.component)) return false;
+  for (Eigen::Index i = 0; i < first.size(); ++i)
+    if (jumps(i))
+      least_[i] = std::max(least_[i], above_errors * std::max(std::abs(other[i]), std::abs(first[i])) / eps_);
+  return true;
 }
 
 StepReport LocalErrorControl::advance(Integrator& fine, Integrator& whole, double& size, double& next) {
@@ -104,9 +127,11 @@ StepReport LocalErrorControl::advance(Integrator& fine, Integrator& whole, doubl
   v_ = fine.velocity_estimate();
   const double stages = 0.5 * (order_ + 1);
   StepReport report;
+  double refused_size = 0.0, refused_part = HUGE_VAL;
   for (bool first = true;; first = false) {
     const bool taken = take_both(fine, whole, size, report);
-    const double part = taken ? error(fine, whole, size) : HUGE_VAL;
+    const Worst worst = taken ? error(fine, whole, size) : Worst{HUGE_VAL};
+    const double part = worst.part;
     if (taken && (part <= 1.0 || std::abs(size) <= smallest_)) {
       const double growth = part > 0.0 ? below_eps * std::pow(part, -1.0 / (order_ + 1)) : most_growth;
       next = size * std::clamp(growth, most_shrinking, first ? most_growth : 1.0);
@@ -115,7 +140,15 @@ StepReport LocalErrorControl::advance(Integrator& fine, Integrator& whole, doubl
       return report;
     }
     ++refused_;
+    const bool shorter = std::abs(size) <= 0.5 * std::abs(refused_size);
+    const bool stays = shorter && taken && std::isfinite(part) && part > hardly_less * refused_part;
+    const bool round_off = stays && is_round_off(fine, whole, start, size, worst);
+    if (refused_size == 0.0 || shorter) {
+      refused_size = size;
+      refused_part = part;
+    }
     if (fine.time() != start) fine.restart(start, q_, p_, v_);
+    if (round_off) continue;
     const double shrinking = taken ? below_eps * std::pow(part, -1.0 / (stages + 1.0)) : after_failure;
     size *= std::clamp(shrinking, most_shrinking, 0.9);
     if (std::abs(size) > 16.0 * std::numeric_limits<double>::epsilon() * std::abs(start) &&

@@ -29,6 +29,10 @@ bool may_change_later(const Scene& scene, double end);
 /// long, at most ten times; a step that is refused shrinks by the power 1/(s + 1) of its s stages, which is
 /// how its error falls where it is stiff (Hairer, Wanner, Solving Ordinary Differential Equations II, IV.8),
 /// at most to a tenth.
+///
+/// Where e does not fall with the size and becomes another one for a size that differs by a thousandth, it is
+/// round-off, as that of the charge of 100 µF beside junctions of 1 pF before anything has charged it: ten
+/// times as much is then allowed of that component.
 class LocalErrorControl {
  public:
   /// `span` is T; steps below `smallest` are accepted, with 0 none are.
@@ -55,13 +59,22 @@ class LocalErrorControl {
     Vector q, p;
   };
 
+  /// The component with the largest error in parts of what is allowed.
+  struct Worst {
+    double part = 0.0, difference = 0.0;
+    Eigen::Index component = 0;  ///< of (q, p)
+  };
+
+  bool is_round_off(Integrator& fine, Integrator& whole, double start, double size, const Worst& worst);
   bool take_both(Integrator& fine, Integrator& whole, double size, StepReport& report);
-  double error(const Integrator& fine, const Integrator& whole, double size);
+  Worst error(const Integrator& fine, const Integrator& whole, double size);
+  Vector differences(const Integrator& fine, const Integrator& whole) const;
 
   double eps_, span_, smallest_;
   int order_;
   long refused_ = 0;
   Sizes seen_;
+  Vector least_;              ///< of the sizes of (q, p), by round-off
   Vector q_, p_, v_, sizes_;  ///< where the step starts; workspace
 };
 

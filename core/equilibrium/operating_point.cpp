@@ -1,57 +1,18 @@
 #include <Eigen/LU>
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <diracstep/core/equilibrium/operating_point.hpp>
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/numerics/monotone_newton.hpp>
 #include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/core/system/first_order_motions.hpp>
-#include <optional>
 
 namespace diracstep {
 
 namespace {
 
 constexpr Eigen::Index most_unknowns_of_operating_point = 2000;
-constexpr int most_iterations_to_operating_point = 300;
-constexpr double singular_below = 1e-13;  // of the largest pivot of a matrix with balanced entries
-constexpr double shortest_part_of_step = 1e-9;
-constexpr double solved_to = 1e-14, near_round_off = 1e-9;  // |change| beside |x|
-constexpr double contradicted_from = 1e-7;                  // of the terms of an equation
-
-/// A matrix with its rows and columns scaled to entries of about 1 (Ruiz, 2001), and its solutions of least
-/// norm in these units.
-class BalancedMatrix {
- public:
-  explicit BalancedMatrix(Columns matrix)
-      : rows_(Vector::Ones(matrix.rows())), columns_(Vector::Ones(matrix.cols())) {
-    constexpr int rounds = 12;
-    const auto scale = [](double largest) { return largest > 0.0 ? 1.0 / std::sqrt(largest) : 1.0; };
-    for (int k = 0; k < rounds; ++k) {
-      const Vector r = matrix.cwiseAbs().rowwise().maxCoeff().unaryExpr(scale);
-      const Vector c = matrix.cwiseAbs().colwise().maxCoeff().transpose().unaryExpr(scale);
-      matrix = r.asDiagonal() * matrix * c.asDiagonal();
-      rows_ = rows_.cwiseProduct(r);
-      columns_ = columns_.cwiseProduct(c);
-    }
-    factors_.setThreshold(singular_below);
-    factors_.compute(matrix);
-  }
-
-  Columns solve(const Columns& right) const {
-    return columns_.asDiagonal() * factors_.solve(Columns(rows_.asDiagonal() * right));
-  }
-  /// In the units of the columns.
-  double norm(const Vector& x) const { return x.cwiseQuotient(columns_).norm(); }
-  /// How large the largest of x is in each row.
-  Vector sizes_in_rows(const Vector& x) const {
-    return max_norm(x.cwiseQuotient(columns_)) * rows_.cwiseInverse();
-  }
-
- private:
-  Vector rows_, columns_;
-  Eigen::CompleteOrthogonalDecomposition<Columns> factors_;
-};
+constexpr double contradicted_from = 1e-7;  // of the terms of an equation
 
 Columns kernel_of_balanced_rows(Columns matrix) {
   for (Eigen::Index r = 0; r < matrix.rows(); ++r)
@@ -201,41 +162,16 @@ class OperatingPointEquations {
                "; state where the motion starts instead (of a netlist: uic and IC=)");
 }
 
-/// x + part·change with the longest part whose next correction, by the same matrix, is shorter.
-std::optional<Vector> monotone_step(OperatingPointEquations& equations, const BalancedMatrix& matrix,
-                                    const Vector& x, const Vector& change) {
-  const double length = matrix.norm(change);
-  for (double part = 1.0; part >= shortest_part_of_step; part /= 2.0) {
-    const Vector next = x + part * change, residual = equations.residual(next);
-    if (!residual.allFinite()) continue;
-    if (matrix.norm(matrix.solve(residual)) <= (1.0 - part / 4.0) * length) return next;
-  }
-  return std::nullopt;
-}
-
 Vector solve_for_operating_point(OperatingPointEquations& equations, const Scene& scene) {
   Vector x = equations.first_guess();
-  for (int k = 0; k < most_iterations_to_operating_point; ++k) {
-    const Vector residual = equations.residual(x);
-    const Columns jacobian = equations.jacobian();
-    if (!residual.allFinite() || !jacobian.allFinite())
-      refuse_operating_point(scene, "the equations are not finite at the start");
-    const BalancedMatrix matrix(jacobian);
-    const Vector change = -matrix.solve(residual);
-    const double length = matrix.norm(change), size = matrix.norm(x);
-    const auto next =
-        length <= solved_to * size ? std::optional<Vector>(x) : monotone_step(equations, matrix, x, change);
-    if (!next && length > near_round_off * size)
-      refuse_operating_point(scene, "Newton's method ends after " + std::to_string(k) + " iterations");
-    if (!next || *next == x) {
-      if (const std::string left = equations.contradiction(x, residual, jacobian, matrix); !left.empty())
-        refuse_operating_point(scene, left);
-      return x;
-    }
-    x = *next;
-  }
-  refuse_operating_point(scene, "not found in " + std::to_string(most_iterations_to_operating_point) +
-                                    " iterations of Newton's method");
+  const MonotoneNewton end = solve_monotonically([&](const Vector& at) { return equations.residual(at); },
+                                                 [&](const Vector&) { return equations.jacobian(); }, x);
+  if (!end.failure.empty()) refuse_operating_point(scene, end.failure);
+  const Vector residual = equations.residual(x);
+  const Columns jacobian = equations.jacobian();
+  const std::string left = equations.contradiction(x, residual, jacobian, BalancedMatrix(jacobian));
+  if (!left.empty()) refuse_operating_point(scene, left);
+  return x;
 }
 
 }  // namespace

@@ -2,12 +2,14 @@
 #include <algorithm>
 #include <cmath>
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/numerics/monotone_newton.hpp>
 #include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/core/spaces/space.hpp>
 #include <diracstep/core/system/consistent_start.hpp>
 #include <diracstep/core/system/constraint_distribution.hpp>
 #include <diracstep/core/system/detail/kernel_start.hpp>
 #include <diracstep/core/system/detail/nearest_point.hpp>
+#include <diracstep/core/system/first_order_motions.hpp>
 #include <diracstep/core/system/hamiltonian_point.hpp>
 #include <diracstep/core/system/hidden_rows.hpp>
 #include <diracstep/core/system/redundant_rows.hpp>
@@ -171,6 +173,32 @@ ConsistentStart project_kernel_start(const Scene& scene, const FirstOrderMotions
   return {moved, (moved.q - scene.start.q).norm(), (moved.v - scene.start.v).norm()};
 }
 
+/// Where a force that is not linear in v determines velocities along W, as the voltages of diodes: those that
+/// it determines, beside the momenta of `v`; nothing else does.
+Vector velocity_by_force(const Scene& scene, const FirstOrderMotions& motions, double t, const Vector& q,
+                         const Vector& v) {
+  const Eigen::Index n = scene.dimension(), m = scene.rows();
+  Vector lq(n), p(n), x = Vector::Zero(n + m), left(n + m), slopes((n + m) * (n + m));
+  scene.lagrangian->gradient(t, q, v, lq, p);
+  x.head(n) = v;
+  FirstOrderVelocityProblem problem(scene, motions);
+  problem.begin(t, q, p);
+  const MonotoneNewton end = solve_monotonically(
+      [&](const Vector& at) {
+        problem.residual(at, left);
+        return left;
+      },
+      [&](const Vector& at) -> Columns {
+        problem.jacobian(at, slopes);
+        return slopes.reshaped(n + m, n + m);
+      },
+      x);
+  if (!end.failure.empty())
+    throw Misuse("scene '" + scene.name +
+                 "': no velocities at the start that its forces determine: " + end.failure);
+  return x.head(n);
+}
+
 }  // namespace
 
 ConsistentStart project_start(const Scene& given, const Start& given_start, const SolverFactory& solvers,
@@ -196,7 +224,9 @@ ConsistentStart project_start(const Scene& given, const Start& given_start, cons
   if (scene.by_hamiltonian() && (!held(guesses.v).empty() || redundant))
     throw Misuse("scene '" + scene.name +
                  "': its start is given by momenta, which are projected all together onto independent rows");
-  if (!held(guesses.v).empty() || redundant) {
+  if (const FirstOrderMotions motions = first_order_motions(scene); motions.by_force) {
+    result.start.v = velocity_by_force(scene, motions, start.time, result.start.q, start.v);
+  } else if (!held(guesses.v).empty() || redundant) {
     auto moved = std::make_shared<Scene>(*complete);  // what carries no momentum is set anew at this position
     moved->start.q = result.start.q;
     result.start.v = with_hidden_rows(moved)->start.v;

@@ -159,13 +159,6 @@ struct Directions {
   Columns resisted, free;
 };
 
-Vector largest_of_rows(const Columns& matrix) {
-  Vector largest(matrix.rows());
-  for (Eigen::Index r = 0; r < matrix.rows(); ++r)
-    largest[r] = size_or_one(max_norm(matrix.row(r).transpose()));
-  return largest;
-}
-
 /// `each_in_its_units`: the conductance of a diode, 1e-12 A/V, counts beside a resistance of 1e3 V/A.
 Directions split(const Columns& w, const Columns& fv, bool each_in_its_units) {
   Columns resistance = w.transpose() * fv * w;
@@ -254,7 +247,8 @@ ConstraintBlocks hidden_rows(const Scene& scene) {
   const Columns w = directions(scene, first, at_first, other, at_other);
   if (w.cols() == 0) return {};
   const FullDerivatives& resisting = first_order.by_force ? at_other : at_first;
-  const Directions parts = split(w, resisting.fv, first_order.by_force);
+  Directions parts = split(w, resisting.fv, first_order.by_force);
+  if (!first_order.by_force) parts.resisted = with_rows_apart(parts.resisted, resisting.fv, w);
   require_described(scene, w, parts, other, at_other);
   const Columns matrix = hidden_matrix(parts, resisting);
   const Vector units = largest_of_rows(matrix);

@@ -1,5 +1,7 @@
+#include <Eigen/QR>
 #include <cmath>
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/core/system/lagrangian_derivatives.hpp>
 #include <diracstep/core/system/multiplier_rows.hpp>
 #include <diracstep/core/system/rows_along_motions.hpp>
@@ -165,6 +167,35 @@ class RowsAlongMotions final : public ConstraintRows {
 };
 
 }  // namespace
+
+Vector largest_of_rows(const Columns& matrix) {
+  Vector largest(matrix.rows());
+  for (Eigen::Index r = 0; r < matrix.rows(); ++r)
+    largest[r] = size_or_one(max_norm(matrix.row(r).transpose()));
+  return largest;
+}
+
+Columns with_rows_apart(Columns w, const Columns& fv, const Columns& motions) {
+  constexpr double nearly = 1e-6;
+  Columns forms = w.transpose() * fv;
+  if (w.cols() < 2) return w;
+  const Columns rows = largest_of_rows(forms).cwiseInverse().asDiagonal() * forms * motions;
+  const Vector pivots =
+      Eigen::ColPivHouseholderQR<Columns>(rows.transpose()).matrixQR().diagonal().cwiseAbs();
+  if (pivots.minCoeff() > nearly * pivots.maxCoeff()) return w;
+  for (Eigen::Index k = 0; k + 1 < w.cols(); ++k) {
+    Eigen::Index row = 0, column = 0;
+    if (forms.bottomRows(w.cols() - k).cwiseAbs().maxCoeff(&row, &column) == 0.0) break;
+    w.col(k).swap(w.col(k + row));
+    forms.row(k).swap(forms.row(k + row));
+    for (Eigen::Index r = k + 1; r < w.cols(); ++r) {
+      const double factor = forms(r, column) / forms(k, column);
+      w.col(r) -= factor * w.col(k);
+      forms.row(r) -= factor * forms.row(k);
+    }
+  }
+  return w;
+}
 
 std::string motion_along(const Scene& scene, const Vector& w) {
   std::ostringstream text;

@@ -17,6 +17,14 @@ std::shared_ptr<const ConstraintRows> rows_along_motions(const Scene& scene, boo
 std::shared_ptr<const ConstraintRows> rows_along_motions_in(const ConstraintRows& rows,
                                                             const Scene& extended);
 
+/// The size of the largest entry of each row, 1 for one of zeros.
+Vector largest_of_rows(const Columns& matrix);
+
+/// The same space of directions W where their rows Wᵀ∂f/∂v, on the columns of `motions`, all but depend on
+/// each other, as those of two loops through the same 1 MΩ, one of them with 10 mΩ more: by elimination, the
+/// largest entry first, which leaves the other loop its 10 mΩ alone.  `fv` is ∂f/∂v.
+Columns with_rows_apart(Columns w, const Columns& fv, const Columns& motions);
+
 /// "qC1-qC3": a motion in words.
 std::string motion_along(const Scene& scene, const Vector& w);
 

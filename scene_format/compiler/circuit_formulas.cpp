@@ -1,12 +1,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <deque>
-#include <diracstep/constraints/kirchhoff.hpp>
 #include <diracstep/scene_format/compiler/circuit_formulas.hpp>
 #include <diracstep/scene_format/compiler/circuit_reader.hpp>
 #include <string>
-#include <unordered_map>
 #include <vector>
 
 namespace diracstep::scene_compiler {
@@ -15,8 +12,8 @@ namespace {
 
 constexpr double usual_capacitance = 1e-12;        // F, of a diode
 constexpr double least_conductance = 1e-12;        // A/V, of a diode without capacitance; SPICE's GMIN
+constexpr double usual_breakdown = 1e-3;           // A, SPICE's IBV
 constexpr double usual_thermal_voltage = 0.02585;  // V, kT/e at 300 K
-constexpr std::size_t most_nodes_on_paths = 300;
 
 }  // namespace
 
@@ -137,9 +134,16 @@ Node CircuitFormulas::conducted(const Branch& branch, Node index) {
     return parser_.formula(branch.values.find("current")->second, where);
   }
   if (branch.has("saturation")) {  // I_s (exp(u/u_T) − 1)
-    const Node x = graph_.divide(u, value_or(branch, index, "thermal_voltage", usual_thermal_voltage));
-    const Node own = graph_.multiply(value(branch, index, "saturation"),
-                                     graph_.subtract(graph_.apply(Op::exp, x), graph_.number(1.0)));
+    const Node thermal = value_or(branch, index, "thermal_voltage", usual_thermal_voltage);
+    Node own = graph_.multiply(
+        value(branch, index, "saturation"),
+        graph_.subtract(graph_.apply(Op::exp, graph_.divide(u, thermal)), graph_.number(1.0)));
+    if (branch.has("breakdown_voltage")) {  // − I_b exp(−(u + u_b)/u_T)
+      const Node beyond = graph_.negative(graph_.add(u, value(branch, index, "breakdown_voltage")));
+      own =
+          graph_.subtract(own, graph_.multiply(value_or(branch, index, "breakdown_current", usual_breakdown),
+                                               graph_.apply(Op::exp, graph_.divide(beyond, thermal))));
+    }
     if (!has_flux(branch)) return own;
     return graph_.add(own, graph_.multiply(graph_.number(least_conductance), u));
   }
@@ -309,226 +313,6 @@ std::vector<CircuitFormulas::Row> CircuitFormulas::rows() {
                     port.place});
   }
   return rows;
-}
-
-// Kirchhoff's current law.
-
-void CircuitFormulas::add_current_laws(std::vector<Row>& rows) {
-  std::vector<std::pair<std::string, std::string>> ends;
-  std::unordered_map<std::string, std::vector<const Branch*>> at;  // each node, in file order
-  std::set<std::string> repeated;
-  for (const auto& branch : document_.branches) {
-    ends.emplace_back(branch.from.name, branch.to.name);
-    for (const SceneDocument::NodeName* end : {&branch.from, &branch.to}) {
-      if (at[end->name].empty() || at[end->name].back() != &branch) at[end->name].push_back(&branch);
-      if (end->index) repeated.insert(end->name);
-    }
-  }
-  const std::vector<std::string> with_rows = nodes_with_rows(ends);
-  for (const std::string& node : repeated) {
-    const Branch& first = *at[node].front();
-    if (std::ranges::find(with_rows, node) == with_rows.end())
-      fail(first.place,
-           fmt::format("nothing joins the nodes {}[…] to 'ground'; repeated nodes need one", node));
-    for (const Branch* branch : at[node])
-      for (const SceneDocument::NodeName* end : {&branch->from, &branch->to})
-        if (end->name == node && !end->index)
-          fail(branch->place,
-               fmt::format("the node '{}' is repeated elsewhere; here it needs an index", node));
-  }
-  for (const std::string& node : with_rows) {
-    if (repeated.contains(node)) {
-      rows.push_back(repeated_law(node));
-      continue;
-    }
-    Node sum = graph_.number(0.0);
-    for (const Branch* branch : at[node]) {
-      const Node out = total_current(*branch, own_index(*branch));
-      if (branch->from.name == node) sum = graph_.add(sum, summed(*branch, out));
-      if (branch->to.name == node) sum = graph_.subtract(sum, summed(*branch, out));
-    }
-    rows.push_back({"node_" + node, "Kirchhoff's current law at node '" + node + "'", {}, sum, {}});
-  }
-}
-
-/// The row of each node n[j]: over all ends, the branch whose end it is, if there is one.
-CircuitFormulas::Row CircuitFormulas::repeated_law(const std::string& name) {
-  Node first = none, last = none;
-  const auto widen = [&](Node low, Node high) {
-    first = first == none ? low : graph_.apply(Op::min, first, low);
-    last = last == none ? high : graph_.apply(Op::max, last, high);
-  };
-  std::vector<std::pair<const Branch*, const SceneDocument::NodeName*>> meeting;
-  for (const auto& branch : document_.branches)
-    for (const SceneDocument::NodeName* end : {&branch.from, &branch.to}) {
-      if (end->name != name) continue;
-      meeting.emplace_back(&branch, end);
-      const std::vector<int> own = loops(branch);
-      if (own.empty()) {
-        widen(node_index(branch, *end, none), node_index(branch, *end, none));
-        continue;
-      }
-      const Loop range = symbols_.loops[static_cast<std::size_t>(own.front())];
-      widen(graph_.add(range.first, shift(branch, *end)), graph_.add(range.last, shift(branch, *end)));
-    }
-  symbols_.loops.push_back({"node", first, last});
-  const int loop = static_cast<int>(symbols_.loops.size()) - 1;
-  Node sum = graph_.number(0.0);
-  for (const auto& [branch, end] : meeting) {
-    const Node flow = inflow(*branch, *end, graph_.loop_index(loop));
-    sum = end == &branch->from ? graph_.add(sum, flow) : graph_.subtract(sum, flow);
-  }
-  return {"node_" + name, "Kirchhoff's current law at the nodes " + name + "[…]", {loop}, sum, {}};
-}
-
-/// Σ of the current over the one turn of the branch whose end is the node, over none where there is no such.
-Node CircuitFormulas::inflow(const Branch& branch, const SceneDocument::NodeName& node, Node at) {
-  const std::vector<int> own = loops(branch);
-  Loop only;
-  if (own.empty()) {
-    const Node here = node_index(branch, node, none);
-    only = {"k", graph_.apply(Op::max, at, here), graph_.apply(Op::min, at, here)};
-  } else {
-    const Loop range = symbols_.loops[static_cast<std::size_t>(own.front())];
-    const Node turn = graph_.subtract(at, shift(branch, node));
-    only = {"k", graph_.apply(Op::max, range.first, turn), graph_.apply(Op::min, range.last, turn)};
-  }
-  symbols_.loops.push_back(only);
-  const int loop = static_cast<int>(symbols_.loops.size()) - 1;
-  return graph_.sum(total_current(branch, own.empty() ? none : graph_.loop_index(loop)), loop);
-}
-
-/// c of an end "n[k + c]".
-Node CircuitFormulas::shift(const Branch& branch, const SceneDocument::NodeName& node) {
-  if (!node.index)
-    fail(branch.place, fmt::format("the node '{}' is repeated elsewhere; here it needs an index", node.name));
-  const Node zero = graph_.number(0.0), turn = own_index(branch);
-  const Node here = node_index(branch, node, turn);
-  const Node c = node_index(branch, node, zero);
-  if (graph_.add(turn, c) != here && graph_.subtract(turn, graph_.negative(c)) != here)
-    fail(node.index->start,
-         fmt::format("the index of the node '{}' is {}; expected the loop variable, plus or "
-                     "minus what does not depend on it, as in n[k-1]",
-                     node.name, node.index->text));
-  return c;
-}
-
-Node CircuitFormulas::node_index(const Branch& branch, const SceneDocument::NodeName& node, Node index) {
-  return parser_.index(*node.index, context(branch, index, "nodes", false));
-}
-
-// Voltages by name.
-
-Node CircuitFormulas::answer(const CircuitQuery& query) {
-  if (query.quantity == 'V') {
-    const At ground{query.names.size() == 2 ? query.names[1] : At{}};
-    At to = ground;
-    if (to.name.empty())
-      for (const auto& branch : document_.branches)
-        for (const auto* end : {&branch.from, &branch.to})
-          if (end->name == "ground" || end->name == "0") to = {end->name};
-    if (to.name.empty())
-      fail(query.place, "there is no node 'ground'; ask for a voltage between two nodes, V(a, b)");
-    return voltage(query.names[0], to, query.place);
-  }
-  const auto& [name, index] = query.names[0];
-  for (const auto& port : document_.two_ports)
-    if (port.name == name)
-      fail(query.place,
-           fmt::format("{} is a {}; its sides are {} and {}", name, port.kind, port.side(1), port.side(2)));
-  const Branch& asked = branch(name, query.place);
-  if (loops(asked).empty() != (index == none))
-    fail(query.place, index == none ? fmt::format("'{0}' is repeated; give an index, {0}[1]", name)
-                                    : fmt::format("'{}' has no index", name));
-  const Node through = total_current(asked, index);
-  return query.quantity == 'I' ? through : graph_.multiply(element_voltage(asked, index), through);
-}
-
-Node CircuitFormulas::element_voltage(const Branch& branch, Node index) {
-  const Node own = drop(branch, index, false);
-  return own != none ? own
-                     : voltage(place_of(branch, branch.from, index), place_of(branch, branch.to, index),
-                               branch.place);
-}
-
-CircuitFormulas::At CircuitFormulas::place_of(const Branch& branch, const SceneDocument::NodeName& node,
-                                              Node index) {
-  return {node.name, node.index ? node_index(branch, node, index) : none};
-}
-
-/// V(from) − V(to), along elements whose voltage is a function of charges and currents; where there are
-/// such, along those that need no currents.
-Node CircuitFormulas::voltage(const At& from, const At& to, Place place) {
-  for (const At* end : {&from, &to})
-    if (std::ranges::none_of(document_.branches, [&](const Branch& branch) {
-          return branch.from.name == end->name || branch.to.name == end->name;
-        }))
-      fail(place, fmt::format("there is no node '{}'", end->name));
-  for (const bool positions_only : {true, false})
-    if (const Node found = path(from, to, positions_only); found != none) return found;
-  fail(place,
-       fmt::format("no voltage between '{}' and '{}': inductors, current sources and transformers alone "
-                   "join them. The potentials of nodes are the columns lambda_node_… of --out; a "
-                   "resistor beside one of these elements gives the voltage a name",
-                   from.name, to.name));
-}
-
-Node CircuitFormulas::path(const At& from, const At& to, bool positions_only) {
-  std::deque<std::pair<At, Node>> open{{from, graph_.number(0.0)}};
-  std::set<std::pair<std::string, Node>> met{{from.name, from.index}};
-  while (!open.empty() && met.size() < most_nodes_on_paths) {
-    const auto [here, sum] = open.front();
-    open.pop_front();
-    if (here.name == to.name && here.index == to.index) return sum;
-    for (const auto& branch : document_.branches)
-      for (const bool along : {true, false}) {
-        const SceneDocument::NodeName &near = along ? branch.from : branch.to,
-                                      &far = along ? branch.to : branch.from;
-        if (near.name != here.name || being_asked_.contains(branch.name)) continue;
-        const auto [meets, index] = index_at(branch, near, here.index);
-        if (!meets) continue;
-        const At there = place_of(branch, far, index);
-        if (met.contains({there.name, there.index})) continue;
-        const Node own = drop(branch, index, positions_only);
-        if (own == none) continue;
-        met.insert({there.name, there.index});
-        open.emplace_back(there, along ? graph_.add(sum, own) : graph_.subtract(sum, own));
-      }
-  }
-  return none;
-}
-
-/// Whether an end of a branch is the node, and the turn of the branch with that end.
-std::pair<bool, Node> CircuitFormulas::index_at(const Branch& branch, const SceneDocument::NodeName& node,
-                                                Node index) {
-  if (loops(branch).empty()) return {!node.index || node_index(branch, node, none) == index, none};
-  if (!node.index) return {false, none};  // one of many
-  return {true, graph_.subtract(index, shift(branch, node))};
-}
-
-/// The voltage of a branch from its own law; none where that does not tell it.
-Node CircuitFormulas::drop(const Branch& branch, Node index, bool positions_only) {
-  if (branch.kind == "capacitor")
-    return graph_.derivative(capacitor_energy(branch, index), charge(branch, index));
-  if (family("q" + branch.name + "_c") != none)
-    return graph_.divide(stored_charge(branch, index), capacitance(branch, index));
-  Node own = none;
-  being_asked_.insert(branch.name);
-  if (branch.kind == "source_voltage") own = graph_.negative(source_value(branch, index));
-  if (!positions_only && has_flux(branch))
-    own = graph_.coordinate(family("f" + branch.name), index, Role::second);
-  if (!positions_only && (branch.kind == "switch" || branch.kind == "resistor")) {
-    const Node size = resistance(branch, index);
-    if (size != none) {
-      own = graph_.multiply(size, current(branch, index));
-    } else if (branch.has("voltage")) {
-      Context where = context(branch, index, "voltage", true);
-      where.locals.emplace("i", current(branch, index));
-      own = parser_.formula(branch.values.find("voltage")->second, where);
-    }
-  }
-  being_asked_.erase(branch.name);
-  return own != none && positions_only && holds(own, true) ? none : own;
 }
 
 }  // namespace diracstep::scene_compiler

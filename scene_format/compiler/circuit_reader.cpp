@@ -22,7 +22,9 @@ const std::vector<ElementKeys>& element_keys() {
       {"resistor", {{"value"}, {"voltage"}, {"current"}}, {"capacitance"}},
       {"source_voltage", {{"value"}}},
       {"source_current", {{"value"}}},
-      {"diode", {{"saturation"}, {"on", "off"}}, {"thermal_voltage", "threshold", "capacitance"}},
+      {"diode",
+       {{"saturation"}, {"on", "off"}},
+       {"thermal_voltage", "threshold", "capacitance", "breakdown_voltage", "breakdown_current"}},
       {"switch", {{"closed", "on", "off"}}},
       {"opamp", {{}}}};
   return keys;
@@ -137,6 +139,8 @@ void CircuitReader::read_branch(const toml::table& table, const std::string& kin
     if (const auto text = tables_.optional_formula(table, key.c_str())) branch.values.emplace(key, *text);
   if (branch.has("capacitance") && kind == "resistor" && !branch.has("current"))
     tables_.fail(place, "'capacitance' of a [[resistor]] stands beside 'current' only");
+  if (branch.has("breakdown_current") && !branch.has("breakdown_voltage"))
+    tables_.fail(place, "'breakdown_current' stands beside 'breakdown_voltage'");
   if (kind == "opamp") std::tie(branch.plus, branch.minus) = two_nodes(table, "inputs");
   document_.branches.push_back(std::move(branch));
 }

@@ -161,6 +161,8 @@ class IdaIntegration {
     const bool loose = options_.formulation == DaeFormulation::rates_loose ||
                        options_.formulation == DaeFormulation::index_2;
     column(tolerance_).setConstant(atol_);
+    for (Eigen::Index i = 0; i < options_.sizes.size(); ++i)
+      if (options_.sizes[i] > 0.0) column(tolerance_)[i] = atol_ * options_.sizes[i];
     if (loose) column(tolerance_).tail(multipliers).setConstant(loose_tolerance);
     require(IDASVtolerances(ida(), options_.rtol, tolerance_.get()), "IDASVtolerances");
     column(differential_) << Vector::Ones(n), Vector::Zero(n), Vector::Ones(n), Vector::Zero(multipliers);
@@ -178,7 +180,8 @@ class IdaIntegration {
   double first_step(double t_end) const {
     const int n = 3 * scene_.dimension();
     const Vector y = column(y_).head(n).cwiseAbs(), rate = column(rate_).head(n).cwiseAbs();
-    const double tolerances_per_time = (rate.array() / (options_.rtol * y.array() + atol_)).maxCoeff();
+    const Vector allowed = options_.rtol * y + column(tolerance_).head(n);
+    const double tolerances_per_time = rate.cwiseQuotient(allowed).maxCoeff();
     const double longest = 1e-3 * (t_end - scene_.start.time);
     return std::min(0.1 / (std::sqrt(options_.rtol) * tolerances_per_time), longest);
   }

@@ -35,6 +35,8 @@ void require_reference(const char* integrator, const Scene& scene, double t_end,
           "a finite time after the start is needed");
   require(options.rtol >= 1e-14 && options.rtol <= 1e-1, "rtol", options.rtol,
           "it must lie in [1e-14, 1e-1]");
+  if (options.sizes.size() != 0 && options.sizes.size() != 3 * scene.dimension())
+    throw Misuse("the sizes of a baseline are those of q, v and p");
   require(options.atol >= 0.0 && std::isfinite(options.atol), "atol", options.atol,
           "a finite number, 0 or more, is needed");
   require(options.max_steps >= 1, "max_steps", static_cast<double>(options.max_steps), "1 or more is needed");

@@ -23,6 +23,7 @@ const char* name(DaeFormulation formulation);
 struct ReferenceOptions {
   double rtol = 1e-8;  ///< relative tolerance, in [1e-14, 1e-1]
   double atol = 0.0;   ///< absolute tolerance on every component that has an error test; 0 takes rtol
+  Vector sizes = {};   ///< of q, v, p, whose parts absolute tolerances are; empty: 1 for each; IDA only
   long max_steps = 5'000'000;
   DaeFormulation formulation = DaeFormulation::rates;  ///< of IDA
 };

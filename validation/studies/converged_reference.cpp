@@ -3,12 +3,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <diracstep/core/adaptive/adaptive_run.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/runs/event_steps.hpp>
 #include <diracstep/core/runs/run.hpp>
 #include <diracstep/core/runs/step_loop.hpp>
 #include <diracstep/validation/studies/converged_reference.hpp>
 #include <diracstep/validation/studies/work_precision.hpp>
+#include <span>
 
 namespace diracstep {
 
@@ -21,6 +23,8 @@ struct Ladder {
 constexpr std::array<Ladder, 4> reference_ladders{
     {{"type1/gl:6", 12}, {"type1/gl:4", 8}, {"type1/midpoint", 8}, {"type1/trapezoidal", 8}}};
 
+constexpr std::array<Ladder, 2> damped_ladders{{{"damped/radau:5", 9}, {"damped/radau:4", 7}}};
+constexpr double coarse_local_error = 1e-4, finer_local_errors = 0.1, smallest_local_error = 1e-13;
 constexpr double converged = 1e-6;  ///< a change above it is never taken for round-off
 constexpr double still_falling = 0.5;
 constexpr double smallest_claim = 1e-15;  ///< the rounding of the reference itself
@@ -46,8 +50,8 @@ struct Refined {
 class Refinement {
  public:
   Refinement(const CatalogueScene& scene, const Registry& registry, const SolverFactory& solvers,
-             double t_end, const Look& look)
-      : scene_(scene), registry_(registry), solvers_(solvers), t_end_(t_end), look_(look) {}
+             double t_end, const Look& look, bool damped)
+      : scene_(scene), registry_(registry), solvers_(solvers), t_end_(t_end), look_(look), damped_(damped) {}
 
   Refined refined(const Ladder& by, double seconds) const {
     Refined best;
@@ -55,15 +59,18 @@ class Refinement {
     best.order = by.order;
     const double begin = thread_seconds(), start = scene_.scene->start.time;
     const double length = t_end_ - start;
-    double step = std::copysign(std::min(first_step * scene_.natural_step, 0.5 * std::abs(length)), length),
+    double step = damped_ ? coarse_local_error
+                          : std::copysign(std::min(first_step * scene_.natural_step, 0.5 * std::abs(length)),
+                                          length),
            last = 0.0;
     Sample before;
     bool any = false;
     for (int k = 0; k < most_halvings && (k == 0 || thread_seconds() - begin + 2.0 * last < seconds);
-         ++k, step *= 0.5) {
+         ++k, step *= damped_ ? finer_local_errors : 0.5) {
+      if (damped_ && step < smallest_local_error) break;
       const double run_begin = thread_seconds();
       Sample end;
-      best.failure = run(by, step, end);
+      best.failure = damped_ ? run_by_local_error(by, step, end) : run(by, step, end);
       last = thread_seconds() - run_begin;
       if (!best.failure.empty()) continue;  // a shorter step may be solved
       if (any) {
@@ -108,6 +115,19 @@ class Refinement {
     return reading.ok() ? "" : describe(reading.status);
   }
 
+  std::string run_by_local_error(const Ladder& by, double eps, Sample& end) const {
+    AdaptiveIntegrator integrator(scene_.scene, registry_, solvers_,
+                                  {.method = by.method, .order = by.order, .step = scene_.natural_step},
+                                  {.eps = eps, .end = t_end_});
+    const RunReport report =
+        run_until(integrator, t_end_, Momentum::projected, steps_per_look, [&](const Sample& sample) {
+          end = sample;
+          if (look_) look_();
+          return true;
+        });
+    return report.last.failure;
+  }
+
   Integrator made(const Ladder& by, double step) const {
     IntegratorOptions options{.method = by.method, .order = by.order, .step = step};
     options.compensated_sums = true;
@@ -124,17 +144,20 @@ class Refinement {
   const SolverFactory& solvers_;
   double t_end_;
   const Look& look_;
+  bool damped_;
 };
 
 }  // namespace
 
 ReferenceEnd converged_reference(const CatalogueScene& scene, const Registry& registry,
-                                 const SolverFactory& solvers, double t_end, double seconds,
-                                 const Look& look) {
-  const Refinement refinement(scene, registry, solvers, t_end, look);
+                                 const SolverFactory& solvers, double t_end, double seconds, const Look& look,
+                                 bool damped) {
+  const Refinement refinement(scene, registry, solvers, t_end, look, damped);
   std::vector<Refined> found;
   ReferenceEnd reference{.kind = "converged", .how = {}, .missing = {}, .q = {}, .p = {}};
-  for (const Ladder& candidate : reference_ladders) {
+  const std::span<const Ladder> ladders =
+      damped ? std::span<const Ladder>(damped_ladders) : std::span<const Ladder>(reference_ladders);
+  for (const Ladder& candidate : ladders) {
     if (found.size() == 2) break;
     try {
       Refined one = refinement.refined(candidate, 0.5 * seconds);
@@ -157,9 +180,9 @@ ReferenceEnd converged_reference(const CatalogueScene& scene, const Registry& re
   reference.p = found[0].end.p;
   reference.self_error =
       std::max({found[0].change, found[1].change, distance(found[1].end, found[0].end), smallest_claim});
-  reference.how = fmt::format("{} of order {} at step {:.3g} and its double, beside {} of order {} at {:.3g}",
-                              found[0].method, found[0].order, found[0].step, found[1].method, found[1].order,
-                              found[1].step);
+  reference.how = fmt::format("{} of order {} at {} {:.3g} and its {}, beside {} of order {} at {:.3g}",
+                              found[0].method, found[0].order, damped ? "eps" : "step", found[0].step,
+                              damped ? "tenfold" : "double", found[1].method, found[1].order, found[1].step);
   return reference;
 }
 

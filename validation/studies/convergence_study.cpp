@@ -8,6 +8,7 @@
 #include <diracstep/plugins/callback_error.hpp>
 #include <diracstep/validation/studies/converged_reference.hpp>
 #include <diracstep/validation/studies/convergence_study.hpp>
+#include <diracstep/validation/studies/damped_motion.hpp>
 #include <diracstep/validation/studies/formulation_choice.hpp>
 #include <diracstep/validation/studies/work_precision.hpp>
 #include <utility>
@@ -22,7 +23,8 @@ constexpr int plateau_length = 2;        // refinements in vain that end a ladde
 constexpr double usual_ladder = 12.0;    // rows, for the progress only
 constexpr std::size_t longest_ladder = 40;
 constexpr double fewest_steps = 2.0;
-constexpr double natural_eps = 1.0;                   // radians of the coarsest variable step
+constexpr double natural_eps = 1.0;  // radians of the coarsest variable step
+constexpr double coarsest_local_error = 1e-2, finer_local_error = 10.0, its_cost = 1.5;
 constexpr double smallest_error = 1e-17;              // an error of zero has no logarithm
 constexpr long most_steps_in_limited_time = 200'000;  // of a baseline: some tenths of a second
 constexpr double near_the_reference = 3.0;    // times its own error: what is smaller shows the reference's
@@ -47,7 +49,13 @@ class StudyInProgress {
     study_.momentum = options.momentum;
     natural_step_ = std::copysign(scene.natural_step, study_.t_end - study_.t_start);
     require_options();
-    for (const auto& [method, order] : options_.series) add(chosen(method, order));
+    if (!options_.series.empty() || options_.rtols.size() > 0)
+      surveyed_ = surveyed_motion(entry_.scene, registry_, solvers_, study_.t_end, natural_step_);
+    if (damped() && !options_.series.empty())
+      for (const char* method : {"damped/radau:3", "damped/radau:5"})
+        series_.push_back({method, registry_.method(method).info.order, true});
+    for (const auto& [method, order] : options_.series)
+      if (!damped() || method == "type1/gl:3") add(chosen(method, order));
     if (options_.series.empty())
       for (const auto& method : options_.methods)
         for (const int order : orders_of(method)) add(chosen(method, order));
@@ -90,11 +98,19 @@ class StudyInProgress {
     if (options_.adaptive && entry_.events.empty()) series_.push_back(series.with_variable_steps());
   }
 
+  bool damped() const { return surveyed_ && surveyed_->damped; }
+  Vector sizes() const { return surveyed_ ? surveyed_->sizes : Vector(); }
+
+  /// With steps by their local error, whose ladder is one of eps.
+  bool by_local_error(const Series& series) const {
+    return series.variable && registry_.method(series.method).info.damped;
+  }
+
   ReferenceEnd reference() const {
     if (auto known = known_point(entry_, study_.t_end)) return *std::move(known);
-    ReferenceEnd ours =
-        converged_reference(entry_, registry_, solvers_, study_.t_end, options_.reference_budget,
-                            [&] { look(0.0, "a converged reference"); });
+    ReferenceEnd ours = converged_reference(
+        entry_, registry_, solvers_, study_.t_end, options_.reference_budget,
+        [&] { look(0.0, "a converged reference"); }, damped());
     const bool by_ida = !ours.missing.empty() && entry_.events.empty();  // which knows no events
     return by_ida ? reference_end(entry_, study_.t_end) : ours;
   }
@@ -218,9 +234,14 @@ class StudyInProgress {
 
   /// Runs the ladder of one series and says why it ended.
   std::string climb(const Series& series) {
-    const double factor = series.order > 4 ? std::sqrt(2.0) : 2.0;
+    const bool local = by_local_error(series);
+    const double factor = local ? finer_local_error : series.order > 4 ? std::sqrt(2.0) : 2.0;
+    const double cost = local ? its_cost : factor;
     const std::size_t first = study_.rows.size();
-    const double start = series.variable ? natural_eps : natural_step_, time = share_of_time();
+    const double start = local             ? coarsest_local_error
+                         : series.variable ? natural_eps
+                                           : natural_step_,
+                 time = share_of_time();
     const double begin = thread_seconds();
     const StudyRow natural = run_row(series, start, 0.0);
     if (!series.variable) coarsen(series, factor, natural.error());
@@ -228,9 +249,9 @@ class StudyInProgress {
     int in_vain = 0;
     const double smallest = std::isfinite(reference_.self_error) ? reference_.self_error : 0.0;
     for (double step = start / factor; study_.rows.size() < first + longest_ladder; step /= factor) {
-      if (cpu_seconds * factor > options_.run_budget)
-        return fmt::format("the next run would take about {:.2g} s", cpu_seconds * factor);
-      if (thread_seconds() - begin + cpu_seconds * factor * (1.0 + options_.repeats) > time)
+      if (cpu_seconds * cost > options_.run_budget)
+        return fmt::format("the next run would take about {:.2g} s", cpu_seconds * cost);
+      if (thread_seconds() - begin + cpu_seconds * cost * (1.0 + options_.repeats) > time)
         return "its share of the time of the study is used up";
       const double part =
           0.95 * std::min(1.0, static_cast<double>(study_.rows.size() - first) / usual_ladder);
@@ -261,9 +282,10 @@ class StudyInProgress {
     if (baseline != ida_method) return {DaeFormulation::rates};  // it has none
     if (options_.ida_formulation) return {*options_.ida_formulation};
     if (!reference_.missing.empty()) return {DaeFormulation::rates};
-    return best_formulations(*entry_.scene, study_.t_end, rtols, reference_,
-                             std::min(options_.run_budget, of_a_share * share_of_time()),
-                             [&] { look(part, "the formulations of IDA"); });
+    return best_formulations(
+        *entry_.scene, study_.t_end, rtols, reference_,
+        std::min(options_.run_budget, of_a_share * share_of_time()),
+        [&] { look(part, "the formulations of IDA"); }, sizes());
   }
 
   void run_baseline_ladder(const std::string& baseline, double part) {
@@ -280,7 +302,7 @@ class StudyInProgress {
     const double time = share_of_time();
     std::vector<Sample> ends(rtols.size());
     const auto run = [&](double rtol, int repeats, Sample& end) {
-      ReferenceOptions reference{.rtol = rtol, .formulation = formulation};
+      ReferenceOptions reference{.rtol = rtol, .sizes = sizes(), .formulation = formulation};
       if (std::isfinite(options_.time_limit)) reference.max_steps = most_steps_in_limited_time;
       return run_baseline(baseline, *entry_.scene, study_.t_end, reference, repeats, reference_, end);
     };
@@ -310,6 +332,7 @@ class StudyInProgress {
   const StudyOptions& options_;
   const StudyObserver& observer_;
   double natural_step_ = 0.0;
+  std::optional<SurveyedMotion> surveyed_;
   std::vector<Series> series_;
   std::size_t series_done_ = 0;
   ReferenceEnd reference_;

@@ -19,11 +19,12 @@ struct Candidate {
 
 Candidate tried(DaeFormulation formulation, const Scene& scene, double t_end,
                 const std::vector<double>& rtols, const ReferenceEnd& reference, double budget,
-                const Look& look) {
+                const Look& look, const Vector& sizes) {
   Candidate candidate{formulation, {}};
   for (const double rtol : rtols) {
     if (look) look();
-    const ReferenceRun run = integrate_with_ida(scene, t_end, {.rtol = rtol, .formulation = formulation});
+    const ReferenceRun run =
+        integrate_with_ida(scene, t_end, {.rtol = rtol, .sizes = sizes, .formulation = formulation});
     if (run.ok()) candidate.points.push_back({rtol, reference.distance(run.end), run.cpu_seconds});
     if (run.cpu_seconds > budget) break;
   }
@@ -51,12 +52,12 @@ const Candidate* fastest_at(double error, const std::vector<Candidate>& all,
 
 std::vector<DaeFormulation> best_formulations(const Scene& scene, double t_end,
                                               const std::vector<double>& rtols, const ReferenceEnd& reference,
-                                              double budget, const Look& look) {
+                                              double budget, const Look& look, const Vector& sizes) {
   const std::vector<DaeFormulation> formulations = formulations_of(scene);
   if (formulations.size() == 1 || rtols.empty()) return {DaeFormulation::rates};
   std::vector<Candidate> all;
   for (const DaeFormulation formulation : formulations)
-    all.push_back(tried(formulation, scene, t_end, rtols, reference, budget, look));
+    all.push_back(tried(formulation, scene, t_end, rtols, reference, budget, look, sizes));
   std::vector<DaeFormulation> chosen;
   for (const double error : judged_errors) {
     const Candidate* const best = fastest_at(error, all, chosen);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <diracstep/core/runs/energy_check.hpp>
+#include <diracstep/scene_format/scene_file.hpp>
 #include <diracstep/validation/references/scaled_rows.hpp>
 #include <diracstep/validation/studies/stability_cases.hpp>
 #include <memory>
@@ -76,6 +77,59 @@ void add_stiff_springs(Cases& cases, bool full) {
     cases.push_back(over_steps("stiff_spring_pendulum at a fifth of its step, k", std::pow(10.0, decade),
                                fmt::format("stiff_spring_pendulum k=1e{} h/5", decade),
                                spring_pendulum(decade), 9.81, 0.2, 5000));
+}
+
+/// The spring as a row with compliance 1/k, whose force is an unknown; at k = ∞ it is the rigid pendulum.
+CatalogueScene compliant_pendulum(double k) {
+  constexpr const char* text = R"toml(name = "stiff_spring_pendulum_row"
+lagrangian = "(v_x^2 + v_y^2)/2 - 9.81*y"
+[coordinates]
+x = {}
+y = {}
+[parameters]
+compliance = 1e-4
+[[rows]]
+name = "spring"
+equation = "sqrt(x^2 + y^2) - 1 = 0"
+compliance = "compliance"
+[start]
+x = 1
+[span]
+end = 10
+step = 0.01
+)toml";
+  CatalogueScene entry = scene_from_text("stiff_spring_pendulum_row.toml", text, {{"compliance", 1.0 / k}});
+  const bool rigid = !(k < 1e8);
+  const Reference plain = rigid ? make_scene("pendulum_cartesian", {{"g", 9.81}}).reference
+                                : make_scene("stiff_spring_pendulum", {{"k", k}}).reference;
+  const Eigen::Index n = entry.scene->dimension();  // with the extension of the spring behind x and y
+  entry.reference = plain;
+  entry.reference.at = [plain, n, rigid](double time) -> std::optional<ReferencePoint> {
+    const auto known = plain.at ? plain.at(time) : std::nullopt;
+    if (!known) return std::nullopt;
+    ReferencePoint point{Vector::Zero(n), Vector::Zero(n)};
+    point.q.head(2) = known->q.head(2);
+    point.v.head(2) = known->v.head(2);
+    const double length = known->q.head(2).norm();  // the extension of the spring
+    if (!rigid) point.q[2] = length - 1.0;
+    if (!rigid) point.v[2] = known->q.head(2).dot(known->v.head(2)) / length;
+    return point;
+  };
+  if (rigid) {
+    entry.reference.how = "the rigid pendulum, approached as g/k";
+    entry.reference.self_error = 9.81 / k;
+  }
+  return entry;
+}
+
+void add_compliant_springs(Cases& cases, bool full) {
+  const auto add = [&](double k, const std::string& text) {
+    cases.push_back(over_steps("stiff_spring_pendulum as a row with compliance 1/k, k", k,
+                               "stiff_spring_pendulum row k=" + text, compliant_pendulum(k), 9.81, 2.0, 500));
+  };
+  for (int decade = 2; decade <= 14; decade += full ? 1 : 2)
+    add(std::pow(10.0, decade), fmt::format("1e{}", decade));
+  add(HUGE_VAL, "inf");
 }
 
 void add_fput(Cases& cases, bool full) {
@@ -255,6 +309,7 @@ void add_long_runs(Cases& cases) {
 std::vector<StabilityCase> stability_cases(bool full) {
   Cases cases;
   add_stiff_springs(cases, full);
+  add_compliant_springs(cases, full);
   add_fput(cases, full);
   add_governor(cases);
   add_kepler(cases, full);

@@ -10,6 +10,7 @@ namespace diracstep {
 ///
 ///   stiff_spring_pendulum  k = 1e2 … 1e12 at the natural step, hω = 0.1 … 1e4, and at a fifth of it;
 ///                          from 1e8 on the reference is the rigid pendulum, approached as g/k
+///   the same as a row      with compliance 1/k, k = 1e2 … 1e14 and ∞, at twice the natural step
 ///   fput                   ω = 50 … 5e4; watched for the energy and its adiabatic invariant, the energy of
 ///   the
 ///                          stiff springs Σ (v_z² + ω² z²)/2

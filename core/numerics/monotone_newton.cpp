@@ -1,0 +1,75 @@
+#include <algorithm>
+#include <cmath>
+#include <diracstep/core/numerics/monotone_newton.hpp>
+#include <diracstep/core/numerics/scales.hpp>
+#include <optional>
+
+namespace diracstep {
+
+namespace {
+
+constexpr int most_iterations = 300;
+constexpr double singular_below = 1e-13;         // of the largest pivot of a matrix with balanced entries
+constexpr double shortest_part_of_step = 1e-18;  // 1 A into a diode of 1e-12 A/V is 1e12 V at first
+constexpr double solved_to = 1e-14, near_round_off = 1e-9;  // |change| beside |x|
+
+using Residual = std::function<Vector(const Vector&)>;
+
+/// x + part·change with the longest part whose next correction, by the same matrix, is shorter.
+std::optional<Vector> monotone_step(const Residual& residual, const BalancedMatrix& matrix, const Vector& x,
+                                    const Vector& change) {
+  const double length = matrix.norm(change);
+  for (double part = 1.0; part >= shortest_part_of_step; part /= 2.0) {
+    const Vector next = x + part * change, left = residual(next);
+    if (!left.allFinite()) continue;
+    if (matrix.norm(matrix.solve(left)) <= (1.0 - part / 4.0) * length) return next;
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+BalancedMatrix::BalancedMatrix(Columns matrix)
+    : rows_(Vector::Ones(matrix.rows())), columns_(Vector::Ones(matrix.cols())) {
+  constexpr int rounds = 12;
+  const auto scale = [](double largest) { return largest > 0.0 ? 1.0 / std::sqrt(largest) : 1.0; };
+  for (int k = 0; k < rounds; ++k) {
+    const Vector r = matrix.cwiseAbs().rowwise().maxCoeff().unaryExpr(scale);
+    const Vector c = matrix.cwiseAbs().colwise().maxCoeff().transpose().unaryExpr(scale);
+    matrix = r.asDiagonal() * matrix * c.asDiagonal();
+    rows_ = rows_.cwiseProduct(r);
+    columns_ = columns_.cwiseProduct(c);
+  }
+  factors_.setThreshold(singular_below);
+  factors_.compute(matrix);
+}
+
+Columns BalancedMatrix::solve(const Columns& right) const {
+  return columns_.asDiagonal() * factors_.solve(Columns(rows_.asDiagonal() * right));
+}
+
+Vector BalancedMatrix::sizes_in_rows(const Vector& x) const {
+  return max_norm(x.cwiseQuotient(columns_)) * rows_.cwiseInverse();
+}
+
+MonotoneNewton solve_monotonically(const Residual& residual,
+                                   const std::function<Columns(const Vector&)>& jacobian, Vector& x) {
+  for (int k = 0; k < most_iterations; ++k) {
+    const Vector left = residual(x);
+    const Columns slopes = jacobian(x);
+    if (!left.allFinite() || !slopes.allFinite()) return {"the equations are not finite at the start", k};
+    const BalancedMatrix matrix(slopes);
+    const Vector change = -matrix.solve(left);
+    const double length = matrix.norm(change), size = matrix.norm(x);
+    if (length <= solved_to * size) return {{}, k};
+    const std::optional<Vector> next = monotone_step(residual, matrix, x, change);
+    if (!next && length > near_round_off * size)
+      return {"Newton's method ends after " + std::to_string(k) + " iterations", k};
+    if (!next || *next == x) return {{}, k};
+    x = *next;
+  }
+  return {"not found in " + std::to_string(most_iterations) + " iterations of Newton's method",
+          most_iterations};
+}
+
+}  // namespace diracstep

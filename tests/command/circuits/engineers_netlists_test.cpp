@@ -1,0 +1,210 @@
+/// Filters, rectifiers, amplifiers and converters as engineers write them, against closed forms and a
+/// Runge-Kutta method on the equations of one voltage.
+#include "run_circuit.hpp"
+
+namespace diracstep::testing {
+namespace {
+
+/// y(t) of y' = f(t, y), y(0) = 0, by the classical method of order 4.
+template <class F>
+double runge_kutta(double end, long steps, const F& f) {
+  const double h = end / static_cast<double>(steps);
+  double y = 0.0;
+  for (long k = 0; k < steps; ++k) {
+    const double t = h * static_cast<double>(k);
+    const double a = f(t, y), b = f(t + h / 2, y + h / 2 * a), c = f(t + h / 2, y + h / 2 * b),
+                 d = f(t + h, y + h * c);
+    y += h / 6 * (a + 2 * b + 2 * c + d);
+  }
+  return y;
+}
+
+TEST_F(Circuits, FiltersOfResistorsCapacitorsAndInductors) {
+  const Json low =
+      json(netlist("* RC low-pass filter, 1 kHz corner\n"
+                   "V1 in 0 DC 0 AC 1 SIN(0 1 1k)\n"
+                   "R1 in out 1.59k ; comment\n"
+                   "C1 out 0\n"
+                   "+ 100n\n"
+                   ".OPTIONS reltol=1e-4\n"
+                   ".tran 10u 5m\n"
+                   ".plot tran V(out)\n"
+                   ".END\n"))["outputs"];
+  const double w = 2e3 * M_PI, tau = 1.59e-4, x = w * tau, t = 5e-3;
+  EXPECT_NEAR(value(low, "V(out)"),
+              (std::sin(w * t) - x * std::cos(w * t) + x * std::exp(-t / tau)) / (1 + x * x), 1e-7);
+  const Json series =
+      json(netlist("Series RLC, step response, in parameters\n"
+                   ".param l=1m f0={1/(2*pi*sqrt(l*1u))} w0=2*pi*f0\n"
+                   "V1 1 0 PULSE(0 5 0 1p 1p 1 2)\n"
+                   "R1 1 2 10\nL1 2 3 {l}\nC1 3 0 {1/(w0**2*l)}\n"
+                   ".tran 1us 1ms\n.print tran v(3) i(L1)\n.end\n"))["outputs"];
+  const double decay = 5000.0, beat = std::sqrt(1e9 - decay * decay), at = 1e-3 - 0.5e-12;
+  const double left = std::exp(-decay * at);
+  EXPECT_NEAR(value(series, "V(3)"),
+              5.0 * (1 - left * (std::cos(beat * at) + decay / beat * std::sin(beat * at))), 1e-6);
+  EXPECT_NEAR(value(series, "I(L1)"), 5.0 / (1e-3 * beat) * left * std::sin(beat * at), 1e-7);
+}
+
+/// R1 = R2, K = 1: u'' + 2 d u' + w² u = w² with w² = 1/(R² C1 C2), d = 1/(R C1); the gain is finite.
+TEST_F(Circuits, ASallenKeyFilter) {
+  const Json out = json(
+      netlist("Sallen-Key low-pass\nV1 in 0 PULSE(0 1 0 1n 1n 10m 20m)\nR1 in a 10k\nR2 a b 10k\n"
+              "C1 a out 22n\nC2 b 0 10n\nEop out 0 b out 1e6\n.tran 5u 0.5m\n.print V(out)\n"))["outputs"];
+  const double d = 1.0 / (1e4 * 22e-9), w = 1.0 / (1e4 * std::sqrt(22e-9 * 10e-9)),
+               b = std::sqrt(w * w - d * d), t = 0.5e-3;
+  EXPECT_NEAR(value(out, "V(out)"), 1 - std::exp(-d * t) * (std::cos(b * t) + d / b * std::sin(b * t)), 1e-5);
+}
+
+TEST_F(Circuits, ARectifierWhoseDiodeHasASeriesResistance) {
+  const Json found =
+      json(netlist("Half-wave rectifier\n"
+                   "Vin in 0 SIN(0 10 60)\nD1 in out 1N4148\nRload out 0 1k\nCf out 0 47u\n"
+                   ".model 1N4148 D (IS=2.52e-9 RS=0.568 N=1.752 CJO=4e-12 M=0.4 TT=20n)\n"
+                   ".tran 0.1m 50m\n.print tran V(out) I(D1)\n.end\n"));
+  EXPECT_EQ(found["method"], "damped/radau:3");
+  const double thermal = 1.752 * thermal_voltage_at_27;
+  const auto current = [&](double u) {  // u = RS i + nV ln(1 + i/IS)
+    return u <= 0.0 ? 2.52e-9 * std::expm1(u / thermal) : root(0.0, u / 0.568, [&](double i) {
+      return 0.568 * i + thermal * std::log1p(i / 2.52e-9) - u;
+    });
+  };
+  const double v = runge_kutta(50e-3, 20'000, [&](double t, double y) {
+    return (current(10 * std::sin(120 * M_PI * t) - y) - y / 1e3) / 47e-6;
+  });
+  EXPECT_NEAR(value(found["outputs"], "V(out)"), v, 2e-4);
+}
+
+/// Two diodes in series conduct; without a capacitance beside them their voltages are algebra.
+TEST_F(Circuits, ABridgeOfDiodesWithoutCapacitanceIsDampedByDefault) {
+  const auto bridge = [this](const std::string& model, const std::string& step) {
+    return json(
+        netlist("bridge rectifier\nV1 p n SIN(0 10 50)\nD1 p o DX\nD2 n o DX\nD3 0 p DX\nD4 0 n DX\n"
+                "R1 o 0 1k\nC1 o 0 100u\n.model DX D(IS=1e-14 N=1" +
+                model + ")\n.tran " + step + " 60m\n.print V(o)\n"));
+  };
+  const double v = runge_kutta(60e-3, 40'000, [](double t, double y) {
+    const double across = 0.5 * (std::abs(10 * std::sin(100 * M_PI * t)) - y);
+    return (1e-14 * std::expm1(across / thermal_voltage_at_27) - y / 1e3) / 100e-6;
+  });
+  for (const char* step : {"50u", "5u"}) {
+    const Json found = bridge(" CJO=0", step);
+    EXPECT_EQ(found["method"], "damped/radau:3");
+    EXPECT_NEAR(value(found["outputs"], "V(o)"), v, 1e-4) << step;
+  }
+  const Json junctions = bridge("", "50u");
+  EXPECT_NEAR(value(junctions["outputs"], "V(o)"), v, 1e-4);
+  EXPECT_LT(junctions["steps"].get<int>(), 3000)
+      << "the charge of 100 µF beside that of junctions of 1 pF is round-off at first";
+}
+
+/// Two diodes in series carry 1 mA, one of them none; and one alone from the operating point.
+TEST_F(Circuits, ACurrentSourceDrivesDiodesAlone) {
+  const double u = root(
+      0.0, 1.0, [](double y) { return 1e-14 * std::expm1(y / thermal_voltage_at_27) + 1e-12 * y - 1e-3; });
+  const Json alone = json(netlist(
+      "current source\nI1 0 a 1m\nD1 a 0 DX\n.model DX D(IS=1e-14 CJO=0)\n.tran 1m 10m\n.print V(a)\n"));
+  EXPECT_NEAR(value(alone["outputs"], "V(a)"), u, 1e-9);
+  const Json varying =
+      outputs(element("source_current", "I", "ground", "a", "value = \"1e-3*(1 + 0.5*sin(100*t))\"") +
+              element("diode", "D", "a", "ground", "saturation = 1e-14\ncapacitance = 0") +
+              "[outputs]\na = \"V(a)\"\n" + span(0.01, 1e-3));
+  const double i = 1e-3 * (1 + 0.5 * std::sin(1.0));
+  EXPECT_NEAR(value(varying, "a"), 0.02585 * std::log(i / 1e-14), 1e-6);
+}
+
+TEST_F(Circuits, ACapacitorBetweenVeryUnequalResistances) {
+  const std::string file = netlist(
+      "divider\nV1 a 0 1\nR1 a b 1MEG\nC1 b 0 1uF\nR2 b 0 {r2}\n.param r2=1MEG\n.tran 1ms 10ms\n.print "
+      "V(b)\n");
+  for (const double r : {1e6, 1.0, 1e-2})
+    EXPECT_NEAR(value(json(file, "--set r2=" + std::to_string(r))["outputs"], "V(b)") * (1e6 + r) / r, 1.0,
+                1e-9)
+        << r;
+}
+
+TEST_F(Circuits, MoreWaveforms) {
+  const Json out = json(
+      netlist("EXP and SFFM\nV1 a 0 EXP(0 4 1u 1u 10u 2u)\nR1 a 0 1k\nV2 b 0 SFFM(1 2 10k 3 1k)\nR2 b 0 1k\n"
+              ".tran 0.1u 20u\n.print V(a) V(b)\n"))["outputs"];
+  EXPECT_NEAR(value(out, "V(a)"), 4 * ((1 - std::exp(-19.0)) - (1 - std::exp(-5.0))), 1e-8);
+  EXPECT_NEAR(value(out, "V(b)"), 1 + 2 * std::sin(0.4 * M_PI + 3 * std::sin(0.04 * M_PI)), 1e-8);
+}
+
+/// 1 kΩ charges 1 µF while the control is high, 1 MΩ behind it.
+TEST_F(Circuits, ASwitchOfANetlist) {
+  const Json out =
+      json(netlist("switched\nV1 in 0 1\nS1 in out g 0 SWM\nC1 out 0 1u\nVG g 0 PULSE(0 5 0 1n 1n 1m 10m)\n"
+                   ".model SWM SW(VT=2.5 RON=1k ROFF=1MEG)\n.tran 10u 2m uic\n.print V(out)\n"))["outputs"];
+  EXPECT_NEAR(value(out, "V(out)"), 1 - std::exp(-1.0) * std::exp(-1e-3), 2e-6);
+}
+
+/// 10 V through 1 kΩ into a diode that breaks down at 5.1 V.
+TEST_F(Circuits, AZenerDiode) {
+  const Json out =
+      json(netlist("Zener\nV1 in 0 10\nR1 in z 1k\nD1 0 z DZ\n.model DZ D(IS=1e-14 BV=5.1 IBV=1m)\n"
+                   ".tran 1u 10u\n.print V(z)\n"))["outputs"];
+  const double u = root(0.0, 10.0, [](double y) {
+    return 1e-3 * std::exp((y - 5.1) / thermal_voltage_at_27) + 1e-14 - (10 - y) / 1e3;
+  });
+  EXPECT_NEAR(value(out, "V(z)"), u, 1e-7);
+}
+
+TEST_F(Circuits, StartsOfNodes) {
+  const Json out =
+      json(netlist("RC discharge\nR1 a 0 1k\nC1 a 0 1u\nC2 b a 1u IC=1\nR2 b 0 1k\n.ic V(a)=5\n"
+                   ".tran 10u 1m uic\n.print V(a) V(b)\n"))["outputs"];
+  // Sum and difference of a and b: C (a' + b') …; modes of [[2, -1], [-1, 1]] C with conductances 1/R.
+  const auto rates = [](double a, double b) {
+    const double ia = -a, ib = -b;  // mA of kΩ, into µF: C1 a' + C2 (a' − b') = ia, C2 (b' − a') = ib
+    return std::pair(ia + ib, ia + 2 * ib);
+  };
+  double a = 5, b = 6;
+  const double h = 1e-4;  // ms
+  for (int k = 0; k < 10'000; ++k) {
+    const auto [pa, pb] = rates(a, b);
+    const auto [qa, qb] = rates(a + h / 2 * pa, b + h / 2 * pb);
+    const auto [ra, rb] = rates(a + h / 2 * qa, b + h / 2 * qb);
+    const auto [sa, sb] = rates(a + h * ra, b + h * rb);
+    a += h / 6 * (pa + 2 * qa + 2 * ra + sa);
+    b += h / 6 * (pb + 2 * qb + 2 * rb + sb);
+  }
+  EXPECT_NEAR(value(out, "V(a)"), a, 1e-7);
+  EXPECT_NEAR(value(out, "V(b)"), b, 1e-7);
+}
+
+TEST_F(Circuits, WhatANetlistLeavesOpenIsTold) {
+  const Outcome floating =
+      run("run " + netlist("Floating\nV1 a 0 SIN(0 1 1k)\nR0 a p 1\nL1 p 0 1m\nL2 s1 s2 1m\n"
+                           "K1 L1 L2 0.9\nRL s1 s2 50\nC1 a c 1n\nC2 c 0 1n\n"
+                           ".tran 10u 0.1m\n.print V(c)\n"));
+  EXPECT_EQ(floating.status, 0) << floating.err;
+  EXPECT_NE(floating.err.find("nothing joins the nodes s1, s2 to node 0"), std::string::npos) << floating.err;
+  EXPECT_NE(floating.err.find("no path for a direct current from the nodes c"), std::string::npos)
+      << floating.err;
+  const Outcome told =
+      run("run " + netlist("Told\nV1 a 0 1\nR1 a 0 1k\n.options reltol=1e-3\n.op\n.ac dec 10 1 1k\n"
+                           ".control\nrun\nplot v(a)\n.endc\n.tran 1u 10u\n.print V(a)\n"));
+  EXPECT_EQ(told.status, 0) << told.err;
+  for (const char* word : {"line 4: .options is left out", "line 5: .op", "line 6: .ac", "line 7: .control"})
+    EXPECT_NE(told.err.find(word), std::string::npos) << told.err;
+  EXPECT_EQ(told.err.find("floating"), std::string::npos) << told.err;
+}
+
+TEST_F(Circuits, WhatIsNoPartOfTheSubsetIsRefusedByItsLine) {
+  const std::string head = "title\nV1 a 0 SIN(0 1 1k)\nR1 a 0 1k\n", tail = ".tran 1u 1m\n";
+  expect_refused(head + ".subckt rc in out\nR9 in out 1k\n.ends\n" + tail, 4,
+                 {"subcircuits are not supported"});
+  expect_refused(head + "X1 a 0 rc\n" + tail, 4, {"unknown element 'X1'"});
+  expect_refused(head + ".include models.lib\n" + tail, 4, {"unknown directive '.include'"});
+  expect_refused(head + ".temp 85\n" + tail, 4, {"27 degrees"});
+  expect_refused(head + ".model DX D(IS=1e-14 LEVEL=3)\n" + tail, 4, {"unknown parameter 'LEVEL'", "BV"});
+  expect_refused(head + ".model SX SW(VT=1 VH=0.1)\n" + tail, 4, {"VH"});
+  expect_refused(head + "C1 a 0 1u\n.ic V(a)=1\n" + tail, 5, {"'uic'"});
+  expect_refused(head + ".ic V(a)=1\n.tran 1u 1m uic\n", 4, {"no capacitor at node 'a'"});
+  expect_refused(head + "E1 b 0 POLY(1) a 0 0 1\n" + tail, 4, {});
+  expect_refused(head + "R2 a 0 4K7\n" + tail, 4, {"'4K7'"});
+}
+
+}  // namespace
+}  // namespace diracstep::testing
