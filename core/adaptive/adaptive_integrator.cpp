@@ -112,6 +112,7 @@ AdaptiveIntegrator::AdaptiveIntegrator(const std::shared_ptr<const Scene>& scene
       longest_ = longest_of_such * std::abs(options_.step);
   } else {
     meter_.emplace(make_meter(main_.scene(), solvers, adaptive_, options_.step, report_.accelerations));
+    if (adaptive_.control != StepControl::in_step) main_.end_steps_at_kinks();
   }
   fractions_ = eps_fractions(options_, main_.options().order, adaptive_.control);
   options_.order = side_.options().order;

@@ -12,6 +12,7 @@ namespace diracstep {
 namespace {
 
 constexpr std::size_t most_instants = 200;
+constexpr int most_stuck = 20;  // steps one after the other that cross a kink undivided
 constexpr double below_eps = 0.9, most_growth = 10.0, most_shrinking = 0.1, after_failure = 0.25;
 constexpr double of_the_rate = 1e-6;  // of T ẏ, which counts as a size
 constexpr double of_the_largest = 1e-10, above_round_off = 4e-16;
@@ -70,6 +71,7 @@ LocalErrorControl::LocalErrorControl(double eps, int order, double span, double 
 void LocalErrorControl::start(const Integrator& at) {
   seen_ = {at.position().cwiseAbs(), at.momentum().cwiseAbs()};
   refused_ = 0;
+  stuck_ = 0;
 }
 
 /// The halves by one integrator, the whole step by the other; false where one fails.
@@ -80,6 +82,12 @@ bool LocalErrorControl::take_both(Integrator& fine, Integrator& whole, double si
   if (!report.ok()) return false;
   report = fine.step(0.5 * size);
   if (report.ok()) report = fine.step(start + size - fine.time());
+  const std::string& stuck = fine.stuck_at_kink();
+  stuck_ = stuck.empty() ? 0 : stuck_ + 1;
+  if (stuck_ > most_stuck) {
+    report.solve.status = SolveStatus::refused;
+    report.failure = stuck;
+  }
   return report.ok();
 }
 
@@ -116,6 +124,7 @@ StepReport LocalErrorControl::advance(Integrator& fine, Integrator& whole, doubl
     }
     ++refused_;
     if (fine.time() != start) fine.restart(start, q_, p_, v_);
+    if (stuck_ > most_stuck) return report;
     const double shrinking = taken ? below_eps * std::pow(part, -1.0 / (stages + 1.0)) : after_failure;
     size *= std::clamp(shrinking, most_shrinking, 0.9);
     if (std::abs(size) > 16.0 * std::numeric_limits<double>::epsilon() * std::abs(start) &&

@@ -73,8 +73,15 @@ StepReport EventSteps<Stepper>::act(std::vector<EventHit> met) {
     for (EventSearch::Left& contact : left)
       contact.rate = EventActions::contact_rate(events()[contact.event], here);
     for (const std::size_t k : search_.at_zero()) add_left(k, left);
-    for (const std::size_t k : search_.go_on(here, left, actions_.awake()))
-      if (!events()[k].condition || events()[k].condition(here.point()) > 0.0) met.push_back({k, here});
+    for (const std::size_t k : search_.go_on(here, left, actions_.awake())) {
+      const Event& event = events()[k];
+      if (event.condition && !(event.condition(here.point()) > 0.0)) continue;
+      if (event.restitution)
+        return failed("event '" + event.name + "': its function was set to " +
+                      to_text(event.at(here.point())) + " at t = " + to_text(here.time, 10) +
+                      ", behind the contact, which is no impact");
+      met.push_back({k, here});
+    }
     add_closing(here, met);
   }
   return {};
