@@ -57,7 +57,6 @@ StepReport AdaptiveIntegrator::control_step(double size) {
   if (!report.ok()) return report;
   if (!main_.kinks_passed().empty()) {  // behind it the motion has another rate
     note(time() - begun);
-    ++report_.resets;
     return start_control() ? report : failed(rate_.failure);
   }
   note(size);
