@@ -112,8 +112,11 @@ StepReport LocalErrorControl::advance(Integrator& fine, Integrator& whole, doubl
   v_ = fine.velocity_estimate();
   const double stages = 0.5 * (order_ + 1);
   StepReport report;
+  std::string stuck;
   for (bool first = true;; first = false) {
     const bool taken = take_both(fine, whole, size, report);
+    for (const Integrator* integrator : {&whole, &fine})
+      if (!integrator->stuck_at_kink().empty()) stuck = integrator->stuck_at_kink();
     const double part = taken ? error(fine, whole, size) : HUGE_VAL;
     if (taken && (part <= 1.0 || std::abs(size) <= smallest_)) {
       const double growth = part > 0.0 ? below_eps * std::pow(part, -1.0 / (order_ + 1)) : most_growth;
@@ -135,6 +138,7 @@ StepReport LocalErrorControl::advance(Integrator& fine, Integrator& whole, doubl
       report.failure = "no size of a step from t = " + to_text(start) +
                        " has a local error as small as asked for; is the motion smooth there?";
     }
+    if (!stuck.empty()) report.failure = stuck;
     return report;
   }
 }

@@ -7,9 +7,9 @@ namespace diracstep {
 
 namespace {
 
-constexpr double nearly_all = 0.98;         // of a step
-constexpr double reach_of_estimates = 2.0;  // in changes within a step
-constexpr double reach_of_motion = 2.0;     // in changes within the part before
+constexpr double nearly_all = 0.98, shorter = 0.9;  // of a step
+constexpr double reach_of_estimates = 2.0;          // in changes within a step
+constexpr double reach_of_motion = 2.0;             // in changes within the part before
 
 }  // namespace
 
@@ -46,8 +46,8 @@ int StepDivision::ahead(const Vector& here) const {
 double StepDivision::place_ahead(Interval step, const State& start) {
   constexpr int halvings = 12;
   const auto crosses_by = [&](double place) {
-    position_ = start.q + place * step.size * start.v;
-    kinks_->evaluate(step.start + place * step.size, position_, start.v, between_);
+    position_ = start.q + place * step.size * start_velocity_;
+    kinks_->evaluate(step.start + place * step.size, position_, start_velocity_, between_);
     for (Eigen::Index k = 0; k < between_.size(); ++k)
       if (kinks_->kinds()[static_cast<std::size_t>(k)] == Kinks::Kind::kink && before_[k] * after_[k] > 0.0 &&
           between_[k] * before_[k] < 0.0)
@@ -61,7 +61,7 @@ double StepDivision::place_ahead(Interval step, const State& start) {
     const double place = 0.5 * (low + high);
     (crosses_by(place) ? high : low) = place;
   }
-  return high < nearly_all ? high / nearly_all : 0.0;
+  return high < nearly_all ? high / nearly_all : shorter;
 }
 
 /// Where between the ends of a step, in parts of it, a kink is on another side than at both; 0 where none.
@@ -91,6 +91,7 @@ double StepDivision::hidden_place(Interval step, const State& start, const State
 bool StepDivision::crosses(Interval step, const State& start, const State& end) {
   const double end_time = step.start + step.size;
   read(step.start, start, false, before_);
+  start_velocity_ = velocity_;
   read(end_time, end, false, after_);
   changes_ = (after_ - before_).cwiseAbs();
   if (hidden_place(step, start, end) > 0.0) return true;

@@ -9,7 +9,7 @@ namespace diracstep {
 namespace {
 
 constexpr std::size_t most_parts_of_a_step = 40;
-constexpr int most_tries = 60, most_halvings = 12, most_returns = 2, most_hidden = 4;
+constexpr int most_tries = 60, most_halvings = 12, most_returns = 2, most_hidden = 8;
 constexpr int most_behind = 12, most_crossings = 16;
 constexpr double towards_zero = 15.0 / 16.0;  // of the way that is left, in one try from the near side
 constexpr double ways_across = 4.0;           // of that way, for the part across
@@ -78,6 +78,7 @@ bool StepDivision::follow(const State& start, Work& work) {
       Interval part{given.start + (given.size - left), left};
       if (parts_.size() >= most_parts_of_a_step) return give_up(crossed, part.start);
       read(part.start, from, true, before_);
+      start_velocity_ = velocity_;
       while (!solve_part(part, from, Guess::plain, work)) {
         if (++halvings > most_halvings) {
           const int number = crossed >= 0 ? crossed : ahead(before_);

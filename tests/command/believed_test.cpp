@@ -339,9 +339,9 @@ step = 0.1
     ASSERT_EQ(outcome.status, 0) << line << outcome.err;
     EXPECT_NEAR(at_end(outcome, "q", "x"), 5.285903130916, tolerance) << line;
   };
-  expect_right("--method damped/radau:3 --step 0.1", 1e-6);
-  expect_right("--method damped/radau:3 --adaptive", 1e-4);
-  expect_right("--method type1/trapezoidal --step 0.01", 3e-3);
+  expect_right("--method damped/radau:3 --step 0.1", 1e-9);
+  expect_right("--method damped/radau:3 --adaptive", 1e-6);
+  expect_right("--method type1/trapezoidal --step 0.1", 1e-9);
   EXPECT_EQ(run("run " + file).status, 0);  // damped/radau:3 by its local error
   const Outcome right = run("run " + file + " --method type1/gl:3 --set damping=0 --json");
   ASSERT_EQ(right.status, 0) << right.err;
