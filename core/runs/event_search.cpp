@@ -163,7 +163,7 @@ bool EventSearch::turned_back(std::size_t event, double rate) {
 }
 
 std::vector<std::size_t> EventSearch::go_on(const Sample& point, const std::vector<Left>& left,
-                                            const std::vector<bool>& awake) {
+                                            const std::vector<bool>& awake, bool by_settings) {
   std::vector<std::size_t> due;
   for (std::size_t k = 0; k < events_.size(); ++k) {
     Watch& watch = watches_[k];
@@ -192,7 +192,7 @@ std::vector<std::size_t> EventSearch::go_on(const Sample& point, const std::vect
     watch.largest = std::max(watch.largest, std::abs(here));
     const bool beyond_round_off =
         std::max(std::abs(before), std::abs(here)) > round_off_of_values * watch.largest;
-    if (!woken && beyond_round_off && changes(k, before, here)) due.push_back(k);
+    if (by_settings && !woken && beyond_round_off && changes(k, before, here)) due.push_back(k);
     if (watch.behind != 0 && std::abs(here) <= watch.zero)
       watch.last = only_sets_values(events_[k]) ? watch.behind * just_crossed : 0.0;
     const Event::Direction direction = events_[k].direction;

@@ -53,10 +53,10 @@ class EventSearch {
     double rate;
   };
   /// From this point on those events are looked for that are awake.  The numbers of those that are due at
-  /// once: what acted has taken their function to the other side of its zero, or they were asleep, and what
-  /// they wait for has happened.
+  /// once: what acted has set their function to the other side of its zero (`by_settings`: it has done
+  /// nothing but set values), or they were asleep, and what they wait for has happened.
   std::vector<std::size_t> go_on(const Sample& point, const std::vector<Left>& left,
-                                 const std::vector<bool>& awake);
+                                 const std::vector<bool>& awake, bool by_settings);
 
   bool empty() const { return events_.empty(); }
   const std::vector<Event>& events() const { return events_; }
