@@ -31,7 +31,7 @@ class MasslessMotion {
     sizes_ = sizes_.cwiseMax(at.q.cwiseAbs());
     const double largest = max_norm(sizes_);
     if (largest == 0.0) return 0.0;  // nothing has moved yet
-    units_ = sizes_.cwiseMax(least_size * largest);
+    units_ = sizes_.cwiseMax(LinearisedMotion::least_size * largest);
     return scene_.dimension() <= most_coordinates ? of_all_modes(at) : of_the_fastest_mode(at);
   }
 
@@ -41,7 +41,7 @@ class MasslessMotion {
     double largest = 0.0;
     Vector here = at.v;
     if (!reader_.velocity(at.time, at.q, at.p, here).ok()) return std::nan("");
-    for (const double side : {damping_probe, -damping_probe}) {
+    for (const double side : {LinearisedMotion::damping_probe, -LinearisedMotion::damping_probe}) {
       Columns image(basis.rows(), basis.cols());
       for (Eigen::Index k = 0; k < basis.cols(); ++k) image.col(k) = change(at, here, basis.col(k), side);
       if (!image.allFinite()) return std::nan("");
@@ -64,7 +64,7 @@ class MasslessMotion {
     if (!reader_.velocity(at.time, at.q, at.p, here).ok()) return std::nan("");
     for (int k = 0; k < iterations; ++k) {
       mode_.normalize();
-      const Vector image = change(at, here, mode_, damping_probe);
+      const Vector image = change(at, here, mode_, LinearisedMotion::damping_probe);
       if (!image.allFinite() || !(image.norm() > 0.0)) return std::nan("");
       rate = -mode_.dot(image);
       mode_ = image;

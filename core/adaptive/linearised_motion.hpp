@@ -15,6 +15,9 @@ namespace diracstep {
 /// The motion linearised about its points.
 class LinearisedMotion {
  public:
+  static constexpr double damping_probe = 1e-6;  // in units of the sizes
+  static constexpr double least_size = 1e-6;     // of the largest position or velocity
+
   LinearisedMotion(const Scene& scene, const SolverFactory& solvers)
       : scene_(scene), n_(scene.dimension()), motion_(scene, solvers), sizes_(Vector::Zero(2 * n_)) {}
 
@@ -105,8 +108,6 @@ class LinearisedMotion {
     return result.cwiseQuotient(units_) / side;
   }
 
-  static constexpr double damping_probe = 1e-6;  // in units of the sizes
-  static constexpr double least_size = 1e-6;     // of the largest position or velocity
   static constexpr double hardly_damped = 1e-2;  // |Re λ| beside |Im λ|
 
   const Scene& scene_;
