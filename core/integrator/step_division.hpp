@@ -76,7 +76,7 @@ class StepDivision {
   SolveReport last_, solved_;  ///< of the part solved last, and of all that were kept
   double to_zero_ = 0.0;       ///< from the end of the part solved last, without sign
   Vector changes_;             ///< of the kinks within the part solved last, for what stuck() says
-  Vector start_velocity_;  ///< of the part
+  Vector start_velocity_;      ///< of the part
   Vector before_, after_, between_, velocity_, speed_, speed_up_, position_;
 };
 
