@@ -47,8 +47,8 @@ TEST_F(KinksOfARun, KeepTheOrderOfMethodsWithANodeAtTheEnd) {
   };
   for (const double beyond : {-1.0, 2.0})
     for (const Case& it :
-         {Case{"damped/radau:1", 1, 0.01}, Case{"damped/radau:2", 3, 0.1}, Case{"damped/radau:3", 5, 0.25},
-          Case{"type1/trapezoidal", 2, 0.1}, Case{"type1/right", 1, 0.05}, Case{"type1/left", 1, 0.05}}) {
+         {Case{"damped/radau:2", 3, 0.1}, Case{"damped/radau:3", 5, 0.25}, Case{"type1/trapezoidal", 2, 0.1},
+          Case{"type1/right", 1, 0.05}, Case{"type1/left", 1, 0.05}}) {
       double errors[2];
       for (int k = 0; k < 2; ++k) {
         const Outcome outcome =
