@@ -11,6 +11,7 @@
 #include <diracstep/command/run_identity.hpp>
 #include <diracstep/command/verbs.hpp>
 #include <diracstep/command/verbs/run_arguments.hpp>
+#include <diracstep/command/verbs/run_times.hpp>
 #include <diracstep/core/adaptive/adaptive_run.hpp>
 #include <diracstep/core/adaptive/checked_motion.hpp>
 #include <diracstep/core/adaptive/damping_survey.hpp>
@@ -30,7 +31,6 @@ namespace diracstep::command {
 namespace {
 
 constexpr long most_fixed_steps = 1'000'000'000'000;
-constexpr double most_chosen_times = 1e8;
 
 StepGrid fitted_steps(const CatalogueScene& entry, double end, double step, const RunArguments& options) {
   const StepGrid grid = fit_steps(entry.scene->start.time, end, step);
@@ -84,35 +84,6 @@ void go_on(const Checkpoint& saved, const RunArguments& options, EventSteps<Inte
     throw Misuse(fmt::format("--resume: '{}': {}", options.resume, misuse.what()));
   }
   say(fmt::format("going on from step {}, t = {:g}", motion.work().steps, motion.time()));
-}
-
-/// The times of --at, or those of --every-time from the start to the end; none where there are neither.
-std::vector<double> chosen_times(const RunArguments& options, const CatalogueScene& entry, double end) {
-  if (!options.at.empty()) return numbers("--at", options.at);
-  if (!options.every_time) return {};
-  const double start = entry.scene->start.time,
-               count = std::floor(std::abs(end - start) / *options.every_time + 1e-9);
-  if (count > most_chosen_times)
-    throw Misuse(fmt::format("--every-time {:g} asks for {:g} points; {:g} are the most", *options.every_time,
-                             count, most_chosen_times));
-  std::vector<double> times;
-  for (double k = 0.0; k <= count; ++k)
-    times.push_back(start + std::copysign(k * *options.every_time, end - start));
-  return times;
-}
-
-/// Throws Misuse for times out of order or outside the run.
-void require_within(const std::vector<double>& times, const Integrator& integrator, long steps) {
-  const double step = integrator.options().step, start = integrator.scene().start.time;
-  const double end = start + static_cast<double>(steps) * step;
-  double last = start;
-  for (const double t : times) {
-    if (!((t - last) * step >= -1e-9 * step * step && (end - t) * step >= -1e-9 * step * step))
-      throw Misuse(
-          fmt::format("--at: t = {:g} does not lie between t = {:g}, the time before, and t = {:g}, the end",
-                      t, last, end));
-    last = t;
-  }
 }
 
 /// Steps of one size to the end, from the start or from a checkpoint.

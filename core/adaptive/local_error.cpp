@@ -12,6 +12,7 @@ namespace diracstep {
 namespace {
 
 constexpr std::size_t most_instants = 200;
+constexpr int most_stuck = 20;  // steps one after the other that cross a kink undivided
 constexpr double below_eps = 0.9, most_growth = 10.0, most_shrinking = 0.1, after_failure = 0.25;
 constexpr double of_the_rate = 1e-6;  // of T ẏ, which counts as a size
 // Errors that are round-off, and what is allowed beside them.
@@ -62,6 +63,7 @@ void LocalErrorControl::start(const Integrator& at) {
   seen_ = {at.position().cwiseAbs(), at.momentum().cwiseAbs()};
   least_ = Vector::Zero(seen_.q.size() + seen_.p.size());
   refused_ = 0;
+  stuck_ = 0;
 }
 
 /// The halves by one integrator, the whole step by the other; false where one fails.
@@ -72,6 +74,12 @@ bool LocalErrorControl::take_both(Integrator& fine, Integrator& whole, double si
   if (!report.ok()) return false;
   report = fine.step(0.5 * size);
   if (report.ok()) report = fine.step(start + size - fine.time());
+  const std::string& stuck = fine.stuck_at_kink();
+  stuck_ = stuck.empty() ? 0 : stuck_ + 1;
+  if (stuck_ > most_stuck) {
+    report.solve.status = SolveStatus::refused;
+    report.failure = stuck;
+  }
   return report.ok();
 }
 
@@ -128,8 +136,11 @@ StepReport LocalErrorControl::advance(Integrator& fine, Integrator& whole, doubl
   const double stages = 0.5 * (order_ + 1);
   StepReport report;
   double refused_size = 0.0, refused_part = HUGE_VAL;
+  std::string stuck;
   for (bool first = true;; first = false) {
     const bool taken = take_both(fine, whole, size, report);
+    for (const Integrator* integrator : {&whole, &fine})
+      if (!integrator->stuck_at_kink().empty()) stuck = integrator->stuck_at_kink();
     const Worst worst = taken ? error(fine, whole, size) : Worst{HUGE_VAL};
     const double part = worst.part;
     if (taken && (part <= 1.0 || std::abs(size) <= smallest_)) {
@@ -148,6 +159,7 @@ StepReport LocalErrorControl::advance(Integrator& fine, Integrator& whole, doubl
       refused_part = part;
     }
     if (fine.time() != start) fine.restart(start, q_, p_, v_);
+    if (stuck_ > most_stuck) return report;
     if (round_off) continue;
     const double shrinking = taken ? below_eps * std::pow(part, -1.0 / (stages + 1.0)) : after_failure;
     size *= std::clamp(shrinking, most_shrinking, 0.9);
@@ -159,6 +171,7 @@ StepReport LocalErrorControl::advance(Integrator& fine, Integrator& whole, doubl
       report.failure = "no size of a step from t = " + to_text(start) +
                        " has a local error as small as asked for; is the motion smooth there?";
     }
+    if (!stuck.empty()) report.failure = stuck;
     return report;
   }
 }

@@ -46,7 +46,8 @@ class LocalErrorControl {
 
   /// Takes one step of `fine` beside one of `whole`, of the size given or, where that has too large an error
   /// or fails, a smaller one; `size` becomes the one taken, `next` the one to try next.  Fails, with `fine`
-  /// where it was, where the size would fall below the round-off of the time.
+  /// where it was, where the size would fall below the round-off of the time, and where many steps are stuck
+  /// at a kink, which no size resolves.
   StepReport advance(Integrator& fine, Integrator& whole, double& size, double& next);
 
   /// Steps that had too large an error or failed.
@@ -73,6 +74,7 @@ class LocalErrorControl {
   double eps_, span_, smallest_;
   int order_;
   long refused_ = 0;
+  int stuck_ = 0;  ///< steps one after the other that crossed a kink undivided
   Sizes seen_;
   Vector least_;              ///< of the sizes of (q, p), by round-off
   Vector q_, p_, v_, sizes_;  ///< where the step starts; workspace

@@ -12,6 +12,7 @@ namespace {
 
 constexpr double lowest_ratio = 0.8, highest_ratio = 1.25;  // of z to ω before the guard acts
 constexpr double size_tolerance = 1e-10;  // relative, of an equation in the step: below it is round-off
+constexpr double beside_kink = 4e-3;      // of a step: beyond the widths of the meter's differences
 constexpr int max_sizes = 30;             // tried for one step
 
 }  // namespace
@@ -21,11 +22,14 @@ constexpr int max_sizes = 30;             // tried for one step
 bool AdaptiveIntegrator::measure(bool growth) {
   const double t = main_.time();
   const SolveReport report = meter_->motion().velocity(t, main_.position(), main_.momentum(), v_);
+  // At a kink just crossed it is measured where no difference reaches across.
+  const double ahead = main_.kinks_passed().empty() ? 0.0 : beside_kink * next_size_;
+  const Vector at = ahead == 0.0 ? main_.position() : Vector(main_.position() + ahead * v_);
   if (!report.ok())
     rate_ = {0.0, 0.0, std::string("no velocity for the monitor: ") + describe(report.status)};
   else
-    rate_ = growth ? meter_->rate_and_growth(t, main_.position(), v_, next_size_)
-                   : meter_->rate(t, main_.position(), v_, next_size_);
+    rate_ = growth ? meter_->rate_and_growth(t + ahead, at, v_, next_size_)
+                   : meter_->rate(t + ahead, at, v_, next_size_);
   if (!rate_.ok()) return false;
   if (const double largest = largest_rate(); rate_.rate > largest) rate_ = {largest, 0.0, {}};
   report_.slowest = std::min(report_.slowest, rate_.rate);
@@ -48,8 +52,13 @@ bool AdaptiveIntegrator::start_control() {
 }
 
 StepReport AdaptiveIntegrator::control_step(double size) {
+  const double begun = time();
   StepReport report = main_.step(size);
   if (!report.ok()) return report;
+  if (!main_.kinks_passed().empty()) {  // behind it the motion has another rate
+    note(time() - begun);
+    return start_control() ? report : failed(rate_.failure);
+  }
   note(size);
   const bool integrating = adaptive_.control == StepControl::integrating;
   if (!measure(integrating)) return failed(rate_.failure);

@@ -26,6 +26,13 @@ std::string fault_of_own_rows(const IntegratorOptions& options, const Scene& sce
   return {};
 }
 
+/// Whether the step, or a composition of steps that stays within it, takes the functions of the scene at its
+/// end.
+bool has_node_at_end(const MethodInfo& method, const IntegratorOptions& options) {
+  const bool within = options.order <= 2 || options.order == method.order;
+  return method.damped || (within && method.stages == 0 && method.constraint_rule != StepRule::midpoint);
+}
+
 IntegratorOptions checked(IntegratorOptions options) {
   require_step(options.step);
   if (options.substeps < 1)
@@ -49,7 +56,8 @@ Integrator::Integrator(PreparedScene prepared, const Registry& registry, const S
       reader_(std::make_unique<PointReader>(scene_, solvers, matrices_.full)),
       sequence_(std::make_unique<StepSequence>(
           scene_, design_step(scene_, registry, method_, options_, matrices_.full), solvers, *reader_)),
-      division_(std::make_unique<StepDivision>(scene_, options_.step, *reader_, *sequence_)),
+      division_(std::make_unique<StepDivision>(scene_, options_.step, has_node_at_end(method_.info, options_),
+                                               *reader_, *sequence_)),
       solved_stages_(std::make_unique<std::vector<SolvedStage>>()),
       left_out_(scene_->whole ? std::make_unique<LeftOutRows>(*scene_) : nullptr) {
   reset(scene_->start);
@@ -136,34 +144,14 @@ StepReport Integrator::take(double h, Guess guess) {
     outcome = std::move(divided);
     pieces = pieces_.size();
   }
-  if (!outcome.ok()) {
-    const std::string& stuck = division_->stuck();
-    return failed(outcome.solve, step.start,
-                  outcome.failure + (stuck.empty() ? kink_ahead(h) : "; " + stuck));
-  }
+  if (!outcome.ok()) return failed(outcome.solve, step.start, outcome.failure);
   if (const std::string broken = left_out_ ? broken_left_out_row(sequence_->end().q) : std::string();
       !broken.empty())
     return failed({.status = SolveStatus::refused}, step.start, broken);
   StepReport report{outcome.solve, work_.steps, step.start, {}};
-  accept_step(h, pieces);
+  const Interval& last = parts.back();
+  accept_step(division_->cut_short() ? last.start + last.size - step.start : h, pieces);
   return report;
-}
-
-/// Empty, or which kink of the formulas a step that failed would have crossed, on with the last acceleration.
-std::string Integrator::kink_ahead(double h) const {
-  if (!scene_->kinks || scene_->kinks->count() == 0 || work_.steps == 0) return {};
-  Vector here(scene_->kinks->count()), there(here);
-  const Vector speed_up = (state_.v - last_.start.v) / last_.size;
-  scene_->kinks->evaluate(time(), state_.q, state_.v, here);
-  scene_->kinks->evaluate(time() + h, state_.q + h * state_.v + 0.5 * h * h * speed_up,
-                          state_.v + h * speed_up, there);
-  for (Eigen::Index k = 0; k < here.size(); ++k)
-    if (here[k] * there[k] < 0.0)
-      return "; in the step " + scene_->kinks->names()[static_cast<std::size_t>(k)] +
-             " changes sides: where a force jumps there and points back from both sides, as dry friction at "
-             "rest, "
-             "no step has a solution; write one that is steep instead of a jump, as tanh(v/eps)";
-  return {};
 }
 
 /// Empty, or what rows left out as redundant demand otherwise than the others: at the end of the step just
@@ -203,6 +191,7 @@ void Integrator::accept_step(double h, std::size_t pieces) {
   ++work_.steps;
 }
 
+void Integrator::end_steps_at_kinks() { division_->end_at_kinks(); }
 bool Integrator::met_kinks() const { return division_->divided(); }
 std::span<const KinkPassed> Integrator::kinks_passed() const { return division_->passed(); }
 const std::string& Integrator::stuck_at_kink() const { return division_->stuck(); }

@@ -66,6 +66,8 @@ class Integrator {
   const Vector& momentum() const { return state_.p; }
   const Vector& velocity_estimate() const { return state_.v; }
   const Work& work() const { return work_; }
+  /// From now on a step that crosses a kink in q and v ends behind the first one: time() tells where.
+  void end_steps_at_kinks();
   /// Whether the last step was taken in parts at such times.
   bool met_kinks() const;
   /// Where it crossed kinks in q and v.
@@ -116,7 +118,6 @@ class Integrator {
   StepReport take(double h, Guess guess);
   StepReport failed(const SolveReport& solve, double time, const std::string& why) const;
   std::string broken_left_out_row(const Vector& end);
-  std::string kink_ahead(double h) const;
   void accept_step(double h, std::size_t pieces);
 
   std::shared_ptr<const Scene> scene_;

@@ -9,86 +9,23 @@ namespace diracstep {
 namespace {
 
 constexpr std::size_t most_parts_of_a_step = 40;
-constexpr int most_tries = 60, most_halvings = 12, most_returns = 2, most_hidden = 4;
+constexpr int most_tries = 60, most_halvings = 12, most_returns = 2, most_hidden = 8;
+constexpr int most_behind = 12, most_crossings = 16;
+constexpr double towards_zero = 15.0 / 16.0;  // of the way that is left, in one try from the near side
+constexpr double ways_across = 4.0;           // of that way, for the part across
 constexpr double finest_part = 1e-14, returned_within = 1e-6;  // of the step
-constexpr double reach_of_estimates = 2.0;                     // in changes within a step
-constexpr double reach_of_motion = 2.0;                        // in changes within the part before
 
 }  // namespace
 
-StepDivision::StepDivision(std::shared_ptr<const Scene> scene, double usual_step, PointReader& reader,
-                           StepSequence& sequence)
+StepDivision::StepDivision(std::shared_ptr<const Scene> scene, double usual_step, bool node_at_end,
+                           PointReader& reader, StepSequence& sequence)
     : scene_(std::move(scene)),
       reader_(&reader),
       sequence_(&sequence),
       kinks_(scene_->kinks && scene_->kinks->count() > 0 ? scene_->kinks.get() : nullptr),
+      node_at_end_(node_at_end),
       times_(scene_->kinks, scene_->start.time, usual_step) {
   parts_.reserve(4);
-}
-
-/// By the velocity of the class of p, or by its estimate: where rows act, that is not of the method's order.
-void StepDivision::read(double t, const State& at, bool exactly, Vector& switches) {
-  velocity_ = at.v;
-  if (exactly && !reader_->velocity(t, at.q, at.p, velocity_).ok()) velocity_ = at.v;
-  switches.resize(kinks_->count());
-  kinks_->evaluate(t, at.q, velocity_, switches);
-}
-
-/// The number of a kink that lies between before_ and after_; -1 where none.
-int StepDivision::first_change() const {
-  for (Eigen::Index k = 0; k < after_.size(); ++k)
-    if (kinks_->kinds()[static_cast<std::size_t>(k)] == Kinks::Kind::kink && before_[k] * after_[k] < 0.0)
-      return static_cast<int>(k);
-  return -1;
-}
-
-/// The number of a kink that the motion comes to, or comes from, by its change within the part solved last;
-/// -1 where none.
-int StepDivision::ahead() const {
-  if (changes_.size() != before_.size()) return -1;
-  for (Eigen::Index k = 0; k < before_.size(); ++k)
-    if (kinks_->kinds()[static_cast<std::size_t>(k)] == Kinks::Kind::kink &&
-        std::abs(before_[k]) <= reach_of_motion * changes_[k])
-      return static_cast<int>(k);
-  return -1;
-}
-
-/// Where between the ends of a step, in parts of it, a kink is on another side than at both; 0 where none.
-double StepDivision::hidden_place(Interval step, const State& start, const State& end) {
-  if (start.q.size() != start.v.size()) return 0.0;  // points that cannot be subtracted
-  velocity_ = (end.q - start.q) / step.size;
-  speed_up_ = velocity_ - start.v;  // in the time of the step
-  for (const double place : {0.5, 0.25, 0.75}) {
-    position_ = start.q + place * step.size * velocity_ - 0.5 * place * (1.0 - place) * step.size * speed_up_;
-    between_.resize(kinks_->count());
-    speed_ = velocity_ + (place - 0.5) * speed_up_;
-    kinks_->evaluate(step.start + place * step.size, position_, speed_, between_);
-    bool nearer = false;
-    for (Eigen::Index k = 0; k < between_.size(); ++k) {
-      if (kinks_->kinds()[static_cast<std::size_t>(k)] != Kinks::Kind::kink ||
-          !(before_[k] * after_[k] > 0.0))
-        continue;
-      if (between_[k] * before_[k] < 0.0) return place;
-      nearer = nearer || std::abs(between_[k]) < 0.5 * std::min(std::abs(before_[k]), std::abs(after_[k]));
-    }
-    if (!nearer) return 0.0;  // what is no nearer to zero in the middle is taken to have none
-  }
-  return 0.0;
-}
-
-bool StepDivision::crosses(Interval step, const State& start, const State& end) {
-  const double end_time = step.start + step.size;
-  read(step.start, start, false, before_);
-  read(end_time, end, false, after_);
-  changes_ = (after_ - before_).cwiseAbs();
-  if (hidden_place(step, start, end) > 0.0) return true;
-  const auto nearest = before_.cwiseAbs().cwiseMin(after_.cwiseAbs()).array();
-  const auto change = (after_ - before_).cwiseAbs().array();
-  if (!(before_.array() * after_.array() <= 0.0 || nearest <= reach_of_estimates * change).any())
-    return false;
-  read(step.start, start, true, before_);
-  read(end_time, end, true, after_);
-  return first_change() >= 0;
 }
 
 StepSequence::Outcome StepDivision::solve(Interval step, const State& start, Guess guess, Work& work) {
@@ -97,22 +34,36 @@ StepSequence::Outcome StepDivision::solve(Interval step, const State& start, Gue
   passed_.clear();
   stuck_.clear();
   if (parts_.size() > 1) guess = Guess::plain;
+  sequence_->begin_record();
   StepSequence::Outcome outcome = sequence_->solve(parts_, start, guess, work);
   if (kinks_ == nullptr || (outcome.ok() && !crosses(step, start, sequence_->end()))) return outcome;
   undivided_ = parts_;
-  const bool followed = follow(start, work);
-  if (followed && !passed_.empty()) {
-    StepSequence::Outcome in_parts = sequence_->solve(parts_, start, Guess::plain, work);
-    if (in_parts.ok()) {
-      divided_ = true;
-      return in_parts;
-    }
+  solved_ = {};
+  if (follow(start, work) && !passed_.empty()) {
+    divided_ = true;
+    return {solved_, {}};
   }
   parts_ = undivided_;
   divided_ = divided_ && stuck_.empty();
   passed_.clear();
+  sequence_->begin_record();
+  if (!outcome.ok() && !stuck_.empty()) outcome.failure = stuck_;
   // end() is that of the last try.
   return outcome.ok() ? sequence_->solve(parts_, start, Guess::plain, work) : outcome;
+}
+
+bool StepDivision::solve_part(Interval part, const State& from, Guess guess, Work& work) {
+  last_ = sequence_->solve({&part, 1}, from, guess, work).solve;
+  if (last_.ok()) read(part.start + part.size, sequence_->end(), true, after_);
+  return last_.ok();
+}
+
+/// The part solved last is one of the step; the motion goes on from its end.
+void StepDivision::keep(const Interval& part, State& from) {
+  parts_.push_back(part);
+  solved_.add(last_);
+  sequence_->keep_record();
+  from = sequence_->end();
 }
 
 /// Divides the parts at the kinks on the way; false where that cannot be done.
@@ -121,49 +72,124 @@ bool StepDivision::follow(const State& start, Work& work) {
   const double whole = std::abs(undivided_.back().start + undivided_.back().size - undivided_.front().start);
   int crossed = -1, returns = 0, hidden = 0, halvings = 0;
   parts_.clear();
+  sequence_->begin_record();
   for (const Interval& given : undivided_)
     for (double left = given.size;;) {
       Interval part{given.start + (given.size - left), left};
-      if (parts_.size() == most_parts_of_a_step) return give_up(crossed, part.start);
+      if (parts_.size() >= most_parts_of_a_step) return give_up(crossed, part.start);
       read(part.start, from, true, before_);
-      while (!sequence_->solve({&part, 1}, from, Guess::plain, work).ok()) {
+      start_velocity_ = velocity_;
+      while (!solve_part(part, from, Guess::plain, work)) {
         if (++halvings > most_halvings) {
-          const int number = crossed >= 0 ? crossed : ahead();
+          const int number = crossed >= 0 ? crossed : ahead(before_);
           return number >= 0 && give_up(number, part.start);
         }
         part.size *= 0.5;
       }
-      read(part.start + part.size, sequence_->end(), true, after_);
-      if (const double place =
-              first_change() < 0 && hidden < most_hidden ? hidden_place(part, from, sequence_->end()) : 0.0;
-          place > 0.0) {
+      for (double place = 1.0; place > 0.0 && hidden < most_hidden;) {
+        place = hidden_place(part, from, sequence_->end());
+        if (place == 0.0) break;
         ++hidden;
         part.size *= place;
-        if (!sequence_->solve({&part, 1}, from, Guess::plain, work).ok()) return false;
-        read(part.start + part.size, sequence_->end(), true, after_);
+        if (!solve_part(part, from, Guess::plain, work)) return false;
       }
       changes_ = (after_ - before_).cwiseAbs();
       int number = first_change(), last = -1;
+      if (number < 0 && node_at_end_ && part.size != left) {  // longer ones fail: for what is at their end?
+        number = ahead(after_);
+        if (number >= 0 && !shorten_before(number, part, from, work)) {
+          number = -1;
+          if (!solve_part(part, from, Guess::plain, work)) return false;
+        }
+        if (number >= 0) {
+          last = number;
+          number = -1;
+        }
+      }
       // Each function once: several vanish together, as those of v > 0 and v < 0, and round-off lets each
       // seem to come first.
       for (int k = 0; k < kinks_->count() && number >= 0 && std::abs(part.size) > finest_part * whole; ++k) {
         last = number;
-        if (!shorten(number, part, from, work)) return give_up(number, part.start);
+        if (!(node_at_end_ ? shorten_before(number, part, from, work) : shorten(number, part, from, work)))
+          return give_up(number, part.start);
         before_[number] = 0.0;  // crossed at the end; what else changed before it?
-        number = first_change();
+        number = part.size == 0.0 ? -1 : first_change();
       }
       const bool returned = last >= 0 && last == crossed && std::abs(part.size) <= returned_within * whole;
       returns = returned ? returns + 1 : 0;
       if (returns == most_returns) return give_up(last, part.start);
       if (last >= 0) crossed = last;
-      left -= part.size;
-      const bool ends = std::abs(left) <= finest_part * whole || left * part.size <= 0.0;
-      parts_.push_back(part);
-      from = sequence_->end();
+      if (part.size != 0.0) {
+        left -= part.size;
+        keep(part, from);
+      }
+      bool ends = std::abs(left) <= finest_part * whole || left * given.size <= 0.0;
+      if (last >= 0 && node_at_end_ && !ends) {
+        Interval across{given.start + (given.size - left), left};
+        if (!cross(last, across, from, work)) return give_up(last, across.start);
+        left -= across.size;
+        keep(across, from);
+        ends = std::abs(left) <= finest_part * whole || left * given.size <= 0.0;
+      }
       if (ends) break;
-      if (last >= 0) passed_.push_back({part.start + part.size, from});
+      if (last >= 0) passed_.push_back({given.start + (given.size - left), from});
+      if (last >= 0 && end_at_kinks_) return true;
     }
   return true;
+}
+
+/// The way across a zero that the part before came to from the near side, of an end that lies behind it:
+/// within `across` at most, and a round-off of the time where that is enough.
+bool StepDivision::cross(int number, Interval& across, const State& from, Work& work) {
+  const double longest = across.size;
+  read(across.start, from, true, before_);
+  double size = std::copysign(
+      std::max(ways_across * to_zero_, 8.0 * std::numeric_limits<double>::epsilon() * std::abs(across.start)),
+      longest);
+  for (int k = 0; k < most_crossings; ++k, size *= 4.0) {
+    across.size = std::abs(size) < std::abs(longest) ? size : longest;
+    if (!solve_part(across, from, Guess::plain, work)) continue;
+    if (before_[number] * after_[number] <= 0.0 || across.size == longest) return true;
+  }
+  return false;
+}
+
+/// Shortens a part, which was solved last, so that it ends before the zero of one function by a round-off of
+/// the time, with the functions of the near side at every node; its size may become 0.  The zero is come to
+/// from the near side alone: a step over it has those of the far side at its end, so that its own zero is
+/// another one.
+bool StepDivision::shorten_before(int number, Interval& part, const State& from, Work& work) {
+  const double finest = std::max(finest_part * std::abs(part.size),
+                                 4.0 * std::numeric_limits<double>::epsilon() * std::abs(part.start));
+  const auto near_side = [&](double value) { return before_[number] * value > 0.0; };
+  double low = 0.0, at_low = before_[number], solved = part.size;
+  double zero = part.size * at_low / (at_low - after_[number]);
+  if (near_side(after_[number])) {
+    if (std::abs(after_[number]) >= std::abs(at_low)) return false;
+    low = part.size;
+    at_low = after_[number];
+  }
+  Guess guess = low == 0.0 ? Guess::plain : Guess::last_solution;
+  int behind = 0;
+  for (int k = 0; k < most_tries && std::abs(zero - low) > finest; ++k) {
+    const double next = low + towards_zero * (zero - low);
+    solved = next;
+    if (solve_part({part.start, next}, from, guess, work) && near_side(after_[number])) {
+      const double slope = (after_[number] - at_low) / (next - low);
+      zero = slope * before_[number] * part.size < 0.0 ? next - after_[number] / slope : 2.0 * next - low;
+      low = next;
+      at_low = after_[number];
+      guess = Guess::last_solution;
+      continue;
+    }
+    if (++behind > most_behind) return false;
+    zero = low + 0.5 * (next - low);
+    guess = Guess::plain;
+  }
+  to_zero_ = std::abs(zero - low);
+  part.size = low;
+  return low == 0.0 || solved == low ||
+         (solve_part(part, from, Guess::plain, work) && near_side(after_[number]));
 }
 
 /// Shortens a part, which was solved last, so that it ends behind the zero of one function.
@@ -173,9 +199,7 @@ bool StepDivision::shorten(int number, Interval& part, const State& from, Work& 
                                  4.0 * std::numeric_limits<double>::epsilon() * std::abs(part.start));
   const auto solve = [&](double size, Guess guess) {
     part.size = size;
-    if (!sequence_->solve({&part, 1}, from, guess, work).ok()) return false;
-    read(part.start + size, sequence_->end(), true, after_);
-    return true;
+    return solve_part(part, from, guess, work);
   };
   for (int k = 0; k < most_tries && std::abs(high - low) > finest; ++k) {
     double next = k % 3 == 2 ? 0.5 * (low + high) : low - at_low * (high - low) / (at_high - at_low);

@@ -14,7 +14,9 @@ namespace diracstep {
 ///
 /// A step at whose end a switching function has another sign than at its start is solved again, shorter,
 /// until it ends a round-off of the time behind the zero, by a bracketed secant method on its size; the rest
-/// follows.  A pair of zeros within a step shows in no sign at its end: it is looked for at three places
+/// follows.  Of a method with a node at the end of its steps, which would take the functions of the far side
+/// there for all of a part, the part ends a round-off before the zero, and one of that size leads across.  A
+/// pair of zeros within a step shows in no sign at its end: it is looked for at three places
 /// along a parabola through the ends, whose curvature is that of the mean velocities of this and the last
 /// step; so pairs that are narrow beside a step, and flat ones, are not seen.  Where the motion crosses one
 /// kink again and again, as at a force that jumps and points back from both sides, the step is solved
@@ -25,8 +27,11 @@ namespace diracstep {
 class StepDivision {
  public:
   /// The reader and the sequence outlive the division.
-  StepDivision(std::shared_ptr<const Scene> scene, double usual_step, PointReader& reader,
+  StepDivision(std::shared_ptr<const Scene> scene, double usual_step, bool node_at_end, PointReader& reader,
                StepSequence& sequence);
+
+  /// From now on a step ends behind the first kink that the motion crosses within it.
+  void end_at_kinks() { end_at_kinks_ = true; }
 
   /// Afterwards sequence.end() is where the step ends; no trace of it is left before it is accepted.
   StepSequence::Outcome solve(Interval step, const State& start, Guess guess, Work& work);
@@ -35,6 +40,8 @@ class StepDivision {
   const std::vector<Interval>& parts() const { return parts_; }
   bool divided() const { return divided_; }
   const std::vector<KinkPassed>& passed() const { return passed_; }
+  /// Whether it ended at a kink.
+  bool cut_short() const { return end_at_kinks_ && !passed_.empty(); }
   /// Empty, or why it is not divided although the motion crosses a kink, or fails before one.
   const std::string& stuck() const { return stuck_; }
 
@@ -44,10 +51,15 @@ class StepDivision {
  private:
   void read(double t, const State& at, bool exactly, Vector& switches);
   bool crosses(Interval step, const State& start, const State& end);
+  double place_ahead(Interval step, const State& start);
   double hidden_place(Interval step, const State& start, const State& end);
   int first_change() const;
-  int ahead() const;
+  int ahead(const Vector& here) const;
+  bool solve_part(Interval part, const State& from, Guess guess, Work& work);
+  void keep(const Interval& part, State& from);
   bool follow(const State& start, Work& work);
+  bool shorten_before(int number, Interval& part, const State& from, Work& work);
+  bool cross(int number, Interval& across, const State& from, Work& work);
   bool shorten(int number, Interval& part, const State& from, Work& work);
   bool give_up(int number, double t);
 
@@ -55,12 +67,16 @@ class StepDivision {
   PointReader* reader_;
   StepSequence* sequence_;
   const Kinks* kinks_;  ///< null where no motion crosses any
+  bool node_at_end_, end_at_kinks_ = false;
   TimeKinks times_;
   std::vector<Interval> parts_, undivided_;
   std::vector<KinkPassed> passed_;
   std::string stuck_;
   bool divided_ = false;
-  Vector changes_;  ///< of the kinks within the part solved last, for what stuck() says
+  SolveReport last_, solved_;  ///< of the part solved last, and of all that were kept
+  double to_zero_ = 0.0;       ///< from the end of the part solved last, without sign
+  Vector changes_;             ///< of the kinks within the part solved last, for what stuck() says
+  Vector start_velocity_;      ///< of the part
   Vector before_, after_, between_, velocity_, speed_, speed_up_, position_;
 };
 

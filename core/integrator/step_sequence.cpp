@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <diracstep/core/integrator/singularity.hpp>
 #include <diracstep/core/integrator/step_sequence.hpp>
 #include <sstream>
@@ -33,7 +34,9 @@ StepSequence::Outcome StepSequence::solve(std::span<const Interval> pieces, cons
                                           Work& work) {
   SolveReport total;
   const State* at = &start;
-  if (record_ != nullptr) record_->clear();
+  if (record_ != nullptr)
+    record_->erase(record_->begin() + static_cast<std::ptrdiff_t>(std::min(kept_, record_->size())),
+                   record_->end());
   for (const Interval& piece : pieces) {
     double t = piece.start;
     for (Stage& stage : stages_) {

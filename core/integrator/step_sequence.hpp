@@ -50,9 +50,11 @@ class StepSequence {
 
   std::size_t stages() const { return stages_.size(); }
 
-  /// Where it writes what it solves: after solve() the stages of all its pieces, in their order.  Null, as at
-  /// first: nowhere.
+  /// Where it writes what it solves: after solve() the stages of all its pieces, in their order, behind what
+  /// was kept.  Null, as at first: nowhere.
   void record_into(std::vector<SolvedStage>* record) { record_ = record; }
+  void begin_record() { kept_ = 0; }
+  void keep_record() { kept_ = record_ != nullptr ? record_->size() : 0; }
 
   const StepSolver& part() const { return parts_.front(); }
 
@@ -81,6 +83,7 @@ class StepSequence {
   Origin origin_ = Origin::start;
   State end_;
   std::vector<SolvedStage>* record_ = nullptr;
+  std::size_t kept_ = 0;
 };
 
 }  // namespace diracstep

@@ -3,12 +3,12 @@
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/runs/event_search.hpp>
 #include <limits>
+#include <utility>
 
 namespace diracstep {
 
 namespace {
 
-constexpr int most_readings = 100;
 constexpr double round_off_of_times = 4.0 * std::numeric_limits<double>::epsilon();
 constexpr double same_instant = 1e-9;  // in steps
 constexpr double round_off_of_values = 1e-13;
@@ -19,16 +19,6 @@ constexpr double just_crossed = std::numeric_limits<double>::min();  // the sign
 bool only_sets_values(const Event& event) {
   return !event.set.empty() && !event.restitution && event.on.empty() && event.off.empty() &&
          std::ranges::none_of(event.set, &Event::Setting::second);
-}
-
-/// How often a clock has ticked at t; ticks within round-off of t have.
-double ticks_at(double t, double start, double every) {
-  const double passed = std::abs(t - start);
-  const double round_off =
-      16.0 * std::numeric_limits<double>::epsilon() * std::max(std::abs(t), std::abs(start));
-  double ticks = std::floor(passed / every);
-  while ((ticks + 1.0) * every <= passed + round_off && ticks + 1.0 > ticks) ticks += 1.0;
-  return ticks;
 }
 
 }  // namespace
@@ -55,6 +45,7 @@ bool EventSearch::changes(std::size_t event, double from, double to) const {
 StepReport EventSearch::begin(const Sample& point) {
   begun_ = true;
   start_ = last_time_ = point.time;
+  last_point_ = point;
   for (std::size_t k = 0; k < events_.size(); ++k) {
     if (!events_[k].at || !watches_[k].awake) continue;
     if (StepReport report = value(k, point, watches_[k].last); !report.ok()) return report;
@@ -83,6 +74,7 @@ StepReport EventSearch::see(const Sample& point, const Read& read) {
     }
   }
   last_time_ = point.time;
+  last_point_ = point;
   return {};
 }
 
@@ -101,36 +93,14 @@ StepReport EventSearch::look(std::size_t event, double here, const Sample& point
                      "would hold it";
     return report;
   }
+  const std::vector<double> times = watch.left ? std::vector<double>{} : times_of_changes(event, here, point);
+  if (!times.empty()) return look_at(times, event, here, point, read);
   if (watch.met_at_last || !changes(event, watch.last, here)) return {};
   EventHit hit{event, {}};
   const double at_point = watch.left ? here / (point.time - last_time_) : here;
-  StepReport report = locate({watch.last, at_point, watch.left}, point, read, hit);
+  StepReport report = locate({last_time_, point.time, watch.last, at_point, watch.left}, point, read, hit);
   if (report.ok()) met_.push_back(std::move(hit));
   return report;
-}
-
-/// The times of a clock between the last point and this one.
-StepReport EventSearch::tick(std::size_t event, const Sample& point, const Read& read) {
-  Watch& watch = watches_[event];
-  const double step = point.time - last_time_;
-  constexpr double most_ticks = 1e5;  // between two points
-  if (std::abs(step) > most_ticks * events_[event].every) {
-    StepReport report;
-    report.solve.status = SolveStatus::refused;
-    report.failure = "event '" + events_[event].name + "' happens every " + to_text(events_[event].every) +
-                     ", more than " + to_text(most_ticks) + " times in a step of " + to_text(std::abs(step));
-    return report;
-  }
-  for (double ticks = watch.ticks + 1.0;; ticks += 1.0) {  // counted where they are kept
-    const double t = start_ + std::copysign(ticks * events_[event].every, step);
-    const double left = (point.time - t) / step;
-    if (!(left > -same_instant)) return {};
-    EventHit hit{event, point};
-    if (left > same_instant)
-      if (StepReport report = read(t, hit.sample); !report.ok()) return report;
-    met_.push_back(std::move(hit));
-    if (events_[event].acts()) return {};
-  }
 }
 
 /// Whether the last of them acts or stops the run; an event whose condition does not hold is none.  Those of
@@ -167,12 +137,16 @@ void EventSearch::mark_zeros(const Sample& at) {
   for (std::size_t k = 0; k < events_.size(); ++k) {
     Watch& watch = watches_[k];
     watch.behind = 0;
-    if (!events_[k].at || !watch.awake || watch.last == 0.0) continue;
+    watch.at_act = 0.0;
+    if (!events_[k].at || !watch.awake) continue;
     const double here = events_[k].at(at.point());
+    watch.at_act = here;
+    if (watch.last == 0.0) continue;
     const double slope = std::abs((here - watch.last) / (at.time - last_time_));
     watch.zero = round_off_of_a_zero * watch.largest +
                  4.0 * round_off_of_times * std::abs(at.time) * (std::isfinite(slope) ? slope : 0.0);
     if (!(std::abs(here) <= watch.zero)) continue;
+    watch.at_act = 0.0;
     watch.behind = watch.last > 0.0 ? -1 : 1;
     at_zero_.push_back(k);
   }
@@ -189,7 +163,7 @@ bool EventSearch::turned_back(std::size_t event, double rate) {
 }
 
 std::vector<std::size_t> EventSearch::go_on(const Sample& point, const std::vector<Left>& left,
-                                            const std::vector<bool>& awake) {
+                                            const std::vector<bool>& awake, bool by_settings) {
   std::vector<std::size_t> due;
   for (std::size_t k = 0; k < events_.size(); ++k) {
     Watch& watch = watches_[k];
@@ -197,9 +171,10 @@ std::vector<std::size_t> EventSearch::go_on(const Sample& point, const std::vect
     watch.awake = awake[k];
     watch.met_at_last = false;
     if (!events_[k].at) {
-      if (woken) watch.ticks = ticks_at(point.time, start_, events_[k].every);
+      if (woken) set_clock(k, point.time);
       continue;
     }
+    const double before = std::exchange(watch.at_act, 0.0);
     if (!watch.awake) continue;
     if (const auto found = std::ranges::find(left, k, &Left::event); found != left.end()) {
       if (turned_back(k, found->rate)) due.push_back(k);
@@ -213,7 +188,11 @@ std::vector<std::size_t> EventSearch::go_on(const Sample& point, const std::vect
     if (std::isnan(here)) continue;
     // What switches rows on is near its zero when they have just been switched off.
     if (woken && !events_[k].on.empty()) continue;
-    watch.last = here;
+    watch.last = watch.at_act = here;
+    watch.largest = std::max(watch.largest, std::abs(here));
+    const bool beyond_round_off =
+        std::max(std::abs(before), std::abs(here)) > round_off_of_values * watch.largest;
+    if (by_settings && !woken && beyond_round_off && changes(k, before, here)) due.push_back(k);
     if (watch.behind != 0 && std::abs(here) <= watch.zero)
       watch.last = only_sets_values(events_[k]) ? watch.behind * just_crossed : 0.0;
     const Event::Direction direction = events_[k].direction;
@@ -222,41 +201,8 @@ std::vector<std::size_t> EventSearch::go_on(const Sample& point, const std::vect
       due.push_back(k);
   }
   last_time_ = point.time;
+  last_point_ = point;
   return due;
-}
-
-/// The Illinois method: the end of the bracket at or behind the zero is the hit.  A guess next to an end is
-/// taken a little inside, so that the bracket closes at once where the guesses have converged.
-StepReport EventSearch::locate(Bracket bracket, const Sample& point, const Read& read, EventHit& hit) const {
-  double before = last_time_, after = point.time;
-  auto& [at_before, at_after, divided] = bracket;
-  hit.sample = point;
-  const double smallest = round_off_of_times * std::max(std::abs(before), std::abs(after));
-  int side = 0;
-  for (int k = 0; k < most_readings && std::abs(after - before) > 2.0 * smallest && at_after != 0.0; ++k) {
-    const double sense = after > before ? 1.0 : -1.0;
-    double t = after - at_after * (after - before) / (at_after - at_before);
-    if (k % 8 == 7 || !std::isfinite(t)) t = before + 0.5 * (after - before);
-    t = sense * std::clamp(sense * t, sense * before + smallest, sense * after - smallest);
-    Sample between;
-    if (StepReport report = read(t, between); !report.ok()) return report;
-    double there = 0.0;
-    if (StepReport report = value(hit.event, between, there); !report.ok()) return report;
-    if (divided) there /= t - last_time_;
-    if ((there < 0.0) == (at_before < 0.0) && there != 0.0) {
-      before = t;
-      at_before = there;
-      if (side == -1) at_after *= 0.5;
-      side = -1;
-    } else {
-      after = t;
-      at_after = there;
-      hit.sample = std::move(between);
-      if (side == 1) at_before *= 0.5;
-      side = 1;
-    }
-  }
-  return {};
 }
 
 void EventSearch::save(Snapshot& to) const {

@@ -22,9 +22,10 @@ struct EventHit {
 /// A change of sign from one point to the next is followed to its time by a bracketed secant method on the
 /// motion between them, which is read by steps of the method from the first of both: so the time has the
 /// order of the method and is solved to round-off.  Where the function vanishes at the start nothing is met
-/// there, and changes between values below 1e-13 of the largest so far are round-off.  Two changes between
-/// neighbouring points cancel and are not seen, but for a contact that was just left: there g/(t − t_left) is
-/// looked at, which is the rate at t_left, so that a return within the same step is found.
+/// there, and changes between values below 1e-13 of the largest so far are round-off.  Changes between
+/// neighbouring points that cancel are looked for at seven places on a cubic between them, so that a pair
+/// that lies closer than an eighth of a step may not be seen, but for a contact that was just left: there
+/// g/(t − t_left) is looked at, which is the rate at t_left, so that a return within the same step is found.
 ///
 /// Where events act, every function that vanishes there has crossed its zero, whatever its last digit says:
 /// where what acted turns it back, as a relay at its switching surface, it crosses again.  Events whose times
@@ -52,15 +53,18 @@ class EventSearch {
     double rate;
   };
   /// From this point on those events are looked for that are awake.  The numbers of those that are due at
-  /// once: they were asleep, and what they wait for has happened.
+  /// once: what acted has set their function to the other side of its zero (`by_settings`: it has done
+  /// nothing but set values), or they were asleep, and what they wait for has happened.
   std::vector<std::size_t> go_on(const Sample& point, const std::vector<Left>& left,
-                                 const std::vector<bool>& awake);
+                                 const std::vector<bool>& awake, bool by_settings);
 
   bool empty() const { return events_.empty(); }
   const std::vector<Event>& events() const { return events_; }
 
   void save(Snapshot& to) const;
   void restore(SnapshotReader& from, const std::vector<bool>& awake);
+  /// After restore(), the point at which it was saved.
+  void stand_at(const Sample& point) { last_point_ = point; }
 
  private:
   struct Watch {
@@ -72,9 +76,11 @@ class EventSearch {
     double largest = 0.0;      ///< value so far, without sign: far smaller ones are round-off
     int behind = 0;            ///< its sign behind the zero at which events act; 0 where it does not vanish
     double zero = 0.0;         ///< what its value may be there
+    double at_act = 0.0;       ///< its value where events act, before or between them; 0 where it vanishes
   };
   /// An event's function between two points, bracketed.
   struct Bracket {
+    double before, after;
     double at_before, at_after;
     bool divided;  ///< by the time since the last point
   };
@@ -83,6 +89,10 @@ class EventSearch {
   StepReport value(std::size_t event, const Sample& sample, double& value) const;
   bool changes(std::size_t event, double from, double to) const;
   StepReport look(std::size_t event, double here, const Sample& point, const Read& read);
+  void set_clock(std::size_t event, double t);
+  std::vector<double> times_of_changes(std::size_t event, double here, const Sample& point) const;
+  StepReport look_at(const std::vector<double>& times, std::size_t event, double here, const Sample& point,
+                     const Read& read);
   StepReport tick(std::size_t event, const Sample& point, const Read& read);
   StepReport locate(Bracket bracket, const Sample& point, const Read& read, EventHit& hit) const;
   bool keep_first_that_acts(const Sample& point);
@@ -93,6 +103,7 @@ class EventSearch {
   std::vector<Watch> watches_;
   bool begun_ = false;
   double start_ = 0.0, last_time_ = 0.0;
+  Sample last_point_;  ///< of no size where it is not known
   std::vector<EventHit> met_;
   std::vector<std::size_t> at_zero_;
 };

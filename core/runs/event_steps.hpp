@@ -288,6 +288,7 @@ void EventSteps<Stepper>::restore(SnapshotReader& from) {
   if (on != at_start) take(actions_.scene_from(start.time, start.q, start.v));
   search_.restore(from, actions_.awake());
   stepper().restore(from);
+  if (Sample here; begun_ && sample(here).ok()) search_.stand_at(here);
 }
 
 }  // namespace diracstep

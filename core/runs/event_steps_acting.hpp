@@ -36,7 +36,7 @@ StepReport EventSteps<Stepper>::begin() {
         return failed("event '" + event.name + "': its function is " + to_text(gap) +
                       " at the start, behind the contact; it is positive where there is none (direction)");
   if (report = search_.see(here, {}); !report.ok()) return report;
-  (void)search_.go_on(here, at_rest_in_contact(here), actions_.awake());
+  (void)search_.go_on(here, at_rest_in_contact(here), actions_.awake(), false);
   std::vector<EventHit> due;
   add_closing(here, due);
   for (std::size_t k = 0; k < events().size(); ++k)
@@ -54,6 +54,10 @@ StepReport EventSteps<Stepper>::act(std::vector<EventHit> met) {
   std::vector<EventSearch::Left> left;
   int made = 0;
   while (!met.empty()) {
+    const bool by_settings = std::ranges::all_of(met, [&](const EventHit& hit) {  // no impact, no row
+      const Event& event = events()[hit.event];
+      return !event.restitution && event.on.empty() && event.off.empty();
+    });
     for (EventHit& hit : met) {
       const Event& event = events()[hit.event];
       stopped_ = stopped_ || event.stop;
@@ -73,8 +77,15 @@ StepReport EventSteps<Stepper>::act(std::vector<EventHit> met) {
     for (EventSearch::Left& contact : left)
       contact.rate = EventActions::contact_rate(events()[contact.event], here);
     for (const std::size_t k : search_.at_zero()) add_left(k, left);
-    for (const std::size_t k : search_.go_on(here, left, actions_.awake()))
-      if (!events()[k].condition || events()[k].condition(here.point()) > 0.0) met.push_back({k, here});
+    for (const std::size_t k : search_.go_on(here, left, actions_.awake(), by_settings)) {
+      const Event& event = events()[k];
+      if (event.condition && !(event.condition(here.point()) > 0.0)) continue;
+      if (event.restitution)
+        return failed("event '" + event.name + "': its function was set to " +
+                      to_text(event.at(here.point())) + " at t = " + to_text(here.time, 10) +
+                      ", behind the contact, which is no impact");
+      met.push_back({k, here});
+    }
     add_closing(here, met);
   }
   return {};

@@ -73,13 +73,17 @@ std::vector<double> GrowthCheck::distances(Integrator& integrator, const Part& p
   }
   std::vector<double> all;
   Sample other;
+  const auto apart = [&](const Sample& here) {
+    return std::max(max_norm(other.q - here.q) / way_, max_norm(other.p - here.p) / largest_momentum_);
+  };
+  if (!integrator.sample(Momentum::projected, other).ok()) return {};
+  // Beside a coordinate that is heavy and at rest the momenta are far apart from the first.
+  const double unit = std::max(1.0, apart(first) / distance_beside);
   for (std::size_t k = 1; k < part.points.size(); ++k) {
     for (long step = 0; step < part.between; ++step)
       if (!integrator.step().ok()) return {};
     if (!integrator.sample(Momentum::projected, other).ok()) return {};
-    const Sample& here = part.points[k];
-    all.push_back(
-        std::max(max_norm(other.q - here.q) / way_, max_norm(other.p - here.p) / largest_momentum_));
+    all.push_back(apart(part.points[k]) / unit);
   }
   return all;
 }

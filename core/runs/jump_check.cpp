@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/numerics/scales.hpp>
@@ -39,14 +40,15 @@ std::optional<double> jump_of_force(std::span<const KinkPassed> kinks, const Int
 
 JumpCheck::JumpCheck(const Integrator& integrator) : method_(integrator.method().name) {
   const MethodInfo& method = integrator.method();
-  watched_ = method.damped || (method.stages == 0 && method.constraint_rule != StepRule::midpoint);
+  watched_ = integrator.options().order > std::max(2, method.order) && method.stages == 0 &&
+             method.constraint_rule != StepRule::midpoint;
 }
 
 std::string JumpCheck::text() const {
   if (!first_) return "";
   return "the force jumps at t = " + to_text(*first_) + " on the way, where " + method_ +
-         " has a node and takes the force of one side for all of a part: its order is lost there; "
-         "--method type1/gl:3 has none at such places";
+         ", composed to a higher order, steps over to the other side and back: its order is lost there; "
+         "--method type1/gl:3 stays within its steps";
 }
 
 }  // namespace diracstep

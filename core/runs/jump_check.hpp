@@ -13,9 +13,10 @@ namespace diracstep {
 std::optional<double> jump_of_force(std::span<const KinkPassed> kinks, const Integrator& end,
                                     Integrator& reader);
 
-/// Follows a run whose steps are divided at the jumps of a force in q and v, by a method with a node at the
-/// end of its steps: it takes the force of the other side there, for a whole part, so that its order is lost.
-/// A method without such nodes, as GL(s) and the midpoint rule, is not looked at.
+/// Follows a run whose steps are divided at the jumps of a force in q and v, by a composition of an order
+/// above that of its method and 2: some of its steps go back, so that the others go over the end of a part
+/// and take the force of the other side there.  What stays within its steps keeps its order and is not looked
+/// at, nor are compositions of the midpoint rule, whose nodes stay within.
 class JumpCheck {
  public:
   explicit JumpCheck(const Integrator& integrator);

@@ -45,11 +45,11 @@ class RunChecks {
   }
   void after_step(Integrator& integrator) {
     ++step_number_;
-    step_.after(integrator);
     branch_.after(integrator);
     kinks_.after(integrator);
     jumps_.after(integrator.kinks_passed(), integrator, integrator);
     work_.after(integrator);
+    step_.after(integrator);  // behind those that ask for the kinks of the step
     growth_.at_node(integrator);
   }
   void see(const Sample& point) {

@@ -1,12 +1,15 @@
 #include <algorithm>
+#include <cmath>
 #include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/core/runs/step_size_check.hpp>
+#include <vector>
 
 namespace diracstep {
 
 namespace {
 
 constexpr long steps_for_a_look = 600, fewest_looks = 3;
+constexpr double shortest_part = 1e-6;  // of a step, behind a kink
 
 }  // namespace
 
@@ -38,6 +41,33 @@ void StepSizeCheck::compare(Integrator& integrator) {
   divided_ = false;
   if (!integrator.sample(Momentum::projected, whole_).ok()) return;
   comparison_.add(start_, integrator.options().step, whole_, parts_);
+}
+
+/// Between the kinks of the last step, and from the last of them to its end.
+void StepSizeCheck::look_behind_kinks(Integrator& integrator) {
+  if (++over_kinks_ < next_over_kinks_) return;
+  next_over_kinks_ = over_kinks_ < fewest_looks ? over_kinks_ + 1 : 2 * over_kinks_;
+  const std::vector<KinkPassed> kinks(integrator.kinks_passed().begin(), integrator.kinks_passed().end());
+  const Snapshot state = integrator.save();
+  Sample end;
+  if (!integrator.sample(Momentum::projected, end).ok()) return;
+  for (std::size_t k = 0; k < kinks.size(); ++k) {
+    const bool last = k + 1 == kinks.size();
+    const double size = (last ? end.time : kinks[k + 1].time) - kinks[k].time,
+                 first = StepComparison::first_part * size;
+    if (!(std::abs(size) > shortest_part * std::abs(integrator.options().step)) ||
+        !integrator.sample(kinks[k], Momentum::projected, start_).ok())
+      continue;
+    if (last)
+      whole_ = end;
+    else if (!integrator.sample(kinks[k + 1], Momentum::projected, whole_).ok())
+      continue;
+    integrator.restart(kinks[k].time, kinks[k].at.q, kinks[k].at.p, start_.v);
+    if (integrator.step(first).ok() && integrator.step(size - first).ok() &&
+        integrator.sample(Momentum::projected, parts_).ok())
+      comparison_.add(start_, size, whole_, parts_);
+  }
+  integrator.restore(state);
 }
 
 }  // namespace diracstep

@@ -7,9 +7,10 @@
 namespace diracstep {
 
 /// Divides a few steps of a run, one in 600 and at least three, the first one where it does not start from
-/// rest, and each that follows one in which the velocity changed by more than twice as much as ever before,
-/// to say when they are too large: at a step
-/// that resolves the motion, two parts end where the whole does; see StepComparison.
+/// rest, each that follows one in which the velocity changed by more than twice as much as ever before, and
+/// what is left of a step behind a kink that it crossed, where a force may be another one, of the first three
+/// such steps, the sixth, the twelfth, …, to say when they are too large: at a step that resolves the motion,
+/// two parts end where the whole does; see StepComparison.
 ///
 /// Needs no energy, so that it also sees forced and driven scenes.  The parts are taken between
 /// Integrator::save and restore: the run keeps its bits.  Silence proves nothing: a short event between the
@@ -19,7 +20,8 @@ class StepSizeCheck {
   /// For the next so many steps.
   StepSizeCheck(const Integrator& integrator, long steps);
 
-  /// Around each step of the run; for most of them a comparison of numbers.
+  /// Around each step of the run; for most of them a comparison of numbers.  What the integrator tells of the
+  /// kinks of the last step is lost by after().
   void before(Integrator& integrator) {
     const bool due = integrator.work().steps == next_look_;
     if (due) next_look_ += between_looks_;
@@ -28,6 +30,7 @@ class StepSizeCheck {
   void after(Integrator& integrator) {
     if (divided_) compare(integrator);
     follow(integrator);
+    if (!integrator.kinks_passed().empty()) look_behind_kinks(integrator);
   }
 
   /// Empty, or a line that names the worst step so far.
@@ -40,11 +43,13 @@ class StepSizeCheck {
   void divide(Integrator& integrator);
   void compare(Integrator& integrator);
   void follow(const Integrator& integrator);
+  void look_behind_kinks(Integrator& integrator);
 
   StepComparison comparison_;
   long between_looks_, next_look_;
   bool divided_ = false, fast_;
-  double largest_change_ = 0.0;  ///< of the velocity in a step
+  long over_kinks_ = 0, next_over_kinks_ = 1;  ///< steps that crossed some
+  double largest_change_ = 0.0;                ///< of the velocity in a step
   Vector velocity_;
   Sample start_, whole_, parts_;
 };

@@ -171,7 +171,6 @@ class GaussLobattoStep final : public StepProblem {
   }
 
   StageColumns stage_columns() const { return {momentum_.momenta(), momentum_.forces(), impulses_}; }
-
   StageArrays arrays() {
     StageArrays arrays{};
     arrays.points = &points_;
@@ -188,7 +187,6 @@ class GaussLobattoStep final : public StepProblem {
   }
 
   double step_size() const { return points_.step.size; }
-
   /// Everything the residual is made of, at x, unless x is where it was last taken.
   void evaluate(ConstVectorRef x) {
     if (evaluated_ &&
@@ -196,12 +194,14 @@ class GaussLobattoStep final : public StepProblem {
       return;
     evaluated_ = true;
     const double impulse = evaluate_points(x), forces = largest_entry(momentum_.forces().data(), n_ * s_);
-    const double terms =
+    double terms =
         std::max(largest_entry(momentum_.momenta().data(), n_ * s_), std::abs(step_size()) * forces);
+    const double mass = m_ > 0 ? largest_entry(momentum_.mass(0).data(), momentum_.mass(0).size()) : 0.0,
+                 speed = m_ > 0 ? largest_entry(x.data(), n_ * s_) : 0.0;
+    if (known_[0] <= at_rest * mass * speed) terms = std::max(terms, mass * speed);  // rows hold it at rest
     blocks_[0].scale = std::max(known_[0], part() * std::max(terms, m_ > 0 ? impulse_scale(impulse) : 0.0));
     if (m_ == 0) return;
-    const double mass = largest_entry(momentum_.mass(0).data(), momentum_.mass(0).size());
-    const double velocity = std::max(largest_entry(x.data(), n_ * s_), mass > 0.0 ? terms / mass : 0.0);
+    const double velocity = std::max(speed, mass > 0.0 ? terms / mass : 0.0);
     blocks_[1].scale = std::max(known_[1], scale_of(part() * form_size(rows_) * velocity));
   }
 

@@ -1,0 +1,43 @@
+#include <fmt/format.h>
+
+#include <cmath>
+#include <diracstep/command/arguments.hpp>
+#include <diracstep/command/verbs/run_times.hpp>
+#include <diracstep/core/numerics/errors.hpp>
+
+namespace diracstep::command {
+
+namespace {
+
+constexpr double most_chosen_times = 1e8;
+
+}  // namespace
+
+std::vector<double> chosen_times(const RunArguments& options, const CatalogueScene& entry, double end) {
+  if (!options.at.empty()) return numbers("--at", options.at);
+  if (!options.every_time) return {};
+  const double start = entry.scene->start.time,
+               count = std::floor(std::abs(end - start) / *options.every_time + 1e-9);
+  if (count > most_chosen_times)
+    throw Misuse(fmt::format("--every-time {:g} asks for {:g} points; {:g} are the most", *options.every_time,
+                             count, most_chosen_times));
+  std::vector<double> times;
+  for (double k = 0.0; k <= count; ++k)
+    times.push_back(start + std::copysign(k * *options.every_time, end - start));
+  return times;
+}
+
+void require_within(const std::vector<double>& times, const Integrator& integrator, long steps) {
+  const double step = integrator.options().step, start = integrator.scene().start.time;
+  const double end = start + static_cast<double>(steps) * step;
+  double last = start;
+  for (const double t : times) {
+    if (!((t - last) * step >= -1e-9 * step * step && (end - t) * step >= -1e-9 * step * step))
+      throw Misuse(
+          fmt::format("--at: t = {:g} does not lie between t = {:g}, the time before, and t = {:g}, the end",
+                      t, last, end));
+    last = t;
+  }
+}
+
+}  // namespace diracstep::command

@@ -1,0 +1,107 @@
+#include <algorithm>
+#include <cmath>
+#include <diracstep/core/integrator/step_division.hpp>
+
+/// Which kinks a part of a step crosses, by the signs of the switching functions.
+namespace diracstep {
+
+namespace {
+
+constexpr double nearly_all = 0.98, shorter = 0.9;  // of a step
+constexpr double reach_of_estimates = 2.0;          // in changes within a step
+constexpr double reach_of_motion = 2.0;             // in changes within the part before
+
+}  // namespace
+
+/// By the velocity of the class of p, or by its estimate: where rows act, that is not of the method's order.
+void StepDivision::read(double t, const State& at, bool exactly, Vector& switches) {
+  velocity_ = at.v;
+  if (exactly && !reader_->velocity(t, at.q, at.p, velocity_).ok()) velocity_ = at.v;
+  switches.resize(kinks_->count());
+  kinks_->evaluate(t, at.q, velocity_, switches);
+}
+
+/// The number of a kink that lies between before_ and after_; -1 where none.
+int StepDivision::first_change() const {
+  for (Eigen::Index k = 0; k < after_.size(); ++k)
+    if (kinks_->kinds()[static_cast<std::size_t>(k)] == Kinks::Kind::kink && before_[k] * after_[k] < 0.0)
+      return static_cast<int>(k);
+  return -1;
+}
+
+/// The number of a kink at which the motion comes to be soon, by its change within the part solved last; -1
+/// where none.
+int StepDivision::ahead(const Vector& here) const {
+  if (changes_.size() != here.size()) return -1;
+  for (Eigen::Index k = 0; k < here.size(); ++k)
+    if (kinks_->kinds()[static_cast<std::size_t>(k)] == Kinks::Kind::kink &&
+        std::abs(here[k]) <= reach_of_motion * changes_[k])
+      return static_cast<int>(k);
+  return -1;
+}
+
+/// Just behind where the motion would cross a kink first with its velocity at the start of a step, in parts
+/// of it, where its end is on this side again: a step far too large for what is behind the kink turns it back
+/// within itself.  0 where it would not.
+double StepDivision::place_ahead(Interval step, const State& start) {
+  constexpr int halvings = 12;
+  const auto crosses_by = [&](double place) {
+    position_ = start.q + place * step.size * start_velocity_;
+    kinks_->evaluate(step.start + place * step.size, position_, start_velocity_, between_);
+    for (Eigen::Index k = 0; k < between_.size(); ++k)
+      if (kinks_->kinds()[static_cast<std::size_t>(k)] == Kinks::Kind::kink && before_[k] * after_[k] > 0.0 &&
+          between_[k] * before_[k] < 0.0)
+        return true;
+    return false;
+  };
+  between_.resize(kinks_->count());
+  if (!crosses_by(1.0)) return 0.0;
+  double low = 0.0, high = 1.0;
+  for (int k = 0; k < halvings; ++k) {
+    const double place = 0.5 * (low + high);
+    (crosses_by(place) ? high : low) = place;
+  }
+  return high < nearly_all ? high / nearly_all : shorter;
+}
+
+/// Where between the ends of a step, in parts of it, a kink is on another side than at both; 0 where none.
+double StepDivision::hidden_place(Interval step, const State& start, const State& end) {
+  if (start.q.size() != start.v.size()) return 0.0;  // points that cannot be subtracted
+  if (const double place = place_ahead(step, start); place > 0.0) return place;
+  velocity_ = (end.q - start.q) / step.size;
+  speed_up_ = velocity_ - start.v;  // in the time of the step
+  for (const double place : {0.5, 0.25, 0.75}) {
+    position_ = start.q + place * step.size * velocity_ - 0.5 * place * (1.0 - place) * step.size * speed_up_;
+    between_.resize(kinks_->count());
+    speed_ = velocity_ + (place - 0.5) * speed_up_;
+    kinks_->evaluate(step.start + place * step.size, position_, speed_, between_);
+    bool nearer = false;
+    for (Eigen::Index k = 0; k < between_.size(); ++k) {
+      if (kinks_->kinds()[static_cast<std::size_t>(k)] != Kinks::Kind::kink ||
+          !(before_[k] * after_[k] > 0.0))
+        continue;
+      if (between_[k] * before_[k] < 0.0) return place;
+      nearer = nearer || std::abs(between_[k]) < 0.5 * std::min(std::abs(before_[k]), std::abs(after_[k]));
+    }
+    if (!nearer) return 0.0;  // what is no nearer to zero in the middle is taken to have none
+  }
+  return 0.0;
+}
+
+bool StepDivision::crosses(Interval step, const State& start, const State& end) {
+  const double end_time = step.start + step.size;
+  read(step.start, start, false, before_);
+  start_velocity_ = velocity_;
+  read(end_time, end, false, after_);
+  changes_ = (after_ - before_).cwiseAbs();
+  if (hidden_place(step, start, end) > 0.0) return true;
+  const auto nearest = before_.cwiseAbs().cwiseMin(after_.cwiseAbs()).array();
+  const auto change = (after_ - before_).cwiseAbs().array();
+  if (!(before_.array() * after_.array() <= 0.0 || nearest <= reach_of_estimates * change).any())
+    return false;
+  read(step.start, start, true, before_);
+  read(end_time, end, true, after_);
+  return first_change() >= 0;
+}
+
+}  // namespace diracstep

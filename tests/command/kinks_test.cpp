@@ -1,0 +1,222 @@
+/// Runs across kinks and jumps of the formulas, against closed forms.
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "run_command.hpp"
+
+namespace diracstep::testing {
+namespace {
+
+using Json = nlohmann::json;
+
+class KinksOfARun : public Command {
+ protected:
+  static double at_end(const Outcome& outcome, const char* what, const char* name) {
+    return Json::parse(outcome.out)["end"][what][name].get<double>();
+  }
+  static bool says(const Outcome& outcome, const std::string& words) {
+    return outcome.err.find(words) != std::string::npos;
+  }
+};
+
+/// An oscillator that is pushed by 0.5 below x = 0.3 and by `beyond` above.
+std::string pushed_oscillator(double beyond) {
+  return "lagrangian = \"v_x^2/2 - x^2/2\"\n[coordinates]\nx = {}\n[parameters]\nbeyond = " +
+         std::to_string(beyond) +
+         "\n[force]\nx = \"if(x > 0.3, beyond, 0.5)\"\n[start]\nv_x = 1\n[span]\nend = 1\nstep = 0.1\n";
+}
+
+/// x = 0.5 − 0.5 cos t + sin t until x = 0.3, then an oscillation about `beyond`.
+double pushed_position(double beyond) {
+  double low = 0.0, high = 1.0;
+  for (int k = 0; k < 100; ++k) {
+    const double t = 0.5 * (low + high);
+    (0.5 - 0.5 * std::cos(t) + std::sin(t) > 0.3 ? high : low) = t;
+  }
+  const double v = 0.5 * std::sin(high) + std::cos(high), s = 1.0 - high;
+  return beyond + (0.3 - beyond) * std::cos(s) + v * std::sin(s);
+}
+
+/// A method with a node at the end of its steps has the order it states across a jump of the force, whether
+/// the force points back there or on.
+TEST_F(KinksOfARun, KeepTheOrderOfMethodsWithANodeAtTheEnd) {
+  struct Case {
+    const char* method;
+    int order;
+    double step;
+  };
+  for (const double beyond : {-1.0, 2.0})
+    for (const Case& it :
+         {Case{"damped/radau:2", 3, 0.1}, Case{"damped/radau:3", 5, 0.25}, Case{"type1/trapezoidal", 2, 0.1},
+          Case{"type1/right", 1, 0.05}, Case{"type1/left", 1, 0.05}}) {
+      double errors[2];
+      for (int k = 0; k < 2; ++k) {
+        const Outcome outcome =
+            run("run " + scene("pushed", pushed_oscillator(beyond)) + " --json --method " + it.method +
+                " --step " + std::to_string(it.step / (k + 1)));
+        ASSERT_EQ(outcome.status, 0) << it.method << outcome.err;
+        errors[k] = std::abs(at_end(outcome, "q", "x") - pushed_position(beyond));
+      }
+      EXPECT_GT(std::log2(errors[0] / errors[1]), it.order - 0.5) << it.method << ' ' << beyond;
+      EXPECT_LT(std::log2(errors[0] / errors[1]), it.order + 1.0) << it.method << ' ' << beyond;
+    }
+}
+
+TEST_F(KinksOfARun, AreDoubtedWhereACompositionStepsOverThemAndBack) {
+  const std::string file = scene("pushed", pushed_oscillator(-1.0));
+  const Outcome outcome = run("run " + file + " --method type1/trapezoidal --order 4");
+  EXPECT_EQ(outcome.status, 3) << outcome.err;
+  EXPECT_TRUE(says(outcome, "the force jumps at t = ")) << outcome.err;
+  const Outcome midpoint = run("run " + file + " --method type1/midpoint --order 4 --json");
+  EXPECT_EQ(midpoint.status, 0) << midpoint.err;
+  EXPECT_NEAR(at_end(midpoint, "q", "x"), pushed_position(-1.0), 1e-6);
+}
+
+/// From 1 by −0.8, 0.6, −0.4, 0.2 to rest in 0 at t = 5π, where the friction holds.
+TEST_F(KinksOfARun, ARefusalOfDryFrictionGivesThatReasonAlone) {
+  const std::string rest = R"toml(
+[coordinates]
+x = {}
+[force]
+x = "if(v_x > 0, -0.1, 0.1)"
+[start]
+x = 1
+[span]
+end = 20
+step = 0.1
+)toml";
+  const std::string file = scene("friction", "lagrangian = \"v_x^2/2 - x^2/2\"" + rest);
+  const Outcome turned = run("run " + file + " --end 5 --json");
+  EXPECT_EQ(turned.status, 0) << turned.err;
+  EXPECT_NEAR(at_end(turned, "q", "x"), -0.1 - 0.7 * std::cos(5.0 - M_PI), 1e-9);
+  for (const char* how : {"", " --method damped/radau:3 --step 0.1", " --method damped/radau:3 --adaptive"}) {
+    const Outcome outcome = run("run " + file + how);
+    EXPECT_EQ(outcome.status, 1) << how << outcome.err;
+    EXPECT_TRUE(says(outcome, "points back from both sides")) << how << outcome.err;
+    EXPECT_FALSE(says(outcome, "initial guess poor")) << how << outcome.err;
+  }
+}
+
+/// Between two walls of stiffness 1e4: each contact lasts π/100.
+TEST_F(KinksOfARun, VariableStepsFromAFreeFlightFindTheWall) {
+  const std::string file = scene("walls", R"toml(
+lagrangian = "v_x^2/2 - 1e4*max(0, x)^2/2 - 1e4*max(0, -1 - x)^2/2"
+[coordinates]
+x = {}
+[start]
+x = -0.5
+v_x = 1
+[span]
+end = 10
+step = 0.05
+)toml");
+  const double contact = M_PI / 100.0, left = 10.0 - 4.0 * (2.0 + 2.0 * contact) - 1.5 - 2.0 * contact;
+  for (const auto& [method, tolerance] : {std::pair{"type1/gl:3", 2e-5}, std::pair{"type1/midpoint", 0.05}}) {
+    const Outcome outcome = run("run " + file + " --adaptive --json --method " + method);
+    EXPECT_EQ(outcome.status, 0) << method << outcome.err;
+    if (outcome.status != 0) continue;
+    EXPECT_NEAR(at_end(outcome, "q", "x"), -1.0 + left, tolerance) << method;
+    EXPECT_NEAR(at_end(outcome, "v", "x"), 1.0, tolerance) << method;
+  }
+}
+
+/// A contact of 1e6 that a formula switches on: ω h is 100 at the first step and 0.1 at the last.  A step of
+/// GL(3) over all of the contact ends beside the motion by a part of what the contact takes, 3 ms.
+TEST_F(KinksOfARun, AContactThatIsTooStiffForTheStepIsFollowedOrDoubted) {
+  const std::string file = scene("contact", R"toml(
+lagrangian = "v_y^2/2 - 10*y"
+[coordinates]
+y = {}
+[force]
+y = "if(y < 0, -1e6*y, 0)"
+[start]
+y = 1
+[span]
+end = 3
+step = 0.1
+)toml");
+  const double g = 10.0, k = 1e6, omega = std::sqrt(k), v = std::sqrt(2.0 * g), fall = std::sqrt(2.0 / g);
+  const double contact = (2.0 * M_PI - 2.0 * std::atan2(v / omega, g / k)) / omega,
+               phase = std::fmod(3.0, 2.0 * fall + contact), exact = 1.0 - g * phase * phase / 2.0;
+  ASSERT_LT(phase, fall) << "falls from the top again";
+  for (const char* step : {"0.1", "0.05", "0.02", "0.01"}) {
+    const Outcome outcome = run("run " + file + " --json --step " + step);
+    EXPECT_TRUE(outcome.status == 3 || std::abs(at_end(outcome, "q", "y") - exact) < 1e-3)
+        << step << outcome.out;
+  }
+  const Outcome fine = run("run " + file + " --json --step 1e-4");
+  EXPECT_EQ(fine.status, 0);
+  EXPECT_NEAR(at_end(fine, "q", "y"), exact, 1e-9);
+}
+
+/// mod(t, 0.1) − 0.05 rises through zero in the middle of each tenth and falls at its end.
+TEST_F(KinksOfARun, EventsOnFunctionsThatJumpDoNotDependOnTheStep) {
+  const std::string file = scene("wrap", R"toml(
+lagrangian = "v_x^2/2"
+[coordinates]
+x = {}
+[states]
+n = {}
+[start]
+v_x = 1
+[span]
+end = 0.99
+step = 0.03
+[[events]]
+name = "wrap"
+when = "mod(t, 0.1) - 0.05"
+set = { n = "n + 1" }
+)toml");
+  for (const char* step : {"0.01", "0.03", "0.05", "0.1", "0.2"}) {
+    const Outcome outcome = run("run " + file + " --json --step " + step);
+    ASSERT_EQ(outcome.status, 0) << step << outcome.err;
+    EXPECT_EQ(at_end(outcome, "q", "n"), 19.0) << step;
+  }
+}
+
+/// A heavy coordinate at rest: what is beside it by 1e-13 of a velocity has a momentum of 1e3.
+TEST_F(KinksOfARun, AHeavyCoordinateAtRestAmplifiesNothing) {
+  const std::string file = scene("mixed", R"toml(
+lagrangian = "v_x^2/2 - x^2/2 + M*v_y^2/2 - M*y^2/2"
+[coordinates]
+x = {}
+y = {}
+[parameters]
+M = 1
+[start]
+x = 1
+[span]
+end = 1
+step = 0.1
+)toml");
+  for (const char* mass : {"1e12", "1e16", "1e20"}) {
+    const Outcome outcome = run("run " + file + " --json --set M=" + mass);
+    ASSERT_EQ(outcome.status, 0) << mass << outcome.err;
+    EXPECT_NEAR(at_end(outcome, "q", "x"), std::cos(1.0), 1e-10) << mass;
+  }
+}
+
+TEST_F(KinksOfARun, ABodyHeldAtRestStaysThere) {
+  const Outcome outcome = run("run " + scene("held", R"toml(
+[[body]]
+name = "a"
+mass = 1
+inertia = [0.1, 0.1, 0.1]
+position = [0, 0, 0]
+orientation = { axis = [0, 0, 1], angle = 0.5 }
+[[joint]]
+name = "j"
+kind = "revolute"
+between = ["ground", "a"]
+point = [0, 0, 0]
+axis = [0, 0, 1]
+[span]
+end = 1
+step = 0.01
+)toml") + " --json");
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_NEAR(at_end(outcome, "q", "a_q0"), std::cos(0.25), 1e-12);
+}
+
+}  // namespace
+}  // namespace diracstep::testing

@@ -1,0 +1,87 @@
+#include <cmath>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "run_command.hpp"
+
+/// The error that a run states, and the work that it takes for it.
+namespace diracstep::testing {
+namespace {
+
+using Json = nlohmann::json;
+
+class StatedErrors : public Command {};
+
+TEST_F(StatedErrors, AnErrorThatEqualRunsWouldStateIsNotStated) {
+  const Outcome outcome = run("run vertical_rolling_disk --end 1 --step 10 --error 1e-6 --json");
+  const Json json = Json::parse(outcome.out);
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_LT(json["error_q"].get<double>(), 1e-6);
+  EXPECT_TRUE(json["error_control"]["estimate"].is_number());
+  long last = 0;
+  for (const Json& one : json["error_control"]["runs"]) {
+    EXPECT_GT(one["steps"].get<long>(), last);
+    last = one["steps"];
+  }
+}
+
+TEST_F(StatedErrors, TheFileHoldsTheAcceptedRun) {
+  for (const char* options : {"pendulum_cartesian --error 1e-7", "kepler_e099 --error 1e-6",
+                              "knife_edge --error 1e-6 --rule midpoint --method type1/trapezoidal"}) {
+    const Outcome stated = run(std::string("run ") + options + " --json");
+    ASSERT_EQ(stated.status, 0) << stated.err;
+    const Json end = Json::parse(stated.out)["end"];
+    ASSERT_EQ(run(std::string("run ") + options + " --out " + path("run.csv")).status, 0);
+    const auto rows = lines(contents(path("run.csv")));
+    const auto names = fields(rows.front()), values = fields(rows.back());
+    for (std::size_t i = 0; i < names.size(); ++i)
+      if (end["q"].contains(names[i])) {
+        EXPECT_EQ(std::stod(values[i]), end["q"][names[i]].get<double>()) << options << ' ' << names[i];
+      }
+  }
+}
+
+TEST_F(StatedErrors, ARuleAskedForIsThatOfTheAcceptedRun) {
+  const Outcome outcome = run("run knife_edge --error 1e-4 --rule midpoint --json");
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_TRUE(Json::parse(outcome.out)["method"].get<std::string>().starts_with("type1/midpoint"));
+}
+
+TEST_F(StatedErrors, FixedStepsCanBeAskedFor) {
+  const Outcome fixed = run("run chaplygin_sleigh --error 1e-5 --fixed --json");
+  ASSERT_EQ(fixed.status, 0) << fixed.err;
+  EXPECT_EQ(Json::parse(fixed.out)["error_control"]["adaptive"], false);
+  expect_misuse("run kepler_e06 --error 1e-5 --fixed --adaptive", {"--fixed", "--adaptive"});
+}
+
+TEST_F(StatedErrors, TheWorkIsLimitedAndTheBestAnswerShown) {
+  const Outcome outcome =
+      run("run kepler_e06 --error 1e-9 --method type1/midpoint --fixed --max-solves 20000 --json");
+  EXPECT_EQ(outcome.status, 1);
+  const Json json = Json::parse(outcome.out);
+  EXPECT_LE(json["error_control"]["solves"].get<long>(), 20000);
+  EXPECT_NE(json["status"].get<std::string>().find("--max-solves"), std::string::npos);
+  EXPECT_TRUE(json["end"].is_object());
+  EXPECT_TRUE(json["error_control"]["estimate"].is_number());
+  const Outcome late = run("run toda_200 --end 1e5 --error 1e-9 --max-time 0.5 --json");
+  EXPECT_EQ(late.status, 1);
+  EXPECT_NE(late.err.find("--max-"), std::string::npos) << late.err;
+}
+
+TEST_F(StatedErrors, VariableStepsFromRestEnd) {
+  for (const char* force : {"t", "t^4"}) {
+    const std::string file =
+        scene("ramp", "lagrangian = \"v_x^2/2\"\n[coordinates]\nx = {}\n[force]\nx = \"" +
+                          std::string(force) + "\"\n[start]\nx = 0\n[span]\nend = 2.0\nstep = 0.1\n");
+    const Outcome outcome = run("run " + file + " --adaptive --json", "timeout 20");
+    ASSERT_EQ(outcome.status, 0) << force << outcome.err;
+    const double exact = std::string(force) == "t" ? 8.0 / 6.0 : 64.0 / 30.0;
+    EXPECT_NEAR(Json::parse(outcome.out)["end"]["q"]["x"].get<double>(), exact, 1e-6);
+  }
+  const Outcome limited = run("run kepler_e099 --adaptive --max-steps 10");
+  EXPECT_EQ(limited.status, 1);
+  EXPECT_NE(limited.err.find("10 steps did not reach the end"), std::string::npos) << limited.err;
+}
+
+}  // namespace
+}  // namespace diracstep::testing
