@@ -8,7 +8,7 @@ namespace diracstep {
 namespace {
 
 /// Seven lines of a scene that moves along x until t = 2.
-const std::string good =
+const std::string moves_along_x =
     "name = \"a\"\nlagrangian = \"v_x^2/2\"\n[coordinates]\nx = {}\n[span]\nend = 2\nstep = 0.1\n";
 
 struct Bad {
@@ -17,7 +17,7 @@ struct Bad {
   const char* told;
 };
 
-std::string refusal(const std::string& text) {
+std::string told_of(const std::string& text) {
   try {
     static_cast<void>(scene_from_text("scene.toml", text));
   } catch (const Misuse& misuse) {
@@ -27,9 +27,9 @@ std::string refusal(const std::string& text) {
 }
 
 void expect_told(const std::vector<Bad>& all) {
-  ASSERT_EQ(refusal(good), "");
+  ASSERT_EQ(told_of(moves_along_x), "");
   for (const Bad& bad : all) {
-    const std::string told = refusal(good + bad.rest);
+    const std::string told = told_of(moves_along_x + bad.rest);
     EXPECT_EQ(told.find(std::string("scene.toml:") + bad.place + ": "), 0U) << bad.rest << told;
     EXPECT_NE(told.find(bad.told), std::string::npos) << bad.rest << told;
   }
