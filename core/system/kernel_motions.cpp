@@ -46,7 +46,7 @@ void divide_coordinates(const Columns& mass, FirstOrderMotions& motions) {
 
 /// A basis of the kernel; without a column where there is none.
 Columns kernel_of_rows(const Columns& rows, Eigen::Index n) {
-  if (rows.rows() == 0) return Columns::Identity(n, n);
+  if (rows.size() == 0) return Columns::Identity(n, n);
   Eigen::FullPivLU<Columns> lu;
   lu.setThreshold(1e-11);
   lu.compute(rows);

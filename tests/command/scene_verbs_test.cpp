@@ -77,6 +77,7 @@ TEST_F(SceneVerbs, ExpandPrintsAPlainSceneThatRunsToTheSameBits) {
 
 TEST_F(SceneVerbs, CheckNamesRedundantRows) {
   const std::string file = "'" + made() + "'";
+  change("class = ", "redundant = \"refuse\"\nclass = ");
   change("[start]", "[[rows]]\nname = \"twin\"\nequation = \"3*(x^2 + z^2) = 3*r^2\"\n\n[start]");
   const Outcome outcome = run("check " + file);
   EXPECT_EQ(outcome.status, 1);
