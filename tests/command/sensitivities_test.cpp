@@ -183,7 +183,7 @@ TEST_F(FitVerb, RefusesDataThatAreNone) {
   refused("t,z\n1,2\n", "no coordinate, velocity or output");
   refused("x,t\n1,2\n", "expected t");
   refused("t,x\n1,two\n", "expected finite numbers");
-  refused("t,x\n1\n", "fields");
+  refused("t,x\n1\n", "1 columns; expected 2");
   refused("t,x\n", "no lines");
   refused("t,x\n2,1\n1,1\n", "does not follow");
   EXPECT_EQ(run("fit chaplygin_sleigh " + data_ + " --parameters mass").status, 2);
