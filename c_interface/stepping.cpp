@@ -45,7 +45,10 @@ StepReport step(StepChecks& checks, FixedMotion& motion) {
   if (!checks.pushed) return motion.step();
   checks.pushed->before(motion.stepper());
   StepReport report = motion.step();
-  if (report.ok() && !motion.acted()) checks.pushed->after(motion.stepper());
+  if (report.ok() && !motion.acted()) {
+    checks.pushed->after(motion.stepper());
+    checks.pushed->finish(motion.stepper());  // with the force of this step
+  }
   if (motion.acted()) checks.begin_anew();
   return report;
 }

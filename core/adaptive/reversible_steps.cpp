@@ -24,12 +24,14 @@ bool AdaptiveIntegrator::measure(bool growth) {
   const SolveReport report = meter_->motion().velocity(t, main_.position(), main_.momentum(), v_);
   // At a kink just crossed it is measured where no difference reaches across.
   const double ahead = main_.kinks_passed().empty() ? 0.0 : beside_kink * next_size_;
-  const Vector at = ahead == 0.0 ? main_.position() : Vector(main_.position() + ahead * v_);
+  const auto rate_at = [&](const Vector& q) {
+    return growth ? meter_->rate_and_growth(t + ahead, q, v_, next_size_)
+                  : meter_->rate(t + ahead, q, v_, next_size_);
+  };
   if (!report.ok())
     rate_ = {0.0, 0.0, std::string("no velocity for the monitor: ") + describe(report.status)};
   else
-    rate_ = growth ? meter_->rate_and_growth(t + ahead, at, v_, next_size_)
-                   : meter_->rate(t + ahead, at, v_, next_size_);
+    rate_ = ahead == 0.0 ? rate_at(main_.position()) : rate_at(main_.position() + ahead * v_);
   if (!rate_.ok()) return false;
   if (const double largest = largest_rate(); rate_.rate > largest) rate_ = {largest, 0.0, {}};
   report_.slowest = std::min(report_.slowest, rate_.rate);

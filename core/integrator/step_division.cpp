@@ -13,7 +13,14 @@ constexpr int most_tries = 60, most_halvings = 12, most_returns = 2, most_hidden
 constexpr int most_behind = 12, most_crossings = 16;
 constexpr double towards_zero = 15.0 / 16.0;  // of the way that is left, in one try from the near side
 constexpr double ways_across = 4.0;           // of that way, for the part across
+constexpr double nodes_before = 0.005;        // of a part: the way to its end from the last node within it
 constexpr double finest_part = 1e-14, returned_within = 1e-6;  // of the step
+
+/// The shortest way to the end of a part that a zero is looked for in.
+double finest_of(const Interval& part) {
+  return std::max(finest_part * std::abs(part.size),
+                  4.0 * std::numeric_limits<double>::epsilon() * std::abs(part.start));
+}
 
 }  // namespace
 
@@ -154,53 +161,75 @@ bool StepDivision::cross(int number, Interval& across, const State& from, Work& 
   return false;
 }
 
-/// Shortens a part, which was solved last, so that it ends before the zero of one function by a round-off of
-/// the time, with the functions of the near side at every node; its size may become 0.  The zero is come to
-/// from the near side alone: a step over it has those of the far side at its end, so that its own zero is
-/// another one.
-bool StepDivision::shorten_before(int number, Interval& part, const State& from, Work& work) {
-  const double finest = std::max(finest_part * std::abs(part.size),
-                                 4.0 * std::numeric_limits<double>::epsilon() * std::abs(part.start));
+/// Comes to the zero of one function, within the part solved last, from the near side alone, so that the
+/// functions at all nodes are those of the near side: a step over the zero has those of the far side at some,
+/// so that its own zero is another one, or no solution.  Ends where the way that is left is below `within` of
+/// the part; false where the zero is not found.
+bool StepDivision::approach(int number, const Interval& part, const State& from, double within, Approach& to,
+                            Work& work) {
   const auto near_side = [&](double value) { return before_[number] * value > 0.0; };
-  double low = 0.0, at_low = before_[number], solved = part.size;
-  double zero = part.size * at_low / (at_low - after_[number]);
+  to = {0.0, before_[number], part.size * before_[number] / (before_[number] - after_[number])};
   if (near_side(after_[number])) {
-    if (std::abs(after_[number]) >= std::abs(at_low)) return false;
-    low = part.size;
-    at_low = after_[number];
+    if (std::abs(after_[number]) >= std::abs(to.value)) return false;
+    to.size = part.size;
+    to.value = after_[number];
   }
-  Guess guess = low == 0.0 ? Guess::plain : Guess::last_solution;
+  const double finest = finest_of(part);
+  Guess guess = to.size == 0.0 ? Guess::plain : Guess::last_solution;
   int behind = 0;
-  for (int k = 0; k < most_tries && std::abs(zero - low) > finest; ++k) {
-    const double next = low + towards_zero * (zero - low);
-    solved = next;
+  for (int k = 0;
+       k < most_tries && std::abs(to.zero - to.size) > std::max(finest, within * std::abs(to.size)); ++k) {
+    const double next = to.size + towards_zero * (to.zero - to.size);
     if (solve_part({part.start, next}, from, guess, work) && near_side(after_[number])) {
-      const double slope = (after_[number] - at_low) / (next - low);
-      zero = slope * before_[number] * part.size < 0.0 ? next - after_[number] / slope : 2.0 * next - low;
-      low = next;
-      at_low = after_[number];
+      const double slope = (after_[number] - to.value) / (next - to.size);
+      to.zero =
+          slope * before_[number] * part.size < 0.0 ? next - after_[number] / slope : 2.0 * next - to.size;
+      to.size = next;
+      to.value = after_[number];
       guess = Guess::last_solution;
       continue;
     }
     if (++behind > most_behind) return false;
-    zero = low + 0.5 * (next - low);
+    to.zero = to.size + 0.5 * (next - to.size);
     guess = Guess::plain;
   }
-  to_zero_ = std::abs(zero - low);
-  part.size = low;
-  return low == 0.0 || solved == low ||
-         (solve_part(part, from, Guess::plain, work) && near_side(after_[number]));
+  return true;
 }
 
-/// Shortens a part, which was solved last, so that it ends behind the zero of one function.
+/// Shortens a part, which was solved last, so that it ends before the zero of one function by a round-off of
+/// the time; its size may become 0.
+bool StepDivision::shorten_before(int number, Interval& part, const State& from, Work& work) {
+  Approach to;
+  if (!approach(number, part, from, 0.0, to, work)) return false;
+  to_zero_ = std::abs(to.zero - to.size);
+  part.size = to.size;
+  return part.size == 0.0 ||
+         (solve_part(part, from, Guess::plain, work) && before_[number] * after_[number] > 0.0);
+}
+
+/// Shortens a part, which was solved last, so that it ends behind the zero of one function.  Of a method
+/// whose nodes lie within its steps, a part that is hardly longer than to the zero has all of them before it.
 bool StepDivision::shorten(int number, Interval& part, const State& from, Work& work) {
-  double low = 0.0, high = part.size, at_low = before_[number], at_high = after_[number];
-  const double finest = std::max(finest_part * std::abs(part.size),
-                                 4.0 * std::numeric_limits<double>::epsilon() * std::abs(part.start));
+  const double finest = finest_of(part), whole = part.size, at_whole = after_[number];
+  Approach to;
+  if (!approach(number, part, from, nodes_before, to, work)) return false;
   const auto solve = [&](double size, Guess guess) {
     part.size = size;
     return solve_part(part, from, guess, work);
   };
+  double low = to.size, at_low = to.value, high = to.zero, at_high = to.value;
+  const double beyond = std::copysign(std::max(std::abs(to.zero - low), 0.5 * finest), whole);
+  for (int k = 0; before_[number] * at_high >= 0.0; ++k) {
+    high = low + std::ldexp(beyond, k);
+    if (std::abs(high) > std::abs(whole)) {
+      high = whole;
+      at_high = at_whole;
+    } else if (solve(high, Guess::plain)) {
+      at_high = after_[number];
+    } else {
+      return false;
+    }
+  }
   for (int k = 0; k < most_tries && std::abs(high - low) > finest; ++k) {
     double next = k % 3 == 2 ? 0.5 * (low + high) : low - at_low * (high - low) / (at_high - at_low);
     const double margin = std::min(0.5 * finest, 0.25 * std::abs(high - low));  // so that both ends close in

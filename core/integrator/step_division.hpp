@@ -13,8 +13,9 @@ namespace diracstep {
 /// as of contacts, clipped forces, dry friction on the way.
 ///
 /// A step at whose end a switching function has another sign than at its start is solved again, shorter,
-/// until it ends a round-off of the time behind the zero, by a bracketed secant method on its size; the rest
-/// follows.  Of a method with a node at the end of its steps, which would take the functions of the far side
+/// until it ends a round-off of the time behind the zero, by a secant method on its size; the rest follows.
+/// The zero is come to from the near side, since a step with nodes behind a jump has another zero or no
+/// solution.  Of a method with a node at the end of its steps, which would take the functions of the far side
 /// there for all of a part, the part ends a round-off before the zero, and one of that size leads across.  A
 /// pair of zeros within a step shows in no sign at its end: it is looked for at three places
 /// along a parabola through the ends, whose curvature is that of the mean velocities of this and the last
@@ -49,6 +50,12 @@ class StepDivision {
   void add_pulses(Interval step, std::vector<double>& times) { times_.add_pulses(step, times); }
 
  private:
+  /// A part that ends before the zero of a function, with the value there, and the size that the zero is
+  /// taken to be at.
+  struct Approach {
+    double size, value, zero;
+  };
+
   void read(double t, const State& at, bool exactly, Vector& switches);
   bool crosses(Interval step, const State& start, const State& end);
   double place_ahead(Interval step, const State& start);
@@ -58,6 +65,7 @@ class StepDivision {
   bool solve_part(Interval part, const State& from, Guess guess, Work& work);
   void keep(const Interval& part, State& from);
   bool follow(const State& start, Work& work);
+  bool approach(int number, const Interval& part, const State& from, double within, Approach& to, Work& work);
   bool shorten_before(int number, Interval& part, const State& from, Work& work);
   bool cross(int number, Interval& across, const State& from, Work& work);
   bool shorten(int number, Interval& part, const State& from, Work& work);

@@ -49,7 +49,7 @@ class RunChecks {
     kinks_.after(integrator);
     jumps_.after(integrator.kinks_passed(), integrator, integrator);
     work_.after(integrator);
-    step_.after(integrator);  // behind those that ask for the kinks of the step
+    step_.after(integrator);
     growth_.at_node(integrator);
   }
   void see(const Sample& point) {
@@ -58,7 +58,10 @@ class RunChecks {
     work_.see(point);
   }
   /// Where the run has come to its end.
-  void finish(Integrator& integrator) { growth_.finish(integrator, step_.part_of_motion()); }
+  void finish(Integrator& integrator) {
+    step_.finish(integrator);
+    growth_.finish(integrator, step_.part_of_motion());
+  }
 
   /// Empty, or the doubts, one after the other.
   std::string text() const {

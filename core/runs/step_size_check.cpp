@@ -43,30 +43,33 @@ void StepSizeCheck::compare(Integrator& integrator) {
   comparison_.add(start_, integrator.options().step, whole_, parts_);
 }
 
-/// Between the kinks of the last step, and from the last of them to its end.
-void StepSizeCheck::look_behind_kinks(Integrator& integrator) {
+void StepSizeCheck::keep_kinks(Integrator& integrator) {
   if (++over_kinks_ < next_over_kinks_) return;
   next_over_kinks_ = over_kinks_ < fewest_looks ? over_kinks_ + 1 : 2 * over_kinks_;
-  const std::vector<KinkPassed> kinks(integrator.kinks_passed().begin(), integrator.kinks_passed().end());
+  if (!integrator.sample(Momentum::projected, end_).ok()) return;
+  kinks_.assign(integrator.kinks_passed().begin(), integrator.kinks_passed().end());
+}
+
+/// Between the kinks of the last step, and from the last of them to its end.
+void StepSizeCheck::look_behind_kinks(Integrator& integrator) {
   const Snapshot state = integrator.save();
-  Sample end;
-  if (!integrator.sample(Momentum::projected, end).ok()) return;
-  for (std::size_t k = 0; k < kinks.size(); ++k) {
-    const bool last = k + 1 == kinks.size();
-    const double size = (last ? end.time : kinks[k + 1].time) - kinks[k].time,
+  for (std::size_t k = 0; k < kinks_.size(); ++k) {
+    const bool last = k + 1 == kinks_.size();
+    const double size = (last ? end_.time : kinks_[k + 1].time) - kinks_[k].time,
                  first = StepComparison::first_part * size;
     if (!(std::abs(size) > shortest_part * std::abs(integrator.options().step)) ||
-        !integrator.sample(kinks[k], Momentum::projected, start_).ok())
+        !integrator.sample(kinks_[k], Momentum::projected, start_).ok())
       continue;
     if (last)
-      whole_ = end;
-    else if (!integrator.sample(kinks[k + 1], Momentum::projected, whole_).ok())
+      whole_ = end_;
+    else if (!integrator.sample(kinks_[k + 1], Momentum::projected, whole_).ok())
       continue;
-    integrator.restart(kinks[k].time, kinks[k].at.q, kinks[k].at.p, start_.v);
+    integrator.restart(kinks_[k].time, kinks_[k].at.q, kinks_[k].at.p, start_.v);
     if (integrator.step(first).ok() && integrator.step(size - first).ok() &&
         integrator.sample(Momentum::projected, parts_).ok())
       comparison_.add(start_, size, whole_, parts_);
   }
+  kinks_.clear();
   integrator.restore(state);
 }
 

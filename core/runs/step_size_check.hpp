@@ -3,6 +3,7 @@
 #include <diracstep/core/integrator/integrator.hpp>
 #include <diracstep/core/runs/step_comparison.hpp>
 #include <string>
+#include <vector>
 
 namespace diracstep {
 
@@ -21,8 +22,9 @@ class StepSizeCheck {
   StepSizeCheck(const Integrator& integrator, long steps);
 
   /// Around each step of the run; for most of them a comparison of numbers.  What the integrator tells of the
-  /// kinks of the last step is lost by after().
+  /// last step, its kinks and stages, stays until before(): what is left behind its kinks is looked at there.
   void before(Integrator& integrator) {
+    if (!kinks_.empty()) look_behind_kinks(integrator);
     const bool due = integrator.work().steps == next_look_;
     if (due) next_look_ += between_looks_;
     if (due || fast_) divide(integrator);
@@ -30,7 +32,11 @@ class StepSizeCheck {
   void after(Integrator& integrator) {
     if (divided_) compare(integrator);
     follow(integrator);
-    if (!integrator.kinks_passed().empty()) look_behind_kinks(integrator);
+    if (!integrator.kinks_passed().empty()) keep_kinks(integrator);
+  }
+  /// Behind the last step.
+  void finish(Integrator& integrator) {
+    if (!kinks_.empty()) look_behind_kinks(integrator);
   }
 
   /// Empty, or a line that names the worst step so far.
@@ -43,12 +49,15 @@ class StepSizeCheck {
   void divide(Integrator& integrator);
   void compare(Integrator& integrator);
   void follow(const Integrator& integrator);
+  void keep_kinks(Integrator& integrator);
   void look_behind_kinks(Integrator& integrator);
 
   StepComparison comparison_;
   long between_looks_, next_look_;
   bool divided_ = false, fast_;
   long over_kinks_ = 0, next_over_kinks_ = 1;  ///< steps that crossed some
+  std::vector<KinkPassed> kinks_;              ///< of the last step, where they are looked at
+  Sample end_;                                 ///< of that step
   double largest_change_ = 0.0;                ///< of the velocity in a step
   Vector velocity_;
   Sample start_, whole_, parts_;

@@ -37,6 +37,27 @@ double pushed_position(double beyond) {
   return beyond + (0.3 - beyond) * std::cos(s) + v * std::sin(s);
 }
 
+/// Dry friction written as a jump, past turning points where the spring holds against it on both sides: the
+/// motion is made of half oscillations about ±F/k.
+TEST_F(KinksOfARun, DryFrictionGoesOnPastItsTurningPoints) {
+  const double k = 10.0, friction = 0.6, end = 1.2, w = std::sqrt(k), half = M_PI / w, offset = friction / k;
+  for (const double start : {0.3, 0.42, 0.65, 0.9, 1.13, 1.3})
+    for (const double step : {0.05, 0.01}) {
+      const Outcome outcome =
+          run("run " +
+              scene("dry",
+                    "lagrangian = \"v_x^2/2 - 10*x^2/2\"\n[coordinates]\nx = {}\n[force]\n"
+                    "x = \"-0.6*if(v_x > 0, 1, -1)\"\n[start]\nx = " +
+                        std::to_string(start) + "\n[span]\nend = 1.2\nstep = 0.05\n") +
+              " --json --step " + std::to_string(step));
+      ASSERT_EQ(outcome.status, 0) << start << ' ' << step << outcome.err;
+      const double turned = 2.0 * offset - start;  // at t = half
+      EXPECT_NEAR(at_end(outcome, "q", "x"), -offset + (turned + offset) * std::cos(w * (end - half)),
+                  step > 0.02 ? 1e-8 : 1e-12)
+          << start << ' ' << step;
+    }
+}
+
 /// A method with a node at the end of its steps has the order it states across a jump of the force, whether
 /// the force points back there or on.
 TEST_F(KinksOfARun, KeepTheOrderOfMethodsWithANodeAtTheEnd) {

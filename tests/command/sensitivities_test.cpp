@@ -193,17 +193,23 @@ TEST_F(FitVerb, RefusesDataThatAreNone) {
 /// The time at which a jump of the force is crossed moves with the start; where the force has a kink alone,
 /// that changes nothing.
 TEST_F(SensitivitiesOfRuns, AJumpOfTheForceOnTheWayIsDoubted) {
-  const auto outcome_of = [&](const std::string& potential) {
+  const auto outcome_of = [&](const std::string& potential, const std::string& more = "") {
     std::ofstream(path("valley.toml"))
         << "name = \"valley\"\nlagrangian = \"v_x^2/2 - " + potential +
                "\"\n[coordinates]\nx = {}\n[parameters]\na = 1\n[start]\nx = 1\n"
                "[span]\nend = 2.7\nstep = 0.1\n";
-    return run("run '" + path("valley.toml") + "' --sensitivities a,q0");
+    return run("run '" + path("valley.toml") + "' --sensitivities a,q0" + more);
   };
   const Outcome jump = outcome_of("a*abs(x)");
   EXPECT_EQ(jump.status, 3) << jump.out;
   EXPECT_NE(jump.err.find("jump of the force"), std::string::npos) << jump.err;
-  EXPECT_EQ(outcome_of("a*(x^2 + max(0, -x)^2)/2").status, 0);
+  // Such a motion is as large as its start, and the derivative by it is the motion from a start of 1.
+  const Outcome kink = outcome_of("a*(x^2 + max(0, -x)^2)/2", " --json");
+  ASSERT_EQ(kink.status, 0) << kink.err;
+  const Json json = Json::parse(kink.out);
+  for (const char* of : {"q", "v"})
+    EXPECT_NEAR(json["sensitivities"]["x(0)"][of]["x"].get<double>(), json["end"][of]["x"].get<double>(),
+                1e-10);
 }
 
 }  // namespace
