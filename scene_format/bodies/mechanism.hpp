@@ -25,6 +25,7 @@ struct Body {
   Vec rate = zero_vector();  ///< in the body; in the plane the third component
   bool velocity_given = false, rate_given = false;
   bool position_given = false;
+  bool laid_between = false;  ///< by `from` and `to`: in the plane its axis lies in it
   bool guess = false;  ///< position and orientation are moved onto the rows
   Shape shape = Shape::none;
   Vec size =
