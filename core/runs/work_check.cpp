@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/core/runs/work_check.hpp>
 #include <sstream>
 #include <utility>
@@ -25,6 +26,7 @@ WorkCheck::WorkCheck(const Integrator& integrator)
       damped_(integrator.method().damped),
       watched_(changes_by_force_alone(scene_)),
       to_{integrator.time(), integrator.position(), integrator.velocity_estimate()},
+      rest_(scene_),
       force_(Vector::Zero(scene_.dimension())) {
   if (watched_) power_ = power(to_.time, to_.q, to_.v);
 }
@@ -66,6 +68,7 @@ void WorkCheck::see(const Sample& point) {
   if (!begun_) {
     begun_ = true;
     start_energy_ = point.energy;
+    start_time_ = point.time;
     return;
   }
   Integral work = work_;
@@ -85,12 +88,16 @@ void WorkCheck::see(const Sample& point) {
   off_by_ = point.time;
   change_ = change;
   done_ = work.value;
+  if (!doubted()) return;
+  rest_.see(point);  // where nothing moves but round-off, it does all the work there is
+  rounding_ = std::max(
+      {rounding_, at_rest * std::abs(start_energy_), at_rest * rest_.energy(point.time - start_time_)});
 }
 
 bool WorkCheck::doubted() const {
-  if (damped_) return off_ > too_much_taken * at_play_;
-  return off_ > (order_ < order_that_keeps_energy ? too_far_off_at_low_order : too_far_off) *
-                    std::max(at_play_, turned_over_);
+  if (damped_) return off_ > std::max(too_much_taken * at_play_, rounding_);
+  const double part = order_ < order_that_keeps_energy ? too_far_off_at_low_order : too_far_off;
+  return off_ > std::max({part * at_play_, part * turned_over_, rounding_});
 }
 
 std::string WorkCheck::text() const {
