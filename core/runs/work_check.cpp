@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <diracstep/core/numerics/scales.hpp>
+#include <diracstep/core/runs/rest_sizes.hpp>
 #include <diracstep/core/runs/work_check.hpp>
 #include <sstream>
 #include <utility>
@@ -18,6 +19,13 @@ bool changes_by_force_alone(const Scene& scene) {
          std::ranges::all_of(scene.constraints, [](const auto& rows) { return rows->workless(); });
 }
 
+/// Of an energy: that of the start, and what forces, which balance in a scene at rest, do in the time so far.
+double round_off(const Scene& scene, double start_energy, const Sample& point) {
+  RestSizes rest(scene);
+  rest.see(point);
+  return at_rest * std::max(std::abs(start_energy), rest.energy(point.time - scene.start.time));
+}
+
 }  // namespace
 
 WorkCheck::WorkCheck(const Integrator& integrator)
@@ -26,7 +34,6 @@ WorkCheck::WorkCheck(const Integrator& integrator)
       damped_(integrator.method().damped),
       watched_(changes_by_force_alone(scene_)),
       to_{integrator.time(), integrator.position(), integrator.velocity_estimate()},
-      rest_(scene_),
       force_(Vector::Zero(scene_.dimension())) {
   if (watched_) power_ = power(to_.time, to_.q, to_.v);
 }
@@ -68,7 +75,6 @@ void WorkCheck::see(const Sample& point) {
   if (!begun_) {
     begun_ = true;
     start_energy_ = point.energy;
-    start_time_ = point.time;
     return;
   }
   Integral work = work_;
@@ -84,20 +90,20 @@ void WorkCheck::see(const Sample& point) {
   const double lost = work.value - change;
   const double off = (damped_ ? lost : std::abs(lost)) - quadrature_errors * work.error;
   if (!(off > off_)) return;
-  off_ = off;
+  const double before = std::exchange(off_, off);
+  if (doubted() && off <= round_off(scene_, start_energy_, point)) {
+    off_ = before;
+    return;
+  }
   off_by_ = point.time;
   change_ = change;
   done_ = work.value;
-  if (!doubted()) return;
-  rest_.see(point);  // where nothing moves but round-off, it does all the work there is
-  rounding_ = std::max(
-      {rounding_, at_rest * std::abs(start_energy_), at_rest * rest_.energy(point.time - start_time_)});
 }
 
 bool WorkCheck::doubted() const {
-  if (damped_) return off_ > std::max(too_much_taken * at_play_, rounding_);
+  if (damped_) return off_ > too_much_taken * at_play_;
   const double part = order_ < order_that_keeps_energy ? too_far_off_at_low_order : too_far_off;
-  return off_ > std::max({part * at_play_, part * turned_over_, rounding_});
+  return off_ > part * std::max(at_play_, turned_over_);
 }
 
 std::string WorkCheck::text() const {

@@ -2,7 +2,6 @@
 
 #include <diracstep/core/integrator/integrator.hpp>
 #include <diracstep/core/runs/path_cubic.hpp>
-#include <diracstep/core/runs/rest_sizes.hpp>
 #include <string>
 
 namespace diracstep {
@@ -47,11 +46,9 @@ class WorkCheck {
   PathPoint from_, to_;
   double power_ = 0.0;  ///< at to_
   Integral work_;
-  RestSizes rest_;
-  double rounding_ = 0.0;     ///< of an energy, where there was a doubt
   double turned_over_ = 0.0;  ///< ∫ |f·v| dt, by steps
   Vector force_, q_, v_;
-  double start_energy_ = 0.0, start_time_ = 0.0, at_play_ = 0.0;
+  double start_energy_ = 0.0, at_play_ = 0.0;
   double off_ = 0.0, off_by_ = 0.0;   ///< the most so far, quadrature errors deducted, and when
   double change_ = 0.0, done_ = 0.0;  ///< of the energy, and by the forces, until then
 };
