@@ -30,7 +30,7 @@ step = 0.1
 TEST_F(StudyCommand, JsonHasTheKeysOfTheContract) {
   const Outcome outcome = run("study knife_edge --json " + small);
   ASSERT_EQ(outcome.status, 0) << outcome.err;
-  EXPECT_TRUE(outcome.err.starts_with("diracstep: version ")) << outcome.err;
+  EXPECT_TRUE(outcome.err.starts_with("diracstep: version: ")) << outcome.err;
   const Json study = Json::parse(outcome.out)["studies"][0];
   EXPECT_EQ(study["scene"], "knife_edge");
   EXPECT_EQ(study["t_end"], 5.0);

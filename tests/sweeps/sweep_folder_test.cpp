@@ -177,19 +177,21 @@ TEST_F(SweepFolder, AFailedMemberTellsHowFarItCame) {
 lagrangian = "v_x^2/2"
 [coordinates]
 x = {}
+[parameters]
+x0 = 0.1
 [[rows]]
 name = "grows"
 equation = "v_x - x^2 = 0"
 [start]
-x = 0.1
-v_x = "x^2"
+x = "x0"
+v_x = "x0^2"
 [span]
 end = 1
 step = 0.02
 )");
   const Sweep sweep = read_sweep(write("s.toml", R"(scene = "grows.toml"
 [grid]
-"start.x" = [0.1, 2]
+x0 = [0.1, 2]
 [record]
 values = ["x"]
 )"));
