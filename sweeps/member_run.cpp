@@ -209,6 +209,7 @@ MemberResult MemberRuns::run_without_events(const CatalogueScene& entry, const I
   const RunReport report =
       run_steps(integrator, steps, Momentum::projected, recorded.needs_every_point() ? 1 : steps, see,
                 checks ? &*checks : nullptr);
+  if (!report.last.ok()) end.time = integrator.time();  // not every node was seen
   return result_of(report.last.failure, checks ? checks->text() : "", entry, end, recorded);
 }
 
@@ -293,7 +294,8 @@ MemberResult MemberRuns::search(const CatalogueScene& entry) const {
   wanted.max_time =
       std::numeric_limits<double>::infinity();  // solves alone, so that the answer is the same anywhere
   const ErrorControlReport found = solve_to_error(entry.scene, registry_, solvers_, *sweep_.end, wanted);
-  if (!found.ok()) return {MemberResult::Status::failed, found.refusal, found.end.time, {}};
+  if (!found.ok())  // no answer, though runs may have come some way
+    return {MemberResult::Status::failed, found.refusal, unknown_number, {}};
   return {found.warning.empty() ? MemberResult::Status::ok : MemberResult::Status::doubted, found.warning,
           found.end.time, Recorded(sweep_, entry).numbers(entry, found.end)};
 }

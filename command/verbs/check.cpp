@@ -101,8 +101,9 @@ std::string as_text(const CatalogueScene& entry, const Examination& examination)
   std::vector<std::vector<std::string>> rows{{"examined", "result", "detail"}};
   for (const Finding& finding : examination.findings)
     rows.push_back({finding.what, finding.passed ? "pass" : "FAIL", finding.detail});
-  std::string text = fmt::format("{}: {}\n\n{}\nformulas: {}\n", entry.scene->name, entry.description,
-                                 aligned(rows), entry.code);
+  const std::string described = entry.description.empty() ? "" : ": " + entry.description;
+  std::string text =
+      fmt::format("{}{}\n\n{}\nformulas: {}\n", entry.scene->name, described, aligned(rows), entry.code);
   for (const auto& advice : examination.advice) text += "advice: " + advice + '\n';
   return text;
 }

@@ -71,6 +71,12 @@ GuessedMotion guess_of_control(const ControlArguments& arguments, const ControlP
                        conditions.value.tail(n));
 }
 
+/// 0 where it is round-off beside others of its kind.
+std::string shown_of(double value, double largest) {
+  constexpr double round_off = 1e-15;
+  return fmt::format("{:.10g}", std::abs(value) <= round_off * largest ? 0.0 : value);
+}
+
 std::string control_text(const OptimalControlReport& report, const ControlProblem& problem,
                          const std::string& method) {
   const Scene& scene = *problem.controlled.scene;
@@ -83,7 +89,8 @@ std::string control_text(const OptimalControlReport& report, const ControlProble
   for (int i = 0; i < std::min(n, most_coordinates_of_control); ++i) {
     auto& row = rows.emplace_back(std::vector<std::string>{scene.coordinates[static_cast<std::size_t>(i)]});
     for (const Eigen::Index k : {Eigen::Index{0}, last})
-      for (const Columns* of : {&report.q, &report.v}) row.push_back(fmt::format("{:.10g}", (*of)(i, k)));
+      for (const Columns* of : {&report.q, &report.v})
+        row.push_back(shown_of((*of)(i, k), of->row(i).cwiseAbs().maxCoeff()));
   }
   text += aligned(rows);
   if (n > most_coordinates_of_control)
@@ -92,8 +99,9 @@ std::string control_text(const OptimalControlReport& report, const ControlProble
   std::vector<std::vector<std::string>> controls{{"control", "least", "greatest"}};
   for (std::size_t k = 0; k < problem.controlled.controls.size(); ++k) {
     const auto values = report.controls.row(static_cast<Eigen::Index>(k));
-    controls.push_back({problem.controlled.controls[k], fmt::format("{:.10g}", values.minCoeff()),
-                        fmt::format("{:.10g}", values.maxCoeff())});
+    const double largest = values.cwiseAbs().maxCoeff();
+    controls.push_back({problem.controlled.controls[k], shown_of(values.minCoeff(), largest),
+                        shown_of(values.maxCoeff(), largest)});
   }
   text += '\n' + aligned(controls) + fmt::format("\ncost: {:.12g}\n", report.cost);
   return text + fmt::format("a run with these controls ends off by: {:.2g}\n", report.end_of_run);

@@ -20,6 +20,7 @@
 #include <diracstep/reports/study_comparison.hpp>
 #include <diracstep/reports/study_page.hpp>
 #include <diracstep/reports/study_plot.hpp>
+#include <diracstep/scene_format/position_names.hpp>
 #include <diracstep/scene_format/scene_file.hpp>
 #include <diracstep/solvers/sundials_build.hpp>
 #include <filesystem>
@@ -221,7 +222,10 @@ void study(const StudyArguments& options, Session& session) {
     return study_gradients({options.scenes, options.set, options.end, options.out, options.json}, session);
   require_files(options, session);
   std::vector<CatalogueScene> scenes = chosen_scenes(options, session);
-  std::ranges::for_each(scenes, tell_baselines_left_out);
+  for (const CatalogueScene& entry : scenes) {
+    require_flat(*entry.scene, "study");
+    tell_baselines_left_out(entry);
+  }
   const StudyOptions chosen = study_options(options);
   const std::string before = options.compare.empty() ? "" : earlier_study(options.compare);
   std::optional<OutputDirectory> out = report_directory(options);
@@ -231,7 +235,8 @@ void study(const StudyArguments& options, Session& session) {
     const double passed = thread_seconds() - begin;
     return limited(options) ? std::max(0.0, quick_time - passed) : std::numeric_limits<double>::infinity();
   };
-  for (const auto& [name, value] : build_facts()) say(fmt::format("{}: {}", name, value));
+  for (const auto& [name, value] : build_facts())
+    say(fmt::format("{}: {}", name == "diracstep" ? "version" : name, value));
   const Screen screen(options, out.has_value());
   Course course(std::move(scenes), chosen, session, !nothing_named(options));
   std::vector<Study> studies;

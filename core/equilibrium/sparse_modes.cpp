@@ -93,9 +93,9 @@ double change_of(const SparseMatrix& from, const SparseMatrix& to) {
   return size > 0.0 ? (to - from).norm() / size : to.norm();
 }
 
-/// Of the matrices with the same forces of rows.
+/// Of the matrices with the same forces of rows; `reach` is a size of coordinates that round-off may be of.
 double variation_of(const Scene& scene, const ForceBalance& here, const Equilibrium& at, const Vector& lambda,
-                    double later) {
+                    double later, double reach) {
   double largest = 0.0;
   for (const double part : {0.382, 0.618}) {
     const double t = part * (later - at.time);
@@ -107,7 +107,7 @@ double variation_of(const Scene& scene, const ForceBalance& here, const Equilibr
       largest = std::max(largest, change_of(here.*matrix, there.*matrix));
     Vector left = there.forces;
     if (lambda.size() > 0) left -= there.one_forms.transpose() * lambda;
-    const double size = there.sizes.lpNorm<Eigen::Infinity>();
+    const double size = there.sizes.lpNorm<Eigen::Infinity>() + reach * largest_of(here.stiffness);
     if (size > 0.0) largest = std::max(largest, left.lpNorm<Eigen::Infinity>() / size);
   }
   return largest;
@@ -145,7 +145,8 @@ NearestModes nearest_modes(const Scene& given, const Equilibrium& at, int count,
   balance.set_multipliers(lambda);
   NearestModes result;
   result.near = near.value_or(1e-3 * fastest_rate(balance));
-  result.variation = variation_of(*scene, balance, at, lambda, later);
+  const double reach = std::max(given.start.q.lpNorm<Eigen::Infinity>(), at.q.lpNorm<Eigen::Infinity>());
+  result.variation = variation_of(*scene, balance, at, lambda, later, reach);
   const ShiftInverse map(balance, result.near,
                          result.near != 0.0 ? std::abs(result.near) : fastest_rate(balance));
   if (map.singular())

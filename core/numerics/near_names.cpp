@@ -32,7 +32,9 @@ std::string near_name(std::string_view given, const std::vector<std::string>& kn
   const std::string_view name = given.substr(0, longest);
   const auto nearest = std::ranges::min_element(
       known, {}, [&](const std::string& candidate) { return distance(name, candidate); });
-  if (distance(name, *nearest) <= std::max<std::size_t>(1, given.size() / 3)) return *nearest;
+  // One letter is no misspelling of another.
+  const std::size_t allowed = given.size() == 1 ? 0 : std::max<std::size_t>(1, given.size() / 3);
+  if (distance(name, *nearest) <= allowed) return *nearest;
   const auto begun = [&](const std::string& candidate) { return candidate.starts_with(name); };
   return std::ranges::count_if(known, begun) == 1 ? *std::ranges::find_if(known, begun) : "";
 }

@@ -22,13 +22,13 @@ from .integrator import Gradient, Integrator, Jacobian, State
 from .run import Ensemble, Event, Points, Run, Search, Statistics
 from .scene import Scene
 from .study import Study
-from .symbols import (acos, acosh, asin, asinh, atan, atan2, atanh, cos, cosh, exp, log, maximum, minimum, pi, sin, sinh, sqrt, tan,
-                      tanh)
+from .symbols import (acos, acosh, asin, asinh, atan, atan2, atanh, cos, cosh, exp, log, maximum, minimum, pi, sign, sin, sinh, sqrt,
+                      tan, tanh)
 
 __version__ = version()
 
 __all__ = ["CallbackCost", "Doubt", "Ensemble", "Equilibrium", "Error", "Event", "Failure", "Fit", "GeneratingFunction",
            "Gradient", "Integrator", "Interrupted", "Jacobian", "Misuse", "Points", "Run", "Scene", "Search", "SolvedStart",
            "State", "Statistics", "Study", "acos", "acosh", "asin", "asinh", "atan", "atan2", "atanh", "catalogue", "cos",
-           "cosh", "exp", "load", "log", "maximum", "methods", "minimum", "parse", "pi", "sin", "sinh", "sqrt", "sweep", "tan",
-           "tanh", "version"]
+           "cosh", "exp", "load", "log", "maximum", "methods", "minimum", "parse", "pi", "sign", "sin", "sinh", "sqrt", "sweep",
+           "tan", "tanh", "version"]

@@ -70,22 +70,24 @@ class Verbs:
                 call += ["--set", f"{name}={value!r}"]
         if self._scene._again["drop_redundant"] and verb != "fit":
             call += ["--drop-redundant"]
-        return call_command(verb, call, self._scene._again["plugins"], self._scene.name)
+        return call_command(verb, call, self._scene._again["plugins"], self._scene.name, self.folder)
 
     def tolerances(self) -> list[str]:
         return [text for name, value in self._scene._tolerances.items() for text in ("--tolerance", f"{name}={value!r}")]
 
 
-def call_command(verb: str, arguments: Sequence[str], plugins: Sequence[str], name: str) -> Any:
-    """The document that a verb gives; ``name`` stands before a doubt."""
+def call_command(verb: str, arguments: Sequence[str], plugins: Sequence[str], name: str, folder: Path | None = None) -> Any:
+    """The document that a verb gives; ``name`` stands before a doubt, and paths in ``folder``, which nobody will find, are shown
+    without it."""
     loaded = [text for plugin in plugins for text in ("--plugin", os.fspath(plugin))]
     done = subprocess.run([_command(), verb, *arguments, *loaded, "--json"], capture_output=True, text=True, check=False)
+    told = _told(done.stderr if folder is None else done.stderr.replace(f"{folder}{os.sep}", ""))
     if done.returncode == 2:
-        raise Misuse(_told(done.stderr))
+        raise Misuse(told)
     if done.returncode == 3:
-        warnings.warn(f"{name}: {_told(done.stderr)}", Doubt, stacklevel=5)
+        warnings.warn(f"{name}: {told}", Doubt, stacklevel=5)
     elif done.returncode != 0:
-        raise Failure(_told(done.stderr))
+        raise Failure(told)
     return json.loads(done.stdout)
 
 

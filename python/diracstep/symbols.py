@@ -13,7 +13,7 @@ from typing import Any, Callable, Iterable
 import numpy as np
 
 __all__ = ["Expression", "Column", "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "asinh", "acosh",
-           "atanh", "exp", "log", "sqrt", "atan2", "minimum", "maximum", "pi"]
+           "atanh", "exp", "log", "sign", "sqrt", "atan2", "minimum", "maximum", "pi"]
 
 pi = math.pi
 
@@ -194,6 +194,7 @@ atanh = _function("atanh", np.arctanh)
 exp = _function("exp", np.exp)
 log = _function("log", np.log)
 sqrt = _function("sqrt", np.sqrt)
+sign = _function("sign", np.sign)
 atan2 = _function("atan2", np.arctan2)
 minimum = _function("min", np.minimum)
 maximum = _function("max", np.maximum)
@@ -221,7 +222,7 @@ _UFUNCS: dict[str, Callable[..., Any]] = {
     "log10": lambda a: log(a) / math.log(10.0),
     "exp2": lambda a: 2**a,
     "sin": sin, "cos": cos, "tan": tan, "arcsin": asin, "arccos": acos, "arctan": atan, "sinh": sinh, "cosh": cosh,
-    "tanh": tanh, "arcsinh": asinh, "arccosh": acosh, "arctanh": atanh, "exp": exp, "log": log, "sqrt": sqrt,
+    "tanh": tanh, "arcsinh": asinh, "arccosh": acosh, "arctanh": atanh, "exp": exp, "log": log, "sqrt": sqrt, "sign": sign,
     "arctan2": atan2, "minimum": minimum, "maximum": maximum, "fmin": minimum, "fmax": maximum,
 }
 

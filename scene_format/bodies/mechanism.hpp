@@ -25,7 +25,8 @@ struct Body {
   Vec rate = zero_vector();  ///< in the body; in the plane the third component
   bool velocity_given = false, rate_given = false;
   bool position_given = false;
-  bool guess = false;  ///< position and orientation are moved onto the rows
+  bool laid_between = false;  ///< by `from` and `to`: in the plane its axis lies in it
+  bool guess = false;         ///< position and orientation are moved onto the rows
   Shape shape = Shape::none;
   Vec size =
       zero_vector();  ///< box: edges; ball: radius; cylinder and disc: radius, length along z; rod: length

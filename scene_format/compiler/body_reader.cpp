@@ -221,10 +221,10 @@ void BodyReader::read_shape(const toml::table& table, Body& body, const std::str
   }
   const ShapeKeys& keys = choice(table, "shape", what, shapes());
   body.shape = keys.shape;
-  const bool between = table.contains("from");
+  body.laid_between = table.contains("from");
   std::size_t k = 0;
   for (const char* key : keys.sizes) {
-    if (between && std::string_view(key) == "length") {
+    if (body.laid_between && std::string_view(key) == "length") {
       body.size[k++] = norm(end_to_end(table, body, what));
       continue;
     }
@@ -241,7 +241,7 @@ void BodyReader::read_shape(const toml::table& table, Body& body, const std::str
                      fmt::format("'size' of {}: edges must be above 0", what));
   }
   body.inertia = inertia_of(body.shape, body.mass, body.size);
-  if (body.plane && body.shape == Body::Shape::rod)
+  if (body.plane && (body.shape == Body::Shape::rod || body.laid_between))
     body.inertia[2][2] = body.inertia[0][0];  // it lies along x
 }
 
@@ -380,6 +380,10 @@ void BodyReader::draw(const Body& body) {
   Vec size = body.size;
   if (body.shape == Body::Shape::none && !body.plane && body.mass.value() > 0.0 && !body.fixed)
     size = ellipsoid_of(body);
+  if (body.plane && body.shape == Body::Shape::cylinder && body.laid_between) {
+    drawn.shape = shape_name(Body::Shape::box);  // as the plane sees it; a cylinder is drawn along z
+    size = {body.size[1], 2.0 * body.size[0], 2.0 * body.size[0]};
+  }
   for (const Formula& one : size) drawn.size.push_back(text(one));
   if (body.plane) {
     for (const char* last : {"_x", "_y", "_th"}) drawn.coordinates.push_back(body.name + last);

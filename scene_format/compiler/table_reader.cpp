@@ -80,7 +80,9 @@ std::string TableReader::required_string(const toml::table& table, const char* k
 double TableReader::number(const toml::node& node, const std::string& what) const {
   const auto value = node.value<double>();
   if (!(node.is_integer() || node.is_floating_point()) || !value || !std::isfinite(*value))
-    fail(place_of(node.source()), fmt::format("'{}': expected a finite number", what));
+    fail(place_of(node.source()),
+         fmt::format("'{}': expected a finite number{}", what,
+                     node.is_string() ? "; a formula belongs in [definitions]" : ""));
   return *value;
 }
 

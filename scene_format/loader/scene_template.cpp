@@ -11,7 +11,7 @@ constexpr const char* body = R"toml(description = "A bead on a hoop that turns a
 source = "where the data come from"
 
 # The Lagrangian in the coordinates x, their velocities v_x, the time t and the parameters.
-# There are + - * / ^ ( ) pi, sin cos tan asin acos atan atan2 sinh cosh tanh asinh acosh atanh exp log sqrt abs
+# There are + - * / ^ ( ) pi, sin cos tan asin acos atan atan2 sinh cosh tanh asinh acosh atanh exp log sqrt abs sign
 # pow min max, rate(f) for df/dt, diff(f, x), and sum(i = 1..N, …) over repeated coordinates.
 # A Hamiltonian in p_x can stand in its place:  hamiltonian = "p_x^2/(2*m) + …"
 lagrangian = "m*(v_x^2 + v_z^2)/2 + m*omega^2*x^2/2 - m*g*z"

@@ -186,6 +186,18 @@ TEST_F(EquilibriumVerb, AFewModesBySparseMatricesAreThoseOfFullOnes) {
   }
 }
 
+/// At u = 0, found from sin(2πx), forces are round-off of what was moved: no change with the time.
+TEST_F(EquilibriumVerb, SparseModesOfAFieldWithoutTimeAreNotDoubted) {
+  if (!has_sparse_modes()) GTEST_SKIP() << "built without Spectra";
+  std::ofstream(path("string.toml"))
+      << "name = \"string\"\ndissipation = \"integral(0.2*u_t^2/2)\"\n[field]\n"
+         "density = \"u_t^2/2 - u_x^2/2\"\nspace = \"lobatto:3\"\ncells = 10\nlength = 1\n"
+         "boundary = \"periodic\"\n[coordinates]\nu = {}\n[start]\nu = \"sin(2*pi*x)\"\n"
+         "[span]\nend = 1\nstep = 0.02\n";
+  const auto all = eigenvalues_in(found("'" + path("string.toml") + "' --modes 4"));  // status 0
+  ASSERT_FALSE(all.empty());
+}
+
 /// With nonholonomic rows, along a motion, near a negative number: capsize of the bicycle at 5 m/s.
 TEST_F(EquilibriumVerb, SparseModesKnowNonholonomicRows) {
   if (!has_sparse_modes()) GTEST_SKIP() << "built without Spectra";

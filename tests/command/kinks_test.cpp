@@ -83,6 +83,20 @@ TEST_F(KinksOfARun, KeepTheOrderOfMethodsWithANodeAtTheEnd) {
     }
 }
 
+/// x'' = −sign x from x = 1 at rest: parabolas that meet at t = √2, whose steps the method solves exactly.
+TEST_F(KinksOfARun, AreThoseOfSign) {
+  const Outcome outcome =
+      run("run " +
+          scene("sign",
+                "lagrangian = \"v_x^2/2\"\n[coordinates]\nx = {}\n[force]\nx = \"-sign(x)\"\n"
+                "[start]\nx = 1\n[span]\nend = 2\nstep = 0.1\n") +
+          " --json");
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  const double s = 2.0 - std::sqrt(2.0);
+  EXPECT_NEAR(at_end(outcome, "q", "x"), -std::sqrt(2.0) * s + s * s / 2.0, 1e-10);
+  EXPECT_NEAR(at_end(outcome, "v", "x"), -std::sqrt(2.0) + s, 1e-10);
+}
+
 TEST_F(KinksOfARun, AreDoubtedWhereACompositionStepsOverThemAndBack) {
   const std::string file = scene("pushed", pushed_oscillator(-1.0));
   const Outcome outcome = run("run " + file + " --method type1/trapezoidal --order 4");

@@ -84,6 +84,13 @@ TEST_F(SceneVerbs, CheckNamesRedundantRows) {
   EXPECT_NE(outcome.out.find("rank 1 of 2"), std::string::npos) << outcome.out;
 }
 
+TEST_F(SceneVerbs, CheckOfASceneWithoutADescriptionBeginsWithItsName) {
+  const Outcome outcome = run("check " + scene("plain",
+                                               "lagrangian = \"v_x^2/2\"\n[coordinates]\nx = {}\n"
+                                               "[span]\nend = 1\nstep = 0.1\n"));
+  EXPECT_TRUE(outcome.out.starts_with("plain\n\n")) << outcome.out;
+}
+
 TEST_F(SceneVerbs, CheckSaysWhyTheRecommendedMethodCannotStep) {
   const std::string file = "'" + made() + "'";
   change("order = 4", "order = 3");

@@ -13,9 +13,24 @@ class StudyCommand : public Command {
   const std::string small = "--orders 2,4 --steps 0.1,0.05,0.025 --rtols 1e-6,1e-8 --repeat 2 --end 5";
 };
 
+TEST_F(StudyCommand, ScenesOnManifoldsAreRefusedByName) {
+  const std::string file = scene("top", R"(
+lagrangian = "(w_R[1]^2 + w_R[2]^2 + 2*w_R[3]^2)/2"
+[coordinates]
+R = "SO3"
+[start]
+w_R = [1, 0, 1]
+[span]
+end = 1
+step = 0.1
+)");
+  expect_misuse("study " + file, {"study", "'top'"});
+}
+
 TEST_F(StudyCommand, JsonHasTheKeysOfTheContract) {
   const Outcome outcome = run("study knife_edge --json " + small);
   ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_TRUE(outcome.err.starts_with("diracstep: version: ")) << outcome.err;
   const Json study = Json::parse(outcome.out)["studies"][0];
   EXPECT_EQ(study["scene"], "knife_edge");
   EXPECT_EQ(study["t_end"], 5.0);

@@ -117,9 +117,27 @@ def test_options_are_spelled_as_in_python():
     def circle(rows, y, **options):
         return ds.Scene(["x", "y"], lambda q, v: v @ v / 2 - q.y, rows=rows, q=[1.0, y], **options)
 
+    twice = """name = "twice"
+redundant = "refuse"
+lagrangian = "(v_x^2 + v_y^2)/2 - y"
+[coordinates]
+x = {}
+y = {}
+[[rows]]
+name = "one"
+equation = "x^2 + y^2 = 1"
+[[rows]]
+name = "two"
+equation = "2*x^2 + 2*y^2 = 2"
+[start]
+x = 1
+[span]
+end = 1
+step = 0.1
+"""
     with pytest.raises(ds.Misuse, match='drop them: drop_redundant=True, or redundant = "drop"'):
-        circle(lambda q: [q @ q - 1, 2 * (q @ q) - 2], 0.0).run()
-    assert len(circle(lambda q: [q @ q - 1, 2 * (q @ q) - 2], 0.0, drop_redundant=True).run(steps=1, step=0.1)) == 2
+        ds.parse(twice).run()
+    assert len(ds.parse(twice, drop_redundant=True).run(steps=1, step=0.1)) == 2
     with pytest.raises(ds.Misuse, match="or project_start=True$"):
         circle(lambda q: q @ q - 1, 0.1).run()
     with pytest.raises(ds.Failure, match=r"\(max_time|max_solves"):

@@ -1,5 +1,7 @@
 """Verbs that the command does: equilibrium, start, fit, sweep, study."""
 
+import tempfile
+
 import numpy as np
 import pytest
 
@@ -45,8 +47,9 @@ def test_a_sweep_is_a_table(spring, tmp_path):
     kept = tmp_path / "sweep"
     first = ds.load("pendulum_cartesian").sweep({"g": [5.0, 10.0]}, ["y"], until=0.5, out=kept)
     assert np.array_equal(first, ds.load("pendulum_cartesian").sweep({"g": [5.0, 10.0]}, ["y"], until=0.5, out=kept))
-    with pytest.raises(ds.Misuse, match="'m'"):
+    with pytest.raises(ds.Misuse, match="'m'") as told:
         spring.sweep({"m": [1.0]}, ["x"])
+    assert tempfile.gettempdir() not in str(told.value)
     assert set(table["status"]) == {"ok"}
 
 

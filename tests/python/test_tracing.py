@@ -51,6 +51,11 @@ def test_a_traced_formula_has_the_value_that_python_computes(tree, q, v, k, t):
     assert got == pytest.approx(expected, rel=1e-9, abs=1e-9)
 
 
+def test_sign_is_a_function_of_formulas():
+    scene = ds.Scene(["a", "b"], lambda v: v @ v / 2, q=[0.3, -0.4], invariants={"f": lambda q: np.sign(q.a) + 3 * ds.sign(q.b)})
+    assert scene.run(steps=1, step=0.1)["f"][0] == 1 - 3
+
+
 def test_numpys_arrays_of_symbols_work_as_arrays():
     mass = np.array([[2.0, 0.5], [0.5, 1.0]])
     scene = ds.Scene(["a", "b"], lambda q, v: v @ mass @ v / 2 - np.sum(np.sin(q[:2]) * np.array([1.0, 2.0])), q=[0.3, 0.4],

@@ -171,6 +171,38 @@ e = [0.1, 1.2, 0.9]
   expect_parts(report.reasons[1], {"member 2, doubted"});
 }
 
+/// x = 1/(1/x0 - t) from x0 = 2 has no steps beyond t = 0.5; x0 = 0.1 gets to the end.
+TEST_F(SweepFolder, AFailedMemberTellsHowFarItCame) {
+  write("grows.toml", R"(name = "grows"
+lagrangian = "v_x^2/2"
+[coordinates]
+x = {}
+[parameters]
+x0 = 0.1
+[[rows]]
+name = "grows"
+equation = "v_x - x^2 = 0"
+[start]
+x = "x0"
+v_x = "x0^2"
+[span]
+end = 1
+step = 0.02
+)");
+  const Sweep sweep = read_sweep(write("s.toml", R"(scene = "grows.toml"
+[grid]
+x0 = [0.1, 2]
+[record]
+values = ["x"]
+)"));
+  const SweepReport report = run(sweep, {.folder = path("out")});
+  EXPECT_EQ(report.failed, 1);
+  const std::vector<std::string> whole = fields(rows("out")[1]), failed = fields(rows("out")[2]);
+  EXPECT_EQ(std::stod(whole[3]), 1.0);
+  EXPECT_NEAR(std::stod(failed[3]), 0.5, 0.05);
+  EXPECT_EQ(failed[4], "");
+}
+
 /// A body that falls from h is at the ground at √(2h/g).
 TEST_F(SweepFolder, EventsAreTakenFromEachMember) {
   write("fall.toml", R"(name = "fall"

@@ -25,7 +25,8 @@ constexpr std::size_t longest_ladder = 40;
 constexpr double fewest_steps = 2.0;
 constexpr double natural_eps = 1.0;  // radians of the coarsest variable step
 constexpr double coarsest_local_error = 1e-2, finer_local_error = 10.0, its_cost = 1.5;
-constexpr double smallest_error = 1e-17;              // an error of zero has no logarithm
+constexpr double more_steps = 1.3;        // else the period of a force sets the steps, not their local error
+constexpr double smallest_error = 1e-17;  // an error of zero has no logarithm
 constexpr long most_steps_in_limited_time = 200'000;  // of a baseline: some tenths of a second
 constexpr double near_the_reference = 3.0;    // times its own error: what is smaller shows the reference's
 constexpr double of_a_share = 0.03;           // of a ladder's time, for a run that compares formulations
@@ -247,6 +248,7 @@ class StudyInProgress {
     if (!series.variable) coarsen(series, factor, natural.error());
     double cpu_seconds = natural.cpu_seconds.median, best = natural.error();
     int in_vain = 0;
+    auto steps = static_cast<double>(natural.steps);
     const double smallest = std::isfinite(reference_.self_error) ? reference_.self_error : 0.0;
     for (double step = start / factor; study_.rows.size() < first + longest_ladder; step /= factor) {
       if (cpu_seconds * cost > options_.run_budget)
@@ -258,7 +260,10 @@ class StudyInProgress {
       const StudyRow& row = run_row(series, step, part);
       cpu_seconds = row.cpu_seconds.median;
       if (!row.ok()) continue;
-      in_vain = best < plateau_ceiling && row.error() > improves_little * best ? in_vain + 1 : 0;
+      if (!local || static_cast<double>(row.steps) > more_steps * steps) {
+        in_vain = best < plateau_ceiling && row.error() > improves_little * best ? in_vain + 1 : 0;
+        steps = static_cast<double>(row.steps);
+      }
       best = std::isnan(best) ? row.error() : std::min(best, row.error());
       if (row.error() < smallest) return fmt::format("the reference is known to {:.1e} only", smallest);
       if (in_vain == plateau_length)

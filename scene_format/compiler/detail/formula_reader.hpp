@@ -16,20 +16,32 @@ struct Function {
   bool reference = false;
 };
 
-inline constexpr std::array functions{
-    Function{"sin", Op::sin, 1},     Function{"cos", Op::cos, 1},
-    Function{"tan", Op::tan, 1},     Function{"asin", Op::asin, 1},
-    Function{"acos", Op::acos, 1},   Function{"atan", Op::atan, 1},
-    Function{"atan2", Op::atan2, 2}, Function{"sinh", Op::sinh, 1},
-    Function{"cosh", Op::cosh, 1},   Function{"tanh", Op::tanh, 1},
-    Function{"asinh", Op::asinh, 1}, Function{"acosh", Op::acosh, 1},
-    Function{"atanh", Op::atanh, 1}, Function{"exp", Op::exp, 1},
-    Function{"log", Op::log, 1},     Function{"sqrt", Op::sqrt, 1},
-    Function{"abs", Op::abs, 1},     Function{"pow", Op::pow, 2},
-    Function{"min", Op::min, 2},     Function{"max", Op::max, 2},
-    Function{"floor", Op::floor, 1}, Function{"kepler_E", Op::kepler_E, 2, true},
-    Function{"sn", Op::sn, 2, true}, Function{"cn", Op::cn, 2, true},
-    Function{"dn", Op::dn, 2, true}};
+inline constexpr std::array functions{Function{"sin", Op::sin, 1},
+                                      Function{"cos", Op::cos, 1},
+                                      Function{"tan", Op::tan, 1},
+                                      Function{"asin", Op::asin, 1},
+                                      Function{"acos", Op::acos, 1},
+                                      Function{"atan", Op::atan, 1},
+                                      Function{"atan2", Op::atan2, 2},
+                                      Function{"sinh", Op::sinh, 1},
+                                      Function{"cosh", Op::cosh, 1},
+                                      Function{"tanh", Op::tanh, 1},
+                                      Function{"asinh", Op::asinh, 1},
+                                      Function{"acosh", Op::acosh, 1},
+                                      Function{"atanh", Op::atanh, 1},
+                                      Function{"exp", Op::exp, 1},
+                                      Function{"log", Op::log, 1},
+                                      Function{"sqrt", Op::sqrt, 1},
+                                      Function{"abs", Op::abs, 1},
+                                      Function{"pow", Op::pow, 2},
+                                      Function{"min", Op::min, 2},
+                                      Function{"max", Op::max, 2},
+                                      Function{"floor", Op::floor, 1},
+                                      Function{"sign", Op::sign, 1},
+                                      Function{"kepler_E", Op::kepler_E, 2, true},
+                                      Function{"sn", Op::sn, 2, true},
+                                      Function{"cn", Op::cn, 2, true},
+                                      Function{"dn", Op::dn, 2, true}};
 
 /// Functions with arguments of their own kind.
 inline constexpr std::array<std::string_view, 7> forms{"sum", "rate", "diff", "if", "mod", "and", "or"};

@@ -52,6 +52,15 @@ TEST_F(Control, FindsControlsWithinTheLimitsOfTheirParameters) {
   EXPECT_NE(none.err.find("not converged"), std::string::npos) << none.err;
 }
 
+/// From rest to rest: velocities at both ends are 0 but for round-off, which is shown as 0.
+TEST_F(Control, RoundOffIsShownAsZero) {
+  if (!optimal_control_available()) GTEST_SKIP() << "not checked: built without Ipopt";
+  const Outcome outcome = run("control " + pushed(squares, "v_x^2/2") + " --to x=0 v_x=0");
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  const std::string table = outcome.out.substr(0, outcome.out.find("cost:"));
+  EXPECT_EQ(table.find("e-"), std::string::npos) << table;
+}
+
 TEST_F(Control, AnEndMayHaveACostInPlaceOfAPlace) {
   if (!optimal_control_available()) GTEST_SKIP() << "not checked: built without Ipopt";
   const std::string file = pushed(squares + "end_cost = \"100*(x^2 + v_x^2)\"\n");

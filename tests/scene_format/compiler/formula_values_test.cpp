@@ -225,6 +225,28 @@ step = 0.1
   EXPECT_EQ(fq[0], -1.0);
 }
 
+TEST(FormulaValues, SignIsThatOfItsArgument) {
+  const CatalogueScene entry = scene_from_text("sign.toml", R"toml(
+name = "sign"
+lagrangian = "v_x^2/2"
+[coordinates]
+x = {}
+[force]
+x = "x*sign(x - 1)"
+[span]
+end = 1.0
+step = 0.1
+)toml");
+  Vector f(1), q(1), fq(1), fv(1);
+  for (const auto& [x, sign] : {std::pair{0.5, -1.0}, {1.0, 0.0}, {3.0, 1.0}}) {
+    q[0] = x;
+    entry.scene->force->value(0.0, q, q, f);
+    EXPECT_EQ(f[0], x * sign);
+    entry.scene->force->derivatives(0.0, q, q, fq, fv);
+    EXPECT_EQ(fq[0], sign);
+  }
+}
+
 /// Beside an infinite slope that is not chosen the other one holds.
 TEST(FormulaValues, DerivativeOfAChoiceIsThatOfTheChosen) {
   const CatalogueScene entry = scene_from_text("choice.toml", R"toml(

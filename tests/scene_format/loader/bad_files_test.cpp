@@ -77,6 +77,12 @@ TEST(BadFiles, UnknownKeysNameTheNearest) {
   expect_told(changed("equation", "eqation"), {"bad.toml:13:1", "'equation'"});
 }
 
+TEST(BadFiles, OneLetterIsNoMisspellingOfAnother) {
+  const std::string message = message_of(changed("m*g*y\"", "m*g*k\""));
+  EXPECT_NE(message.find("unknown name 'k'"), std::string::npos) << message;
+  EXPECT_EQ(message.find("did you mean"), std::string::npos) << message;
+}
+
 TEST(BadFiles, FormulasAreToldByLineAndColumn) {
   expect_told(changed("m*g*y\"", "m*gg*y\""), {"bad.toml:2:39", "unknown name 'gg'", "'g'"});
   expect_told(changed("m*g*y\"", "m*g*\""), {"bad.toml:2:41", "expected a number, a name or '('", "the end"});

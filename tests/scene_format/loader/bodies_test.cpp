@@ -106,6 +106,25 @@ joint = [
     EXPECT_NEAR(output(plane, a, force), output(space, b, force), 1e-6) << force;
 }
 
+/// What each shape weighs against a turn in the plane: E = J ω²/2 of a body that only turns.
+TEST_F(Bodies, InThePlaneEachShapeHasItsMoment) {
+  for (const auto& [shape, moment] : {
+           std::pair<std::string, double>{R"("cylinder", radius = 0.3, from = [0, 0], to = [3, 4])",
+                                          2.0 * (3.0 * 0.09 + 25.0) / 12.0},
+           {R"("cylinder", radius = 0.3, length = 5)", 2.0 * 0.09 / 2.0},
+           {R"("rod", from = [0, 0], to = [3, 4])", 2.0 * 25.0 / 12.0},
+           {R"("rod", length = 5, orientation = 1)", 2.0 * 25.0 / 12.0},
+           {R"("disc", radius = 0.3)", 2.0 * 0.09 / 2.0},
+           {R"("sphere", radius = 0.3)", 0.4 * 2.0 * 0.09},
+           {R"("box", size = [3, 4, 7])", 2.0 * 25.0 / 12.0},
+       }) {
+    const CatalogueScene entry = scene(
+        with_span("body = [{ name = \"b\", plane = true, mass = 2, rate = 3, shape = " + shape + " }]\n"));
+    const Start& start = entry.scene->start;
+    EXPECT_NEAR(2.0 * entry.scene->energy(start.time, start.q, start.v) / 9.0, moment, 1e-13) << shape;
+  }
+}
+
 TEST_F(Bodies, ASpringPullsByItsLawAndADamperTakesEnergy) {
   const std::string weight = R"toml(
 body = [{ name = "w", mass = 2, shape = "box", size = [0.1, 0.1, 0.1], position = [0, 0, 1.5], fixed = false }]
