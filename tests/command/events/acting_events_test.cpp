@@ -394,19 +394,5 @@ TEST_F(ActingEvents, AreFoundBehindOneThatJumpsInTheSameStep) {
          1.0 - 19.62 + 19.5, 39.0);
 }
 
-/// mod(x, 0.01) jumps back between its rising zeros, several of them in a step: x = t²/2 up to the switch at
-/// t = 0.3, then 0.045 + 0.3 (t - 0.3).
-TEST_F(ActingEvents, AFunctionThatJumpsBackIsMetOnceForEachZero) {
-  const std::string marks = scene(
-      "name = \"marks\"\nlagrangian = \"v_x^2/2\"\n[coordinates]\nx = {}\n[states]\nu = {}\nn = {}\n"
-      "[force]\nx = \"u\"\n[[events]]\nname = \"clock\"\nevery = 0.3\nset = { u = \"1 - u\" }\n"
-      "[[events]]\nname = \"mark\"\nwhen = \"mod(x, 0.01) - 0.0051\"\ndirection = \"rising\"\n"
-      "set = { n = \"n + 1\" }\n[span]\nend = 0.55\nstep = 0.0625\n");
-  for (const char* step : {"--step 0.0625", "--step 0.01"}) {
-    const Json json = result(marks + " " + step);
-    EXPECT_EQ(json["end"]["q"]["n"].get<double>(), 12.0) << step;  // x = 0.12
-  }
-}
-
 }  // namespace
 }  // namespace diracstep::testing
