@@ -19,6 +19,8 @@ struct ControlledScene {
   /// ℓ and Φ as functions of n + P coordinates (q, u) and (v, 0); Φ does not read u.  Null: none.
   std::shared_ptr<const Lagrangian> cost = {}, end_cost = {};
   Vector lower = {}, upper = {};  ///< bounds of u, P numbers, infinite where there are none; empty: all free
+  /// Where the force and ℓ are not smooth, as functions of (q, v) with any u; null: as the scene has it.
+  std::shared_ptr<const Kinks> kinks = {};
 };
 
 /// So many steps of the size in the options from the start time of the scene on.  The conditions on the ends
@@ -75,8 +77,10 @@ bool optimal_control_available();
 /// the Hessian of Lagrange's function, one block for each step, is a difference of these.  Solved by Ipopt,
 /// an interior-point method (Wächter, Biegler, Math. Program. 106, 2006): a local minimum near the guess.
 ///
-/// Steps are not divided where formulas have kinks.  Throws Misuse without Ipopt, for sizes that disagree,
-/// for Lagrangians linear in v, and where solve_boundary_values() does.
+/// Steps are divided at times at which formulas jump or have kinks whatever the motion, as those of a run
+/// are, but not where the motion crosses a kink in q or v: end_of_run, of a run that divides there, tells.
+/// Throws Misuse without Ipopt, for sizes that disagree, for Lagrangians linear in v, and where
+/// solve_boundary_values() does.
 OptimalControlReport solve_optimal_control(const ControlProblem& problem);
 
 }  // namespace diracstep

@@ -6,6 +6,7 @@
 #include <diracstep/scene_format/loader/named_values.hpp>
 #include <diracstep/scene_format/loader/parameter_values.hpp>
 #include <diracstep/scene_format/loader/scene_functions.hpp>
+#include <diracstep/scene_format/loader/scene_kinks.hpp>
 #include <diracstep/scene_format/parametric_scene_file.hpp>
 #include <diracstep/sensitivities/moved_start.hpp>
 #include <limits>
@@ -113,6 +114,7 @@ ParametricScene load_parametric(const std::string& file, const std::string& text
   if (control != nullptr) {
     control->cost = file_cost(loaded);
     control->end_cost = file_end_cost(loaded);
+    control->kinks = file_kinks(loaded);
   }
   return result;
 }

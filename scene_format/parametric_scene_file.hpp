@@ -26,6 +26,7 @@ struct SceneControl {
   std::shared_ptr<const Force> force;  ///< all of the force by (q, u), as ParametricScene::extended has it
   std::shared_ptr<const Lagrangian> cost, end_cost;  ///< of (q, u), (v, 0); null where there is none
   Vector values, lower, upper;  ///< of u: as the file has it, and its limits, infinite where there are none
+  std::shared_ptr<const Kinks> kinks = {};  ///< of the scene and of the cost, with u as the file has it
 };
 
 /// Of a scene that make_scene() has made from this name and these changes.  Throws Misuse for a file without

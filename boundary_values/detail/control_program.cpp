@@ -34,6 +34,27 @@ class FreeParticles final : public Lagrangian {
   }
 };
 
+/// The kinks of a scene of n coordinates for one that has more behind them.
+class KinksOfFirst final : public Kinks {
+ public:
+  KinksOfFirst(std::shared_ptr<const Kinks> kinks, int n)
+      : Kinks(kinks->kinds(), kinks->names()), kinks_(std::move(kinks)), n_(n) {}
+  void evaluate(double t, ConstVectorRef q, ConstVectorRef v, VectorRef g) const override {
+    kinks_->evaluate(t, q.head(n_), v.head(n_), g);
+  }
+  std::vector<Instant> instants(double first, double last) const override {
+    return kinks_->instants(first, last);
+  }
+
+ private:
+  std::shared_ptr<const Kinks> kinks_;
+  int n_;
+};
+
+std::shared_ptr<const Kinks> with_cost_behind(std::shared_ptr<const Kinks> kinks, int n) {
+  return kinks ? std::make_shared<const KinksOfFirst>(std::move(kinks), n) : nullptr;
+}
+
 /// The scene and so many coordinates of unit mass behind its own.
 Scene with_particles(const Scene& scene, const std::vector<std::string>& coordinates) {
   const int n = static_cast<int>(coordinates.size());
@@ -127,6 +148,7 @@ ControlProgram::ControlProgram(const ControlProblem& problem) : problem_(problem
 
   auto scene = std::make_shared<Scene>(with_particles(*completed(controlled.scene), {"cost"}));
   scene->force = controlled_force(controlled, in_use_, false);
+  scene->kinks = with_cost_behind(controlled.kinks ? controlled.kinks : controlled.scene->kinks, n_);
   integrator_ = std::make_unique<Integrator>(scene, problem.registry, problem.solvers, problem.options);
   const Scene& prepared = integrator_->scene();
   if (!prepared.lagrangian || controlled.scene->lagrangian->structure().phase_space())

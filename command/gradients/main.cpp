@@ -20,6 +20,7 @@
 #include <cmath>
 #include <cstdio>
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/runs/jump_check.hpp>
 #include <diracstep/core/system/saddle_point.hpp>
 #include <diracstep/files/output_file.hpp>
 #include <diracstep/scene_format/scene_catalogue.hpp>
@@ -84,6 +85,19 @@ Measured by_steps(const Scene& scene, const std::shared_ptr<const Scene>& shared
   Measured result{Columns(2 * n, z.cols()), thread_seconds() - before};
   result.derivatives << at_end.q, at_end.v;
   return result;
+}
+
+/// The derivatives of a motion jump where it crosses a jump of the force, of which IDAS knows nothing.
+void require_no_jump(const std::shared_ptr<const Scene>& scene, double end, long steps) {
+  const Registry registry = Registry::with_built_ins();
+  Integrator integrator(
+      scene, registry, kinsol(),
+      {.method = "type1/gl:6", .step = (end - scene->start.time) / static_cast<double>(steps)});
+  for (long k = 0; k < steps && integrator.step().ok(); ++k)
+    if (const auto jump = jump_of_force(integrator.kinks_passed(), integrator, integrator))
+      throw Misuse("scene '" + scene->name + "': the motion crosses a jump of the force at t = " +
+                   to_text(*jump) + ", where the sensitivities of IDAS lack what the moving jump adds: " +
+                   "gradients are not compared");
 }
 
 /// IDAS on the implicit Lagrangian system with multipliers as derivatives (index 1).
@@ -242,6 +256,7 @@ void compare(const std::string& file, const std::string& name, double stated_end
     throw Misuse("scene '" + scene.name + "' has events, which are not differentiated");
   const double end = stated_end != 0.0 ? stated_end : entry.t_end;
   const auto base = static_cast<long>(std::ceil((end - scene.start.time) / entry.natural_step));
+  require_no_jump(shared, end, 4 * base + 1);  // off the nodes of the others
   const Columns truth = by_steps(scene, shared, "type1/gl:6", end, 4 * base).derivatives;
   if (truth.size() == 0) throw Error("scene '" + scene.name + "': the motion that is the truth fails");
   std::string text = "side,setting,seconds,error\n";

@@ -180,7 +180,7 @@ ControlProblem control_problem(ControlArguments& arguments, Session& session) {
         "--to NAME=VALUE says what is asked of the end, or 'end_cost' of [control] what an end costs");
   const Scene& scene = *entry.scene;
   ControlProblem problem{{entry.scene, control.names, control.force, control.cost, control.end_cost,
-                          control.lower, control.upper},
+                          control.lower, control.upper, control.kinks},
                          session.registry,
                          session.solvers,
                          integrator_options(session, arguments.method),
@@ -211,11 +211,11 @@ void run_control(ControlArguments arguments, Session& session) {
   print(arguments.json ? control_json(report, problem, method) : control_text(report, problem, method));
   constexpr double far_off = 1e-4;
   if (report.converged && !(report.end_of_run <= far_off)) {
-    say(
-        fmt::format("doubted: a run with these controls ends off by {:.2g}, as where the motion is not "
-                    "stable or steps are "
-                    "too large",
-                    report.end_of_run));
+    say(fmt::format(
+        "doubted: a run with these controls ends off by {:.2g}, as where the motion is not "
+        "stable, steps are too large, or it crosses a jump of the formulas within a step, where a "
+        "run divides its step and this search does not",
+        report.end_of_run));
     session.exit_status = doubted;
   }
   if (report.converged) return;

@@ -45,6 +45,34 @@ constexpr double shown_from = 1e-3;          // of its largest
 constexpr int shown_coordinates = 40;
 constexpr int default_modes = 10;  // of a scene that is too large for full matrices
 
+/// A kink of the formulas at the point, across which derivatives jump; empty where there is none.
+std::string kink_there(const Scene& scene, const Equilibrium& at) {
+  constexpr double beside = 1e-7;  // of the largest coordinate or velocity
+  if (!scene.kinks || scene.kinks->count() == 0) return {};
+  Vector here(scene.kinks->count()), before = here, behind = here;
+  scene.kinks->evaluate(at.time, at.q, at.v, here);
+  const double largest = std::max(at.q.lpNorm<Eigen::Infinity>(), scene.start.q.lpNorm<Eigen::Infinity>());
+  const double step = beside * (largest > 0.0 ? largest : 1.0);
+  for (const bool moves : {false, true})
+    for (Eigen::Index i = 0; i < at.q.size(); ++i) {
+      Vector q = at.q, v = at.v;
+      double& moved = moves ? v[i] : q[i];
+      const double value = moved;
+      moved = value - step;
+      scene.kinks->evaluate(at.time, q, v, before);
+      moved = value + step;
+      scene.kinks->evaluate(at.time, q, v, behind);
+      for (Eigen::Index k = 0; k < here.size(); ++k)
+        if (const auto number = static_cast<std::size_t>(k);
+            scene.kinks->kinds()[number] == Kinks::Kind::kink && before[k] * behind[k] < 0.0)
+          return fmt::format(
+              "the formulas have a kink there ({}): derivatives differ on its two sides, and eigenvalues by "
+              "one of them tell nothing of the motion",
+              scene.kinks->names()[number]);
+    }
+  return {};
+}
+
 Found find(const EquilibriumArguments& options, const CatalogueScene& entry) {
   Found found{find_equilibrium(*entry.scene, entry.scene->start, options.along), {}, {}, {}, {}};
   if (!found.at.ok()) return found;
@@ -67,6 +95,7 @@ Found find(const EquilibriumArguments& options, const CatalogueScene& entry) {
         "the linear equations change by {:.2g} of their size {} until t = {:g}: the eigenvalues hold at "
         "t = {:g} only",
         variation, options.along ? "along the motion" : "with the time", entry.t_end, found.at.time);
+  if (found.doubt.empty()) found.doubt = kink_there(scene, found.at);
   return found;
 }
 

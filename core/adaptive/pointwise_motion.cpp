@@ -10,8 +10,7 @@ PointwiseMotion::PointwiseMotion(const Scene& scene, const SolverFactory& solver
       space_(scene.space),
       reader_(std::make_shared<const Scene>(scene), solvers, full_) {
   if (!has_accelerations(scene))
-    throw Misuse("scene '" + scene.name + "': its " +
-                 (scene.lagrangian ? "Lagrangian is linear in v" : "Hamiltonian is degenerate") +
+    throw Misuse("scene '" + scene.name + "': " + why_no_accelerations(scene) +
                  ", so there are no accelerations to choose variable steps by; use a fixed step");
 }
 

@@ -31,6 +31,14 @@ bool has_accelerations(const Scene& scene) {
          !first_order_motions(scene).exist();
 }
 
+std::string why_no_accelerations(const Scene& scene) {
+  if (!scene.lagrangian) return "the Hamiltonian is degenerate";
+  if (scene.lagrangian->structure().y_hessian_zero) return "the Lagrangian is linear in v";
+  return first_order_motions(scene).hide_equations()
+             ? "the kernel of ∂²L/∂v² moves or hides equations"
+             : "the Lagrangian has velocities without mass, along a kernel of ∂²L/∂v²";
+}
+
 void require_even(const Monitor& monitor, const Start& start) {
   if (!monitor.rate) return;
   const double at_start = monitor.rate(start.time, start.q, start.v);

@@ -18,6 +18,8 @@ struct Monitor {
 /// Whether a completed scene has accelerations to choose variable steps by: not where its Lagrangian is
 /// linear in v or has motions of first order, nor where its Hamiltonian is degenerate.
 bool has_accelerations(const Scene& scene);
+/// Of a scene that has none, what it is that has none: "its Lagrangian is linear in v".
+std::string why_no_accelerations(const Scene& scene);
 
 /// Throws Misuse where the monitor is not positive and finite at the start, or not even in v there and at
 /// another velocity: names both values.

@@ -203,8 +203,7 @@ PlanLine variable_steps_line(const std::shared_ptr<const Scene>& given, const So
   const auto scene = completed(given);
   if (!has_accelerations(*scene))
     return {"variable steps", "not offered",
-            std::string(scene->lagrangian ? "L is linear in v" : "the Hamiltonian is degenerate") +
-                ": no accelerations to choose them by"};
+            why_no_accelerations(*scene) + ": no accelerations to choose them by"};
   const RateSurvey survey = survey_rate(*scene, solvers, end);
   if (!survey.failure.empty()) return {"variable steps", "not known", survey.failure};
   const double span = std::abs(end - scene->start.time);

@@ -29,6 +29,8 @@ class EquilibriumSearch {
       if (wanted_v_[i] != 0.0) moving_.push_back(static_cast<int>(i));
     size_ = start.q.lpNorm<Eigen::Infinity>();
     at_ = start.q;
+    reach_ = Vector::Ones(at_.size());
+    hold_constant_rows();
   }
 
   Equilibrium find() {
@@ -50,6 +52,22 @@ class EquilibriumSearch {
   }
 
  private:
+  /// Rows with constant coefficients keep A q: q moves in their kernel alone, whatever else is not met.
+  void hold_constant_rows() {
+    constexpr double held = 1e-12;
+    balance_.evaluate(time_, at_, wanted_v_);
+    const Columns a = balance_.one_forms;
+    std::vector<int> constant;
+    int row = 0;
+    for (const auto& block : balance_.blocks())
+      for (int r = 0; r < block->rows(); ++r, ++row)
+        if (!block->holonomic() && is_on_positions(*block)) constant.push_back(row);
+    if (constant.empty()) return;
+    free_ = null_space(a(constant, Eigen::all));
+    reach_ = free_.rowwise().norm();
+    for (double& reach : reach_) reach = reach > held ? reach : 0.0;
+  }
+
   /// q, what belongs to it, and what is to vanish there: forces that rows do not take up, φ, and the
   /// velocities of rows that the moving coordinates cannot meet.
   struct Point {
@@ -106,10 +124,13 @@ class EquilibriumSearch {
     scales_ = jacobian.rowwise().norm();
     for (double& scale : scales_) scale = scale > 0.0 ? 1.0 / scale : 0.0;
     factors_.setThreshold(equation_met);
-    factors_.compute(scales_.asDiagonal() * jacobian);
+    const Columns scaled = scales_.asDiagonal() * jacobian;
+    factors_.compute(free_.size() > 0 ? Columns(scaled * free_) : scaled);
   }
   Vector correction(const Vector& residual) const {
-    return -factors_.solve(Vector(scales_.asDiagonal() * residual));
+    if (free_.rows() > 0 && free_.cols() == 0) return Vector::Zero(free_.rows());
+    const Vector change = -factors_.solve(Vector(scales_.asDiagonal() * residual));
+    return free_.size() > 0 ? Vector(free_ * change) : change;
   }
 
   /// The longest of the steps 1, ½, ¼ … of the correction that lies on Newton's path, where the residual
@@ -161,7 +182,7 @@ class EquilibriumSearch {
   /// What each equation may be off by: parts of its terms.
   Vector allowed(const Point& point) const {
     const Vector q = point.q.cwiseAbs();
-    const Vector change = Vector::Constant(q.size(), size_);
+    const Vector change = size_ * reach_;
     Vector sizes(point.residual.size());
     sizes << balance_.sizes + balance_.stiffness.cwiseAbs() * change,
         Vector(balance_.one_forms.cwiseAbs() * (q + change)).head(balance_.on_positions),
@@ -216,6 +237,8 @@ class EquilibriumSearch {
   ForceBalance balance_;
   double time_;
   Vector wanted_v_, at_;
+  Columns free_;  ///< an orthonormal basis of where q may move, n×f; empty: everywhere
+  Vector reach_;  ///< of each coordinate there: 0 where rows hold it
   std::vector<int> moving_;
   double size_ = 0.0;
   int iterations_ = 0;

@@ -1,9 +1,10 @@
 #include <Eigen/QR>
-#include <algorithm>
+#include <cmath>
 #include <diracstep/core/equilibrium/force_balance.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/system/hidden_rows.hpp>
 #include <diracstep/core/system/lagrangian_derivatives.hpp>
+#include <diracstep/core/system/row_subset.hpp>
 
 namespace diracstep {
 
@@ -18,12 +19,79 @@ SparseMatrix with_values(const SparsityPattern& pattern, const Vector& values) {
                                         values.data());
 }
 
-ConstraintBlocks positions_first(const ConstraintBlocks& blocks) {
-  ConstraintBlocks sorted = blocks;
-  std::stable_partition(sorted.begin(), sorted.end(),
-                        [](const auto& block) { return is_on_positions(*block); });
-  return sorted;
+/// Which rows of a nonholonomic block have constant coefficients though others of it have not, as states
+/// without a rate beside states with one: by comparing them and their derivatives at generic points.
+std::vector<bool> constant_rows(const ConstraintRows& block, const Start& start) {
+  constexpr int points = 3;
+  const SparsityPattern& pattern = block.pattern();
+  std::vector<bool> constant(static_cast<std::size_t>(block.rows()), true);
+  Vector first, first_offset, a(pattern.nonzeros()), b(block.rows()), d(pattern.nonzeros());
+  for (int point = 0; point < points; ++point) {
+    Vector q = start.q, w = start.q;
+    for (Eigen::Index i = 0; i < q.size(); ++i) {
+      const double number = static_cast<double>(i + 1) + 100.0 * point;
+      q[i] += std::cos(1.7 * number);
+      w[i] = 1.0 + 0.5 * std::sin(2.3 * number);
+    }
+    block.derivative(start.time, q, w, 1.0, d);
+    block.coefficients(start.time, q, a, b);
+    if (point == 0) {
+      first = a;
+      first_offset = b;
+    }
+    Vector later = a, ignored = b;
+    block.coefficients(start.time + 0.37 * (point + 1), q, later, ignored);
+    pattern.for_each([&](Eigen::Index k, int row, int) {
+      if (!(d[k] == 0.0 && a[k] == first[k] && later[k] == first[k]))
+        constant[static_cast<std::size_t>(row)] = false;
+    });
+    for (int row = 0; row < block.rows(); ++row)
+      if (!(b[row] == first_offset[row])) constant[static_cast<std::size_t>(row)] = false;
+  }
+  return constant;
 }
+
+}  // namespace
+
+/// The rows of a scene in blocks, those on positions first, and for each row of the scene its place there.
+struct SortedRows {
+  explicit SortedRows(const Scene& scene) {
+    std::vector<std::vector<Eigen::Index>> numbers, of_others;
+    ConstraintBlocks others;
+    Eigen::Index first = 0;
+    const auto add = [&](const auto& block, const std::vector<int>& rows, bool on_positions) {
+      if (rows.empty()) return;
+      const bool whole = static_cast<int>(rows.size()) == block->rows();
+      const auto part =
+          whole && on_positions == is_on_positions(*block) ? block : rows_of_block(block, rows, on_positions);
+      (on_positions ? blocks : others).push_back(part);
+      auto& of_part = (on_positions ? numbers : of_others).emplace_back();
+      for (const int row : rows) of_part.push_back(first + row);
+    };
+    for (const auto& block : scene.constraints) {
+      std::vector<bool> held(static_cast<std::size_t>(block->rows()), true);
+      if (!is_on_positions(*block)) held = constant_rows(*block, scene.start);
+      for (const bool on_positions : {true, false}) {
+        std::vector<int> rows;
+        for (int r = 0; r < block->rows(); ++r)
+          if (held[static_cast<std::size_t>(r)] == on_positions) rows.push_back(r);
+        add(block, rows, on_positions);
+      }
+      first += block->rows();
+    }
+    blocks.insert(blocks.end(), others.begin(), others.end());
+    numbers.insert(numbers.end(), of_others.begin(), of_others.end());
+    places.resize(static_cast<std::size_t>(first));
+    Eigen::Index place = 0;
+    for (const auto& of_block : numbers)
+      for (const Eigen::Index row : of_block) places[static_cast<std::size_t>(row)] = place++;
+  }
+
+  ConstraintBlocks blocks;
+  std::vector<Eigen::Index> places;
+};
+
+namespace {
 
 int rows_on_positions(const ConstraintBlocks& blocks) {
   int count = 0;
@@ -40,10 +108,13 @@ Columns with_unit_rows(const Columns& matrix) {
 
 }  // namespace
 
-ForceBalance::ForceBalance(const Scene& scene)
-    : on_positions(rows_on_positions(scene.constraints)),
+ForceBalance::ForceBalance(const Scene& scene) : ForceBalance(scene, SortedRows(scene)) {}
+
+ForceBalance::ForceBalance(const Scene& scene, const SortedRows& rows)
+    : on_positions(rows_on_positions(rows.blocks)),
       scene_(scene),
-      blocks_(positions_first(scene.constraints)),
+      blocks_(rows.blocks),
+      places_(rows.places),
       rows_(blocks_, scene.dimension()) {}
 
 void ForceBalance::evaluate(double t, const Vector& q, const Vector& v) {
@@ -121,21 +192,11 @@ void ForceBalance::set_multipliers(const Vector& lambda) {
   if (row > 0) sizes += one_forms.cwiseAbs().transpose() * lambda.cwiseAbs();
 }
 
-std::vector<Eigen::Index> ForceBalance::places() const {
-  std::vector<Eigen::Index> places;
-  Eigen::Index of_positions = 0, other = on_positions;
-  for (const auto& block : scene_.constraints) {
-    Eigen::Index& from = is_on_positions(*block) ? of_positions : other;
-    for (int r = 0; r < block->rows(); ++r) places.push_back(from++);
-  }
-  return places;
-}
-
-Vector ForceBalance::in_order_of_scene(const Vector& here) const { return here(places()); }
+Vector ForceBalance::in_order_of_scene(const Vector& here) const { return here(places_); }
 
 Vector ForceBalance::in_order_here(const Vector& of_scene) const {
   Vector here(of_scene.size());
-  here(places()) = of_scene;
+  here(places_) = of_scene;
   return here;
 }
 

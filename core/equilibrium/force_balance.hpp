@@ -9,6 +9,8 @@ namespace diracstep {
 
 using SparseMatrix = Eigen::SparseMatrix<double>;
 
+struct SortedRows;  // of the source
+
 /// The equations of motion without acceleration, and their derivatives: what equilibria and linear equations
 /// about them are made of.  Third derivatives of L are left out; they vanish at rest and
 /// along motions that nothing depends on.
@@ -40,11 +42,11 @@ class ForceBalance {
 
  private:
   void evaluate_rows();
-  /// For each row of the scene its place here.
-  std::vector<Eigen::Index> places() const;
+  ForceBalance(const Scene& scene, const SortedRows& rows);
 
   const Scene& scene_;
   ConstraintBlocks blocks_;
+  std::vector<Eigen::Index> places_;  ///< for each row of the scene its place here
   ConstraintsAtPoint rows_;
   double t_ = 0.0;
   Vector q_, v_;

@@ -93,7 +93,9 @@ StepReport EventSearch::look(std::size_t event, double here, const Sample& point
                      "would hold it";
     return report;
   }
-  const std::vector<double> times = watch.left ? std::vector<double>{} : times_of_changes(event, here, point);
+  // A function that was left may jump back and vanish again in the same step; a contact may not.
+  const bool at_once = watch.left && events_[event].restitution;
+  const std::vector<double> times = at_once ? std::vector<double>{} : times_of_changes(event, here, point);
   if (!times.empty()) return look_at(times, event, here, point, read);
   if (watch.met_at_last || !changes(event, watch.last, here)) return {};
   EventHit hit{event, {}};
@@ -147,7 +149,10 @@ void EventSearch::mark_zeros(const Sample& at) {
                  4.0 * round_off_of_times * std::abs(at.time) * (std::isfinite(slope) ? slope : 0.0);
     if (!(std::abs(here) <= watch.zero)) continue;
     watch.at_act = 0.0;
-    watch.behind = watch.last > 0.0 ? -1 : 1;
+    // Of what was met by its own bracket: it may have changed its sign before in the same step.
+    const auto hit = std::ranges::find(met_, k, &EventHit::event);
+    const bool known = hit != met_.end() && hit->behind != 0;
+    watch.behind = known ? hit->behind : watch.last > 0.0 ? -1 : 1;
     at_zero_.push_back(k);
   }
 }

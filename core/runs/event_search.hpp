@@ -15,6 +15,7 @@ struct EventHit {
   Sample sample;                     ///< just before it
   std::optional<Sample> after = {};  ///< what it made of it; none where it does not act
   double impulse = 0.0;              ///< Λ_c of a contact, momentum over the unit of its row
+  int behind = 0;                    ///< sign of its function behind the zero; 0 for a clock
 };
 
 /// Finds events between the points of a run.

@@ -151,6 +151,7 @@ class EventSteps {
     return report;
   }
   StepReport begin();
+  std::string releases_late(const Sample& here) const;
   StepReport look(const detail::Node& from, const Sample& point);
   StepReport act(std::vector<EventHit> met);
   StepReport make_true(EventHit hit, std::vector<EventSearch::Left>& left);

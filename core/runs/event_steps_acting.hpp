@@ -22,6 +22,24 @@ std::string EventSteps<Stepper>::slides(const Event& event, double t) {
          "tanh(g/width), or hold the motion there by a row that is switched on";
 }
 
+/// A start at which a row is on that an event should have switched off before.
+template <class Stepper>
+std::string EventSteps<Stepper>::releases_late(const Sample& here) const {
+  const std::vector<bool> awake = actions_.awake();
+  for (std::size_t k = 0; k < events().size(); ++k) {
+    const Event& event = events()[k];
+    if (event.off.empty() || !event.at || !awake[k] || event.direction == Event::Direction::both) continue;
+    if (event.condition && !(event.condition(here.point()) > 0.0)) continue;
+    const double value = event.at(here.point());
+    const bool beyond = event.direction == Event::Direction::falling ? value < 0.0 : value > 0.0;
+    if (beyond)
+      return "event '" + event.name + "': its function is " + to_text(value) +
+             " at the start, already beyond the zero at which it switches row '" + event.off.front() +
+             "' off; start without that row";
+  }
+  return {};
+}
+
 /// Clocks act at the start.
 template <class Stepper>
 StepReport EventSteps<Stepper>::begin() {
@@ -36,6 +54,7 @@ StepReport EventSteps<Stepper>::begin() {
         return failed("event '" + event.name + "': its function is " + to_text(gap) +
                       " at the start, behind the contact; it is positive where there is none (direction)");
   if (report = search_.see(here, {}); !report.ok()) return report;
+  if (std::string late = releases_late(here); !late.empty()) return failed(std::move(late));
   (void)search_.go_on(here, at_rest_in_contact(here), actions_.awake(), false);
   std::vector<EventHit> due;
   add_closing(here, due);

@@ -117,6 +117,7 @@ StepReport EventSearch::look_at(const std::vector<double>& times, std::size_t ev
 StepReport EventSearch::locate(Bracket bracket, const Sample& point, const Read& read, EventHit& hit) const {
   auto& [before, after, at_before, at_after, divided] = bracket;
   hit.sample = point;
+  hit.behind = at_before < 0.0 ? 1 : -1;
   const double smallest = round_off_of_time * std::max(std::abs(before), std::abs(after));
   int side = 0;
   for (int k = 0; k < most_readings && std::abs(after - before) > 2.0 * smallest && at_after != 0.0; ++k) {

@@ -8,11 +8,12 @@ namespace {
 /// Some rows of a block, in order.
 class RowSubset final : public ConstraintRows {
  public:
-  RowSubset(std::shared_ptr<const ConstraintRows> block, std::vector<int> kept)
+  RowSubset(std::shared_ptr<const ConstraintRows> block, std::vector<int> kept, bool constant)
       : ConstraintRows(block->holonomic(), subset(block->pattern(), kept), block->curvature_pattern(),
                        names_of(*block, kept)),
         block_(std::move(block)),
-        kept_(std::move(kept)) {
+        kept_(std::move(kept)),
+        constant_(constant) {
     const std::vector<int> numbers = numbers_of(block_->rows(), kept_);
     int k = 0;
     for (const auto& [row, column] : block_->pattern().entries()) {
@@ -21,7 +22,7 @@ class RowSubset final : public ConstraintRows {
     }
   }
 
-  bool constant() const override { return block_->constant(); }
+  bool constant() const override { return constant_; }
   bool workless() const override { return block_->workless(); }
   std::string origin(int row) const override { return block_->origin(kept_[static_cast<std::size_t>(row)]); }
   void position(double t, ConstVectorRef q, VectorRef phi) const override {
@@ -82,9 +83,15 @@ class RowSubset final : public ConstraintRows {
   std::shared_ptr<const ConstraintRows> block_;
   std::vector<int> kept_;    ///< ascending, so the entries keep their order
   std::vector<int> places_;  ///< values of the kept rows among all
+  bool constant_;
 };
 
 }  // namespace
+
+std::shared_ptr<const ConstraintRows> rows_of_block(const std::shared_ptr<const ConstraintRows>& block,
+                                                    const std::vector<int>& kept, bool constant) {
+  return std::make_shared<const RowSubset>(block, kept, constant);
+}
 
 std::shared_ptr<const Scene> without_rows(const Scene& scene, const std::vector<std::string>& names) {
   auto copy = std::make_shared<Scene>(scene);
@@ -97,7 +104,7 @@ std::shared_ptr<const Scene> without_rows(const Scene& scene, const std::vector<
     if (static_cast<int>(kept.size()) == block->rows())
       copy->constraints.push_back(block);
     else if (!kept.empty())
-      copy->constraints.push_back(std::make_shared<const RowSubset>(block, kept));
+      copy->constraints.push_back(rows_of_block(block, kept, block->constant()));
   }
   return copy;
 }

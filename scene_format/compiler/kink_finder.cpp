@@ -24,6 +24,7 @@ KinkProgram KinkFinder::find() {
     look(*program_.hamiltonian, true);
   if (program_.force) look(*program_.force, false);
   for (const SceneFunction& rows : program_.rows) look(rows, false);
+  if (program_.cost) look(*program_.cost, false);
   return std::move(found_);
 }
 

@@ -13,7 +13,7 @@ class KinkFinder {
   KinkFinder(SceneProgram& program, PieceBuilder& builder)
       : program_(program), graph_(program.graph), builder_(builder) {}
 
-  /// Looks through L (or H where there is no L), the force and the rows.
+  /// Looks through L (or H where there is no L), the force, the rows, and the cost where there is one.
   KinkProgram find();
 
  private:

@@ -227,5 +227,30 @@ TEST_F(EquilibriumVerb, FailuresDoubtsAndMisuseHaveTheirStatus) {
   expect_misuse("equilibrium no_such_scene", {"no_such_scene"});
 }
 
+/// A state without a rate keeps its start, whatever the forces ask of it.
+TEST_F(EquilibriumVerb, StatesThatNothingMovesStayAtTheStart) {
+  const Json thermostat = found("thermostat");
+  EXPECT_EQ(thermostat["q"]["u"].get<double>(), 0.0);
+  EXPECT_NEAR(thermostat["q"]["T"].get<double>(), 0.0, 1e-12);
+  const Outcome clutch = run("equilibrium clutch --json");
+  EXPECT_EQ(clutch.status, 1);
+  EXPECT_EQ(Json::parse(clutch.out)["q"]["slips"].get<double>(), 1.0);
+  EXPECT_NE(clutch.err.find("no equilibrium"), std::string::npos) << clutch.err;
+}
+
+TEST_F(EquilibriumVerb, AKinkAtTheEquilibriumIsDoubted) {
+  const auto outcome_of =
+      [&](const std::string& force) {
+        std::ofstream(path("kink.toml"))
+            << "name = \"kink\"\nlagrangian = \"v_x^2/2 - x^2/2\"\n[coordinates]\nx = {}\n"
+            << "[force]\nx = \"" << force << "\"\n[start]\nx = 0.5\n[span]\nend = 1\nstep = 0.1\n";
+        return run("equilibrium '" + path("kink.toml") + "'");
+      };
+  const Outcome there = outcome_of("if(x > 0, -3*x, 0)");
+  EXPECT_EQ(there.status, 3);
+  EXPECT_NE(there.err.find("have a kink there"), std::string::npos) << there.err;
+  EXPECT_EQ(outcome_of("if(x > 0.1, -3*x, 0)").status, 0);  // elsewhere
+}
+
 }  // namespace
 }  // namespace diracstep::testing

@@ -87,5 +87,41 @@ TEST_F(Control, SaysWhatItLacks) {
   expect(pushed(squares) + " --to x=0 --at-most w=1", "neither a coordinate nor a control");
 }
 
+/// v' = u - 3 from t = 0.33 on: with w = u - 3 s(t) the least of ∫ u²/2 with ∫ u = ∫ 3 s and ∫ (1 - t) u =
+/// 1 + ∫ (1 - t) 3 s is that of a straight line in t, whose coefficients these two integrals are.
+TEST_F(Control, AJumpInTheTimeWithinAStepDividesIt) {
+  if (!optimal_control_available()) GTEST_SKIP() << "not checked: built without Ipopt";
+  const auto scene = [&](const std::string& force, const std::string& cost) {
+    const std::string file = path("jump.toml");
+    std::ofstream(file) << "name = \"jump\"\nlagrangian = \"v_x^2/2\"\n[coordinates]\nx = {}\n[parameters]\n"
+                        << "u = { value = 0 }\n[force]\nx = \"" << force
+                        << "\"\n[span]\nend = 1\nstep = 0.05\n"
+                        << "[control]\nparameters = [\"u\"]\ncost = \"" << cost << "\"\n";
+    return "control '" + file + "' --to x=1 v_x=0 --degree 1 --json";
+  };
+  const Outcome outcome = run(scene("u - 3*if(t > 0.33, 1, 0)", "u^2/2"));
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  const Json json = Json::parse(outcome.out);
+  const double off = 0.67, first = 3.0 * off, second = 1.0 + 3.0 * off * off / 2.0;  // of u, of (1 - t) u
+  const double slope = 12.0 * (second - first / 2.0), mean = first;  // u = mean + slope (1/2 - t)
+  EXPECT_NEAR(json["cost"].get<double>(), (mean * mean + slope * slope / 12.0) / 2.0, 1e-9);
+  EXPECT_LT(json["end_of_run"].get<double>(), 1e-9);
+  // In the cost: u is a third as large where it costs three times as much.
+  const Outcome dear = run(scene("u", "u^2/2*if(t > 0.33, 3, 1)"));
+  ASSERT_EQ(dear.status, 0) << dear.err;
+  const Json of_dear = Json::parse(dear.out);
+  // ∫ r, ∫ r s, ∫ r s² with s = 1 - t and r = 1 before, 1/3 after: the costates a + b s.
+  const auto moment = [](int k) {
+    return (1.0 - std::pow(0.67, k + 1)) / (k + 1) + std::pow(0.67, k + 1) / (k + 1) / 3.0;
+  };
+  const double b = 1.0 / (moment(2) - moment(1) * moment(1) / moment(0));
+  EXPECT_NEAR(of_dear["cost"].get<double>(), b / 2.0, 0.002);  // lines in each step, one over the jump
+  EXPECT_GE(of_dear["cost"].get<double>(), b / 2.0 - 1e-9);
+  // Where x switches, the time is not known before: a run ends elsewhere, which is told.
+  const Outcome by_place = run(scene("u - 3*if(x > 0.33, 1, 0)", "u^2/2"));
+  EXPECT_EQ(by_place.status, 3);
+  EXPECT_NE(by_place.err.find("crosses a jump"), std::string::npos) << by_place.err;
+}
+
 }  // namespace
 }  // namespace diracstep::testing

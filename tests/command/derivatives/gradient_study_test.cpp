@@ -45,5 +45,19 @@ TEST_F(GradientStudy, TellsWhatIsNotCompared) {
   EXPECT_NE(outcome.err.find("linear in v"), std::string::npos) << outcome.err;
 }
 
+/// IDAS has the derivatives on both sides of a jump, not what the moving jump adds between them: whether the
+/// motion crosses it between two nodes or at one.
+TEST_F(GradientStudy, AJumpOfTheForceOnTheWayIsRefused) {
+  for (const char* speed : {"2", "2.13"}) {
+    const std::string file = path("jump.toml");
+    std::ofstream(file) << "name = \"jump\"\nlagrangian = \"v_x^2/2\"\n[coordinates]\nx = {}\n[force]\n"
+                        << "x = \"if(x > 1, -4, 0)\"\n[start]\nv_x = " << speed
+                        << "\n[span]\nend = 0.9\nstep = 0.05\n";
+    const Outcome outcome = study("'" + file + "'");
+    EXPECT_EQ(outcome.status, 1) << outcome.out;
+    EXPECT_NE(outcome.err.find("crosses a jump of the force"), std::string::npos) << outcome.err;
+  }
+}
+
 }  // namespace
 }  // namespace diracstep::testing

@@ -182,5 +182,18 @@ TEST_F(ExampleScenes, TheListNamesStatesAndEvents) {
   }
 }
 
+/// Faster than √(g R) the sphere would have to pull from the start on.
+TEST_F(ExampleScenes, APointTooFastForItsSphereIsTold) {
+  const Outcome outcome = run("run leaving_a_sphere --set v0=10");
+  EXPECT_EQ(outcome.status, 1);
+  EXPECT_NE(outcome.err.find("event 'leaves'"), std::string::npos) << outcome.err;
+  EXPECT_NE(outcome.err.find("beyond the zero"), std::string::npos) << outcome.err;
+}
+
+TEST_F(ExampleScenes, AFlatBlockOverturns) {
+  const auto json = result("rocking_block", "--set b=1 --set h=0.25 --end 8");
+  EXPECT_EQ(json["events"].back()["name"].get<std::string>(), "overturned");
+}
+
 }  // namespace
 }  // namespace diracstep::testing

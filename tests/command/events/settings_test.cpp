@@ -83,5 +83,22 @@ TEST_F(SettingEvents, ThatCallEachOtherAreTold) {
   EXPECT_NE(outcome.err.find("no time passes"), std::string::npos) << outcome.err;
 }
 
+/// mod(x, 0.01) jumps back between its rising zeros, several of them in a step: x = t²/2 up to the switch at
+/// t = 0.3, then 0.045 + 0.3 (t - 0.3).
+TEST_F(SettingEvents, AFunctionThatJumpsBackIsMetOnceForEachZero) {
+  const std::string file = path("marks.toml");
+  std::ofstream(file)
+      << "name = \"marks\"\nlagrangian = \"v_x^2/2\"\n[coordinates]\nx = {}\n[states]\nu = {}\nn = {}\n"
+         "[force]\nx = \"u\"\n[[events]]\nname = \"clock\"\nevery = 0.3\nset = { u = \"1 - u\" }\n"
+         "[[events]]\nname = \"mark\"\nwhen = \"mod(x, 0.01) - 0.0051\"\ndirection = \"rising\"\n"
+         "set = { n = \"n + 1\" }\n[span]\nend = 0.55\nstep = 0.0625\n";
+  for (const char* step : {"--step 0.0625", "--step 0.01"}) {
+    const Outcome outcome = run("run '" + file + "' --json " + step);
+    ASSERT_EQ(outcome.status, 0) << outcome.err;
+    const auto json = nlohmann::json::parse(outcome.out);
+    EXPECT_EQ(json["end"]["q"]["n"].get<double>(), 12.0) << step;  // x = 0.12
+  }
+}
+
 }  // namespace
 }  // namespace diracstep::testing
