@@ -106,6 +106,8 @@ LocalErrorControl::Worst LocalErrorControl::error(const Integrator& fine, const 
   };
   add(q_, fine.position(), seen_.q, 0);
   add(p_, fine.momentum(), seen_.p, q_.size());
+  const double unresolved = std::max(fine.unresolved_between_kinks(), whole.unresolved_between_kinks());
+  worst.part = std::max(worst.part, unresolved / std::max(eps_, of_the_largest));
   return worst;
 }
 

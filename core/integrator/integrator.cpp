@@ -195,6 +195,7 @@ void Integrator::end_steps_at_kinks() { division_->end_at_kinks(); }
 bool Integrator::met_kinks() const { return division_->divided(); }
 std::span<const KinkPassed> Integrator::kinks_passed() const { return division_->passed(); }
 const std::string& Integrator::stuck_at_kink() const { return division_->stuck(); }
+double Integrator::unresolved_between_kinks() const { return division_->unresolved(); }
 
 void Integrator::record_stages(bool wanted) {
   solved_stages_->clear();
