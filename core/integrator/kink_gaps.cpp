@@ -11,9 +11,9 @@ namespace {
 constexpr std::size_t most_parts_of_a_gap = 128;
 constexpr double same_end = 2e-12;  // relative: the places of kinks are round-off below it
 
-/// The lengths between the kinks of a step.
-void find_gaps(const std::vector<KinkPassed>& kinks, std::vector<double>& gaps) {
-  gaps.clear();
+/// The lengths from kink to kink of a step, the first from `start`, or 0 where that is NaN.
+void find_gaps(double start, const std::vector<KinkPassed>& kinks, std::vector<double>& gaps) {
+  gaps.assign(1, std::isnan(start) ? 0.0 : std::abs(kinks.front().time - start));
   for (std::size_t k = 1; k < kinks.size(); ++k) gaps.push_back(std::abs(kinks[k].time - kinks[k - 1].time));
 }
 
@@ -26,8 +26,8 @@ double end_apart(const Vector& a, const Vector& b, const Vector& start) {
 
 /// The size of the next part: what is left, or a part of what lies between two kinks.
 double StepDivision::within_gap(double left) const {
-  if (passed_.empty() || passed_.size() > gaps_.size()) return left;
-  const double longest = gaps_[passed_.size() - 1] / static_cast<double>(parts_of_gap_);
+  if (passed_.size() >= gaps_.size()) return left;
+  const double longest = gaps_[passed_.size()] / static_cast<double>(parts_of_gap_);
   return longest > 0.0 && longest < std::abs(left) ? std::copysign(longest, left) : left;
 }
 
@@ -40,17 +40,19 @@ bool StepDivision::follow_in(std::size_t parts, const State& start, Work& work) 
 /// Divides what lies between the kinks of the step just solved until twice as many parts lead to the same
 /// end.  False where no division leads to an end any more.
 bool StepDivision::resolve_gaps(const State& start, Work& work) {
-  if (end_at_kinks_ || passed_.size() < 2 || start.q.size() != start.v.size()) return true;
+  const std::size_t fewest = resolves_to_first_ ? 1 : 2;
+  const double from = resolves_to_first_ ? undivided_.front().start : std::nan("");
+  if (end_at_kinks_ || passed_.size() < fewest || start.q.size() != start.v.size()) return true;
   for (std::size_t parts = 2;; parts *= 2) {
     const State coarse = sequence_->end();
     const std::vector<double> gaps = gaps_;
-    find_gaps(passed_, gaps_);
+    find_gaps(from, passed_, gaps_);
     if (!follow_in(parts, start, work)) {
       unresolved_ = HUGE_VAL;
       gaps_ = gaps;
       return follow_in(parts / 2, start, work);
     }
-    if (passed_.size() < 2) {  // the whole of it met kinks that its parts do not
+    if (passed_.size() < fewest) {  // the whole of it met kinks that its parts do not
       unresolved_ = 0.0;
       return true;
     }

@@ -41,17 +41,11 @@ int StepDivision::ahead(const Vector& here) const {
 }
 
 /// The acceleration by the forces at the start, which those behind a kink are no part of: the end of a step
-/// that has taken these in tells nothing of it.  Zero where no kink is within reach.
-void StepDivision::find_acceleration(Interval step, const State& start, const State& end) {
+/// that has taken these in tells nothing of it.  Zero of damping methods, whose steps may be far longer than
+/// the times of stiff forces.
+void StepDivision::find_acceleration(Interval step, const State& start) {
   acceleration_.setZero(start.v.size());
-  between_.resize(kinks_->count());
-  changes_of_motion_ = (after_ - before_).cwiseAbs();
-  for (const Vector* v : std::initializer_list<const Vector*>{&start_velocity_, &end.v}) {
-    position_ = start.q + step.size * *v;
-    kinks_->evaluate(step.start + step.size, position_, *v, between_);
-    changes_of_motion_ = changes_of_motion_.cwiseMax((between_ - before_).cwiseAbs());
-  }
-  if (!(before_.array().abs() <= reach_of_motion * changes_of_motion_.array()).any()) return;
+  if (resolves_to_first_) return;
   force_.resize(start.v.size());
   momentum_.resize(start.v.size());
   scene_->force_and_momentum(step.start, start.q, start_velocity_, start.p, force_, momentum_);
@@ -96,7 +90,7 @@ double StepDivision::place_ahead(Interval step, const State& start) {
 /// Where between the ends of a step, in parts of it, a kink is on another side than at both; 0 where none.
 double StepDivision::hidden_place(Interval step, const State& start, const State& end) {
   if (start.q.size() != start.v.size()) return 0.0;  // points that cannot be subtracted
-  find_acceleration(step, start, end);
+  find_acceleration(step, start);
   if (const double place = place_ahead(step, start); place > 0.0) return place;
   velocity_ = (end.q - start.q) / step.size;
   speed_up_ = velocity_ - start.v;  // in the time of the step

@@ -35,6 +35,9 @@ class StepDivision {
 
   /// From now on a step ends behind the first kink that the motion crosses within it.
   void end_at_kinks() { end_at_kinks_ = true; }
+  /// From now on the way to the first kink is divided as what lies between two: for steps that are judged by
+  /// two halves of them, which come to a kink in their first half by the same part.
+  void resolve_to_first_kink() { resolves_to_first_ = true; }
 
   /// Afterwards sequence.end() is where the step ends; no trace of it is left before it is accepted.
   StepSequence::Outcome solve(Interval step, const State& start, Guess guess, Work& work);
@@ -58,7 +61,7 @@ class StepDivision {
   void read(double t, const State& at, bool exactly, Vector& switches);
   bool crosses(Interval step, const State& start, const State& end);
   double place_ahead(Interval step, const State& start);
-  void find_acceleration(Interval step, const State& start, const State& end);
+  void find_acceleration(Interval step, const State& start);
   double hidden_place(Interval step, const State& start, const State& end);
   int first_change() const;
   int ahead(const Vector& here) const;
@@ -83,8 +86,9 @@ class StepDivision {
   std::vector<KinkPassed> passed_;
   std::string stuck_;
   bool divided_ = false;
-  std::vector<double> gaps_;  ///< lengths of the parts between kinks that are divided
+  std::vector<double> gaps_;  ///< lengths of what is divided, to each kink; 0 where that is not
   std::size_t parts_of_gap_ = 1;
+  bool resolves_to_first_ = false;
   double unresolved_ = 0.0;
   SolveReport last_, solved_;  ///< of the part solved last, and of all that were kept
   double to_zero_ = 0.0;       ///< from the end of the part solved last, without sign
@@ -92,7 +96,7 @@ class StepDivision {
   Vector start_velocity_;      ///< of the part
   Vector acceleration_;        ///< there, from the forces at the start
   Vector before_, after_, between_, velocity_, speed_, speed_up_, position_;
-  Vector changes_of_motion_, force_, momentum_;
+  Vector force_, momentum_;
 };
 
 }  // namespace diracstep
