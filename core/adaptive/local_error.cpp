@@ -14,7 +14,8 @@ namespace {
 constexpr std::size_t most_instants = 200;
 constexpr int most_stuck = 20;  // steps one after the other that cross a kink undivided
 constexpr double below_eps = 0.9, most_growth = 10.0, most_shrinking = 0.1, after_failure = 0.25;
-constexpr double of_the_rate = 1e-6;  // of T ẏ, which counts as a size
+constexpr double shortest_over_kinks = 1e-6;  // of the motion: so short steps do not cross kinks in a row
+constexpr double of_the_rate = 1e-6;          // of T ẏ, which counts as a size
 // Errors that are round-off, and what is allowed beside them.
 constexpr double hardly_less = 0.5, erratic = 0.2, above_errors = 100.0;
 constexpr double of_the_largest = 1e-10, above_round_off = 4e-16;
@@ -64,6 +65,7 @@ void LocalErrorControl::start(const Integrator& at) {
   least_ = Vector::Zero(seen_.q.size() + seen_.p.size());
   refused_ = 0;
   stuck_ = 0;
+  sliding_ = 0;
 }
 
 /// The halves by one integrator, the whole step by the other; false where one fails.
@@ -73,7 +75,9 @@ bool LocalErrorControl::take_both(Integrator& fine, Integrator& whole, double si
   report = whole.step(size);
   if (!report.ok()) return false;
   report = fine.step(0.5 * size);
+  crossed_ = !fine.kinks_passed().empty();
   if (report.ok()) report = fine.step(start + size - fine.time());
+  crossed_ = crossed_ || !fine.kinks_passed().empty();
   const std::string& stuck = fine.stuck_at_kink();
   stuck_ = stuck.empty() ? 0 : stuck_ + 1;
   if (stuck_ > most_stuck) {
@@ -106,6 +110,8 @@ LocalErrorControl::Worst LocalErrorControl::error(const Integrator& fine, const 
   };
   add(q_, fine.position(), seen_.q, 0);
   add(p_, fine.momentum(), seen_.p, q_.size());
+  const double unresolved = std::max(fine.unresolved_between_kinks(), whole.unresolved_between_kinks());
+  worst.part = std::max(worst.part, unresolved / std::max(eps_, of_the_largest));
   return worst;
 }
 
@@ -148,6 +154,15 @@ StepReport LocalErrorControl::advance(Integrator& fine, Integrator& whole, doubl
     if (taken && (part <= 1.0 || std::abs(size) <= smallest_)) {
       const double growth = part > 0.0 ? below_eps * std::pow(part, -1.0 / (order_ + 1)) : most_growth;
       next = size * std::clamp(growth, most_shrinking, first ? most_growth : 1.0);
+      const bool slides = crossed_ && std::abs(size) < shortest_over_kinks * span_;
+      sliding_ = slides ? sliding_ + 1 : 0;
+      if (sliding_ > most_stuck) {
+        report.solve.status = SolveStatus::refused;
+        report.failure = "from t = " + to_text(start, 6) +
+                         " the motion crosses a kink of the force in each of " + std::to_string(sliding_) +
+                         " tiny steps: the force points back there from both sides; write one that is "
+                         "steep instead of a jump, as tanh(v/eps)";
+      }
       seen_.q = seen_.q.cwiseMax(fine.position().cwiseAbs());
       seen_.p = seen_.p.cwiseMax(fine.momentum().cwiseAbs());
       return report;

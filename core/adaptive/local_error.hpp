@@ -74,7 +74,9 @@ class LocalErrorControl {
   double eps_, span_, smallest_;
   int order_;
   long refused_ = 0;
-  int stuck_ = 0;  ///< steps one after the other that crossed a kink undivided
+  int stuck_ = 0;    ///< steps one after the other that crossed a kink undivided
+  int sliding_ = 0;  ///< tiny steps one after the other that cross kinks
+  bool crossed_ = false;
   Sizes seen_;
   Vector least_;              ///< of the sizes of (q, p), by round-off
   Vector q_, p_, v_, sizes_;  ///< where the step starts; workspace

@@ -13,6 +13,8 @@ namespace diracstep::detail {
 
 namespace {
 
+// Of the ends of a step between whose kinks more parts are taken: in parts of the error, and at round-off.
+constexpr double unresolved_allowed = 0.01, least_unresolved = 1e-11;
 constexpr int max_failures = 12;  // of runs in a row
 constexpr long fewest_steps = 4;  // of a run with variable steps that counts
 constexpr long nodes_between_looks = 64;
@@ -53,6 +55,7 @@ ErrorControlReport::Steps RefinementSearch::steps_of(long refinement) const {
                       .end = motion_.end};
   } else {
     steps.plan = plan_;
+    steps.plan.allow_unresolved(std::max(unresolved_allowed * motion_.options.error, least_unresolved));
     steps.integrator.step = plan_.first_step(refinement);
   }
   return steps;

@@ -57,6 +57,9 @@ StepReport StepPlan::run(Integrator& integrator, long refinement, const std::fun
       if (!integrator.stuck_at_kink().empty()) {
         report.solve.status = SolveStatus::no_convergence;
         report.failure = integrator.stuck_at_kink();
+      } else if (integrator.unresolved_between_kinks() > unresolved_allowed_) {
+        report.solve.status = SolveStatus::no_convergence;
+        report.failure = "steps are too long for what lies between two kinks that one of them crosses";
       }
       if (!report.ok() || !std::ranges::all_of(integrator.kinks_passed(), at_kink) || !at_node())
         return report;

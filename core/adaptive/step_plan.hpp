@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <diracstep/core/integrator/integrator.hpp>
 #include <functional>
 #include <vector>
@@ -38,8 +39,12 @@ class StepPlan {
   /// The mean step of a run, with its sign.
   double mean_step(long refinement) const;
 
+  /// Of Integrator::unresolved_between_kinks().
+  void allow_unresolved(double part) { unresolved_allowed_ = part; }
+
   /// Steps through the motion; `at_kink` is called where a step has passed a kink in q or v, `at_node` after
-  /// each step, and both end the run with false.  Fails where a step crosses a kink again and again.
+  /// each step, and both end the run with false.  Fails where a step crosses a kink again and again,
+  /// or leaves more unresolved between its kinks than is allowed.
   StepReport run(Integrator& integrator, long refinement, const std::function<bool()>& at_node,
                  const std::function<bool(const KinkPassed&)>& at_kink) const;
 
@@ -50,6 +55,7 @@ class StepPlan {
 
   std::vector<Stretch> stretches_;
   long steps_ = 0;
+  double unresolved_allowed_ = HUGE_VAL;
 };
 
 }  // namespace diracstep

@@ -60,6 +60,7 @@ Integrator::Integrator(PreparedScene prepared, const Registry& registry, const S
                                                *reader_, *sequence_)),
       solved_stages_(std::make_unique<std::vector<SolvedStage>>()),
       left_out_(scene_->whole ? std::make_unique<LeftOutRows>(*scene_) : nullptr) {
+  if (method_.info.damped) division_->resolve_to_first_kink();
   reset(scene_->start);
 }
 
@@ -195,6 +196,7 @@ void Integrator::end_steps_at_kinks() { division_->end_at_kinks(); }
 bool Integrator::met_kinks() const { return division_->divided(); }
 std::span<const KinkPassed> Integrator::kinks_passed() const { return division_->passed(); }
 const std::string& Integrator::stuck_at_kink() const { return division_->stuck(); }
+double Integrator::unresolved_between_kinks() const { return division_->unresolved(); }
 
 void Integrator::record_stages(bool wanted) {
   solved_stages_->clear();

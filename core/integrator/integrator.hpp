@@ -74,6 +74,9 @@ class Integrator {
   std::span<const KinkPassed> kinks_passed() const;
   /// Empty, or why the last step crossed a kink undivided: the motion crosses it again and again.
   const std::string& stuck_at_kink() const;
+  /// How far the ends of the last step by the two finest divisions between its kinks are apart, relative to q
+  /// and p; 0 where that is round-off.
+  double unresolved_between_kinks() const;
   const Scene& scene() const { return *scene_; }
   const IntegratorOptions& options() const { return options_; }
   const MethodInfo& method() const { return method_.info; }

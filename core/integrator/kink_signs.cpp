@@ -40,14 +40,36 @@ int StepDivision::ahead(const Vector& here) const {
   return -1;
 }
 
-/// Just behind where the motion would cross a kink first with its velocity at the start of a step, in parts
-/// of it, where its end is on this side again: a step far too large for what is behind the kink turns it back
-/// within itself.  0 where it would not.
+/// The acceleration by the forces at the start, which those behind a kink are no part of: the end of a step
+/// that has taken these in tells nothing of it.  Zero of damping methods, whose steps may be far longer than
+/// the times of stiff forces.
+void StepDivision::find_acceleration(Interval step, const State& start) {
+  acceleration_.setZero(start.v.size());
+  if (resolves_to_first_) return;
+  force_.resize(start.v.size());
+  momentum_.resize(start.v.size());
+  scene_->force_and_momentum(step.start, start.q, start_velocity_, start.p, force_, momentum_);
+  momentum_ = start.p + step.size * force_;
+  if (scene_->force) {
+    scene_->force->value(step.start, start.q, start_velocity_, force_);
+    momentum_ += step.size * force_;
+  }
+  speed_ = start_velocity_;
+  if (!momentum_.allFinite() || !reader_->velocity(step.start, start.q, momentum_, speed_).ok()) return;
+  if (speed_.allFinite()) acceleration_ = (speed_ - start_velocity_) / step.size;
+}
+
+/// Just behind where the motion would cross a kink first with its velocity and acceleration at the start of a
+/// step, in parts of it, where its end is on this side again: a step far too large for what is behind the
+/// kink turns it back within itself.  0 where it would not.
 double StepDivision::place_ahead(Interval step, const State& start) {
   constexpr int halvings = 12;
+  constexpr double quarter = 0.25;
   const auto crosses_by = [&](double place) {
-    position_ = start.q + place * step.size * start_velocity_;
-    kinks_->evaluate(step.start + place * step.size, position_, start_velocity_, between_);
+    const double time = place * step.size;
+    position_ = start.q + time * start_velocity_ + (0.5 * time * time) * acceleration_;
+    speed_ = start_velocity_ + time * acceleration_;
+    kinks_->evaluate(step.start + time, position_, speed_, between_);
     for (Eigen::Index k = 0; k < between_.size(); ++k)
       if (kinks_->kinds()[static_cast<std::size_t>(k)] == Kinks::Kind::kink && before_[k] * after_[k] > 0.0 &&
           between_[k] * before_[k] < 0.0)
@@ -55,8 +77,9 @@ double StepDivision::place_ahead(Interval step, const State& start) {
     return false;
   };
   between_.resize(kinks_->count());
-  if (!crosses_by(1.0)) return 0.0;
-  double low = 0.0, high = 1.0;
+  double low = 0.0, high = 0.0;
+  while (high < 1.0 && !crosses_by(high += quarter)) low = high;
+  if (high == 1.0 && !crosses_by(1.0)) return 0.0;
   for (int k = 0; k < halvings; ++k) {
     const double place = 0.5 * (low + high);
     (crosses_by(place) ? high : low) = place;
@@ -67,6 +90,7 @@ double StepDivision::place_ahead(Interval step, const State& start) {
 /// Where between the ends of a step, in parts of it, a kink is on another side than at both; 0 where none.
 double StepDivision::hidden_place(Interval step, const State& start, const State& end) {
   if (start.q.size() != start.v.size()) return 0.0;  // points that cannot be subtracted
+  find_acceleration(step, start);
   if (const double place = place_ahead(step, start); place > 0.0) return place;
   velocity_ = (end.q - start.q) / step.size;
   speed_up_ = velocity_ - start.v;  // in the time of the step

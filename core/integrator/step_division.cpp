@@ -8,7 +8,7 @@ namespace diracstep {
 
 namespace {
 
-constexpr std::size_t most_parts_of_a_step = 40;
+constexpr std::size_t most_parts_of_a_step = 40;  // and those of gaps_
 constexpr int most_tries = 60, most_halvings = 12, most_returns = 2, most_hidden = 8;
 constexpr int most_behind = 12, most_crossings = 16;
 constexpr double towards_zero = 15.0 / 16.0;  // of the way that is left, in one try from the near side
@@ -40,13 +40,15 @@ StepSequence::Outcome StepDivision::solve(Interval step, const State& start, Gue
   divided_ = parts_.size() > 1 || parts_.front().size != step.size;
   passed_.clear();
   stuck_.clear();
+  gaps_.clear();
+  unresolved_ = 0.0;
   if (parts_.size() > 1) guess = Guess::plain;
   sequence_->begin_record();
   StepSequence::Outcome outcome = sequence_->solve(parts_, start, guess, work);
   if (kinks_ == nullptr || (outcome.ok() && !crosses(step, start, sequence_->end()))) return outcome;
   undivided_ = parts_;
   solved_ = {};
-  if (follow(start, work) && !passed_.empty()) {
+  if (follow(start, work) && !passed_.empty() && resolve_gaps(start, work)) {
     divided_ = true;
     return {solved_, {}};
   }
@@ -82,8 +84,10 @@ bool StepDivision::follow(const State& start, Work& work) {
   sequence_->begin_record();
   for (const Interval& given : undivided_)
     for (double left = given.size;;) {
-      Interval part{given.start + (given.size - left), left};
-      if (parts_.size() >= most_parts_of_a_step) return give_up(crossed, part.start);
+      const double longest = within_gap(left);
+      Interval part{given.start + (given.size - left), longest};
+      if (parts_.size() >= most_parts_of_a_step + gaps_.size() * parts_of_gap_)
+        return give_up(crossed, part.start);
       read(part.start, from, true, before_);
       start_velocity_ = velocity_;
       while (!solve_part(part, from, Guess::plain, work)) {
@@ -102,7 +106,8 @@ bool StepDivision::follow(const State& start, Work& work) {
       }
       changes_ = (after_ - before_).cwiseAbs();
       int number = first_change(), last = -1;
-      if (number < 0 && node_at_end_ && part.size != left) {  // longer ones fail: for what is at their end?
+      if (number < 0 && node_at_end_ &&
+          part.size != longest) {  // longer ones fail: for what is at their end?
         number = ahead(after_);
         if (number >= 0 && !shorten_before(number, part, from, work)) {
           number = -1;

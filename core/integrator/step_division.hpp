@@ -19,7 +19,10 @@ namespace diracstep {
 /// there for all of a part, the part ends a round-off before the zero, and one of that size leads across.  A
 /// pair of zeros within a step shows in no sign at its end: it is looked for at three places
 /// along a parabola through the ends, whose curvature is that of the mean velocities of this and the last
-/// step; so pairs that are narrow beside a step, and flat ones, are not seen.  Where the motion crosses one
+/// step, and along the one that the force at its start alone would lead on; so pairs that are narrow beside a
+/// step, and flat ones, are not seen.  What lies between two kinks of one step, as a contact that is shorter,
+/// is divided until twice as many parts end the step at the same place, and unresolved() says what that
+/// leaves: its parts do not become shorter with the step.  Where the motion crosses one
 /// kink again and again, as at a force that jumps and points back from both sides, the step is solved
 /// undivided, and stuck() says so.
 ///
@@ -33,6 +36,9 @@ class StepDivision {
 
   /// From now on a step ends behind the first kink that the motion crosses within it.
   void end_at_kinks() { end_at_kinks_ = true; }
+  /// From now on the way to the first kink is divided as what lies between two: for steps that are judged by
+  /// two halves of them, which come to a kink in their first half by the same part.
+  void resolve_to_first_kink() { resolves_to_first_ = true; }
 
   /// Afterwards sequence.end() is where the step ends; no trace of it is left before it is accepted.
   StepSequence::Outcome solve(Interval step, const State& start, Guess guess, Work& work);
@@ -45,6 +51,9 @@ class StepDivision {
   bool cut_short() const { return end_at_kinks_ && !passed_.empty(); }
   /// Empty, or why it is not divided although the motion crosses a kink, or fails before one.
   const std::string& stuck() const { return stuck_; }
+  /// How far its ends by the two finest divisions between its kinks are apart, relative to q and p; 0 where
+  /// that is round-off.
+  double unresolved() const { return unresolved_; }
 
   /// The centres of the pulses and ramps of the time in a step.
   void add_pulses(Interval step, std::vector<double>& times) { times_.add_pulses(step, times); }
@@ -59,11 +68,15 @@ class StepDivision {
   void read(double t, const State& at, bool exactly, Vector& switches);
   bool crosses(Interval step, const State& start, const State& end);
   double place_ahead(Interval step, const State& start);
+  void find_acceleration(Interval step, const State& start);
   double hidden_place(Interval step, const State& start, const State& end);
   int first_change() const;
   int ahead(const Vector& here) const;
   bool solve_part(Interval part, const State& from, Guess guess, Work& work);
   void keep(const Interval& part, State& from);
+  bool resolve_gaps(const State& start, Work& work);
+  bool follow_in(std::size_t parts, const State& start, Work& work);
+  double within_gap(double left) const;
   bool follow(const State& start, Work& work);
   bool approach(int number, const Interval& part, const State& from, double within, Approach& to, Work& work);
   bool shorten_before(int number, Interval& part, const State& from, Work& work);
@@ -81,11 +94,17 @@ class StepDivision {
   std::vector<KinkPassed> passed_;
   std::string stuck_;
   bool divided_ = false;
+  std::vector<double> gaps_;  ///< lengths of what is divided, to each kink; 0 where that is not
+  std::size_t parts_of_gap_ = 1;
+  bool resolves_to_first_ = false;
+  double unresolved_ = 0.0;
   SolveReport last_, solved_;  ///< of the part solved last, and of all that were kept
   double to_zero_ = 0.0;       ///< from the end of the part solved last, without sign
   Vector changes_;             ///< of the kinks within the part solved last, for what stuck() says
   Vector start_velocity_;      ///< of the part
+  Vector acceleration_;        ///< there, from the forces at the start
   Vector before_, after_, between_, velocity_, speed_, speed_up_, position_;
+  Vector force_, momentum_;
 };
 
 }  // namespace diracstep

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/core/runs/kink_check.hpp>
 #include <limits>
@@ -11,6 +12,7 @@ namespace {
 
 constexpr double part_unknown = 0.25;  // of the impulse that a step cannot know, by which it ends off
 constexpr double too_much = 0.005, too_much_at_instants = 0.0005;  // of the largest momentum
+constexpr double too_unresolved = 1e-3;                            // of q or p
 constexpr int looks_in_a_step = 2;
 constexpr double finest_cut = 1e-12;  // in parts of a step
 
@@ -84,6 +86,10 @@ void KinkCheck::look(const Integrator& integrator) {
   std::swap(from_, to_);
   force_before_ = force_;
   read(integrator, to_);
+  if (const double left = integrator.unresolved_between_kinks(); left > unresolved_) {
+    unresolved_ = left;
+    unresolved_time_ = from_.time;
+  }
   force_at(to_.time, to_.q, to_.v, to_.p, force_);
   largest_momentum_ = std::max(largest_momentum_, max_norm(integrator.momentum()));
   const PathCubic path{from_, to_};
@@ -111,6 +117,11 @@ void KinkCheck::look(const Integrator& integrator) {
 }
 
 std::string KinkCheck::text() const {
+  if (unresolved_ > too_unresolved)
+    return "the step from t = " + to_text(unresolved_time_) +
+           " crosses two kinks of the force, and what lies between them, as a contact, is not resolved in "
+           "it: "
+           "take shorter steps, or ask for an error, --error";
   if (!(sum_of_instants_ > too_much_at_instants * largest_momentum_) &&
       !(sum_ + sum_of_instants_ > too_much * largest_momentum_))
     return {};

@@ -20,7 +20,8 @@ namespace diracstep {
 /// since nodes can be put there.
 ///
 /// Steps that resolve what changes, and kinks at which forces stay continuous, as of a contact, count for
-/// little or nothing.  Not seen is what Kinks do not show.
+/// little or nothing.  Where a step could not resolve what lies between two kinks that it crosses, it is
+/// doubted for what that leaves.  Not seen is what Kinks do not show.
 class KinkCheck {
  public:
   /// For a run to about `end`: the instants of the time are looked up until then.
@@ -50,6 +51,7 @@ class KinkCheck {
   Vector force_, force_before_, change_, between_, beside_, momentum_, own_, q_, v_, p_;
   double sum_ = 0.0, sum_of_instants_ = 0.0, largest_momentum_ = 0.0, first_time_ = 0.0;
   long jumps_ = 0;
+  double unresolved_ = 0.0, unresolved_time_ = 0.0;  ///< between kinks, the largest of a step
   int first_ = -1;
 };
 

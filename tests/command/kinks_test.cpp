@@ -253,5 +253,32 @@ step = 0.01
   EXPECT_NEAR(at_end(outcome, "q", "a_q0"), std::cos(0.25), 1e-12);
 }
 
+/// A ball on a one-sided spring whose contact of 9.9 ms lies within the longer steps: the numbers of its
+/// parts do not grow with the number of steps, so that runs may agree and all be wrong.  The end is that of
+/// parabolas and of a half-wave about the depth at rest.
+TEST_F(KinksOfARun, AContactWithinAStepIsResolvedWhateverTheStep) {
+  const std::string file = scene("ball", R"toml(
+lagrangian = "v_x^2/2 - 9.81*x"
+[coordinates]
+x = {}
+[force]
+x = "if(x < 0, -1e5*x, 0)"
+[start]
+x = 1
+[span]
+end = 3
+step = 0.01
+)toml");
+  const double g = 9.81, k = 1e5, omega = std::sqrt(k), v = std::sqrt(2.0 * g), fall = std::sqrt(2.0 / g);
+  const double contact = (2.0 * M_PI - 2.0 * std::atan2(v / omega, g / k)) / omega,
+               phase = std::fmod(3.0, 2.0 * fall + contact), exact = 1.0 - g * phase * phase / 2.0;
+  for (const char* how : {"--error 1e-6", "--error 1e-9", "--step 0.05", "--step 0.1", "--adaptive"}) {
+    const Outcome outcome = run("run " + file + " --json " + how);
+    EXPECT_EQ(outcome.status, 0) << how << outcome.err;
+    const double allowed = std::string(how) == "--adaptive" ? 1e-3 : 1e-8;
+    if (outcome.status == 0) EXPECT_NEAR(at_end(outcome, "q", "x"), exact, allowed) << how;
+  }
+}
+
 }  // namespace
 }  // namespace diracstep::testing
