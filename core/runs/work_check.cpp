@@ -72,19 +72,20 @@ void WorkCheck::look(const Integrator& integrator) {
 
 void WorkCheck::see(const Sample& point) {
   if (!watched_) return;
-  if (!begun_) {
-    begun_ = true;
-    start_energy_ = point.energy;
-    return;
-  }
-  Integral work = work_;
+  Integral rest{0.0, 0.0};
   if (point.time != to_.time) {
     const double at_node = power_;
-    const Integral rest = work_between(to_, {point.time, point.q, point.v});
+    rest = work_between(to_, {point.time, point.q, point.v});
     power_ = at_node;
-    work.value += rest.value;
-    work.error += rest.error;
   }
+  if (!begun_) {  // the work from here on; points may be seen every few steps alone
+    begun_ = true;
+    start_energy_ = point.energy;
+    work_ = {-rest.value, rest.error};
+    turned_over_ = 0.0;
+    return;
+  }
+  const Integral work{work_.value + rest.value, work_.error + rest.error};
   const double change = point.energy - start_energy_;
   at_play_ = std::max({at_play_, 0.5 * std::abs(point.p.dot(point.v)), std::abs(change)});
   const double lost = work.value - change;
