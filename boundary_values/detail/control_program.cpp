@@ -253,7 +253,7 @@ Vector ControlProgram::gradient(const Vector& u) {
     of_end->gradient(at.t, at.q, at.v, by_q, by_v);
     const std::vector<int> places = motion_->end_unknowns();  // qN, then vN, each with the cost's own
     gradient.segment(places.front(), n_) += by_q.head(n_);
-    gradient.segment(places[static_cast<std::size_t>(n_ + 1)], n_) += by_v.head(n_);
+    gradient.segment(places[static_cast<std::size_t>(n_) + 1], n_) += by_v.head(n_);
   }
   return gradient;
 }
@@ -291,7 +291,7 @@ Vector ControlProgram::hessian(const Vector& u, double factor, const Vector& mul
   for (const auto& group : groups_) largest = std::max(largest, group.size());
   std::vector<Columns> blocks;
   for (const auto& group : groups_)
-    blocks.push_back(
+    blocks.emplace_back(
         Columns::Zero(static_cast<Eigen::Index>(group.size()), static_cast<Eigen::Index>(group.size())));
   for (std::size_t j = 0; j < largest; ++j) {
     Vector moved = u;
