@@ -30,6 +30,7 @@ double largest_entry(const SparseMatrix& matrix) {
 }
 
 double relative_change(const SparseMatrix& from, const SparseMatrix& to) {
+  if (from.size() == 0) return 0.0;
   const double size = from.norm();
   return size > 0.0 ? (to - from).norm() / size : to.norm();
 }

@@ -89,6 +89,7 @@ double residual_of(const ShiftInverse& map, std::complex<double> theta, const Ei
 }
 
 double change_of(const SparseMatrix& from, const SparseMatrix& to) {
+  if (from.size() == 0) return 0.0;
   const double size = from.norm();
   return size > 0.0 ? (to - from).norm() / size : to.norm();
 }
