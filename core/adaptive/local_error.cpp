@@ -154,8 +154,10 @@ StepReport LocalErrorControl::advance(Integrator& fine, Integrator& whole, doubl
     if (taken && (part <= 1.0 || std::abs(size) <= smallest_)) {
       const double growth = part > 0.0 ? below_eps * std::pow(part, -1.0 / (order_ + 1)) : most_growth;
       next = size * std::clamp(growth, most_shrinking, first ? most_growth : 1.0);
-      const bool slides = crossed_ && std::abs(size) < shortest_over_kinks * span_;
-      sliding_ = slides ? sliding_ + 1 : 0;
+      if (std::abs(size) >= shortest_over_kinks * span_)
+        sliding_ = 0;
+      else if (crossed_)
+        ++sliding_;
       if (sliding_ > most_stuck) {
         report.solve.status = SolveStatus::refused;
         report.failure = "from t = " + to_text(start, 6) +

@@ -282,5 +282,24 @@ step = 0.01
   }
 }
 
+/// At v = 0.3 the force points back from both sides: steps by their local error become tiny and without end.
+TEST_F(KinksOfARun, SlidingEndsStepsByTheirLocalError) {
+  const std::string file = scene("sliding", R"toml(
+lagrangian = "v_x^2/2"
+[coordinates]
+x = {}
+[force]
+x = "if(v_x > 0.3, -1, 0.2)"
+[start]
+v_x = 1
+[span]
+end = 6
+step = 0.2
+)toml");
+  const Outcome outcome = run("run " + file + " --method damped/radau:3 --adaptive");
+  EXPECT_EQ(outcome.status, 1) << outcome.err;
+  EXPECT_TRUE(says(outcome, "points back there from both sides")) << outcome.err;
+}
+
 }  // namespace
 }  // namespace diracstep::testing
