@@ -1,11 +1,11 @@
 #include <Eigen/Eigenvalues>
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <diracstep/core/adaptive/motion_rates.hpp>
 #include <diracstep/core/adaptive/pointwise_motion.hpp>
 #include <diracstep/core/adaptive/rate_monitor.hpp>
 #include <diracstep/core/integrator/point_reader.hpp>
+#include <diracstep/core/numerics/kernel_basis.hpp>
 #include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/core/system/constraint_distribution.hpp>
 
@@ -16,6 +16,13 @@ namespace {
 constexpr double damping_probe = 1e-6;  // in units of the sizes
 constexpr double least_size = 1e-6;     // of the largest position or velocity
 constexpr double hardly_damped = 1e-2;  // |Re λ| beside |Im λ|
+
+/// An orthonormal basis of what all rows allow.
+Columns tangents_of(Columns rows) {
+  for (Eigen::Index r = 0; r < rows.rows(); ++r)
+    rows.row(r) /= size_or_one(max_norm(rows.row(r).transpose()));
+  return orthonormal_kernel_basis(rows);
+}
 
 }  // namespace
 
@@ -91,10 +98,7 @@ class LinearisedMotion {
       all.bottomLeftCorner(positions.rows(), n_) = positions.pattern().full(positions.coefficients());
     }
     all = all * units_.asDiagonal();
-    for (Eigen::Index r = 0; r < all.rows(); ++r) all.row(r) /= size_or_one(max_norm(all.row(r).transpose()));
-    const Columns kernel = Eigen::FullPivLU<Columns>(all).kernel();
-    return Eigen::HouseholderQR<Columns>(kernel).householderQ() *
-           Columns::Identity(kernel.rows(), kernel.cols());
+    return tangents_of(all);
   }
 
   /// (δv, δa)/side in units, for (δq, δv) = side · direction.
@@ -176,10 +180,7 @@ class MasslessMotion {
     if (positions.rows() == 0) return Columns::Identity(n, n);
     positions.evaluate(at.time, at.q);
     Columns all = positions.pattern().full(positions.coefficients()) * units_.asDiagonal();
-    for (Eigen::Index r = 0; r < all.rows(); ++r) all.row(r) /= size_or_one(max_norm(all.row(r).transpose()));
-    const Columns kernel = Eigen::FullPivLU<Columns>(all).kernel();
-    return Eigen::HouseholderQR<Columns>(kernel).householderQ() *
-           Columns::Identity(kernel.rows(), kernel.cols());
+    return tangents_of(all);
   }
 
   /// δv/side in units, for δq = side · direction, where v is `here` without it.

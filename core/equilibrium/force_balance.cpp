@@ -220,6 +220,16 @@ std::shared_ptr<const Scene> with_start_and_hidden_rows(const Scene& scene, cons
   return with_hidden_rows(with_start(scene, start));
 }
 
+double largest_entry(const SparseMatrix& matrix) {
+  return matrix.nonZeros() > 0 ? matrix.coeffs().cwiseAbs().maxCoeff() : 0.0;
+}
+
+double relative_change(const SparseMatrix& from, const SparseMatrix& to) {
+  if (from.size() == 0) return 0.0;
+  const double size = from.norm();
+  return size > 0.0 ? (to - from).norm() / size : to.norm();
+}
+
 Vector least_multipliers(const Columns& one_forms, const Vector& forces) {
   if (one_forms.rows() == 0) return {};
   Eigen::CompleteOrthogonalDecomposition<Columns> decomposition;

@@ -61,6 +61,12 @@ std::shared_ptr<const Scene> with_start(const Scene& scene, const Start& start);
 /// matrices.
 std::shared_ptr<const Scene> with_start_and_hidden_rows(const Scene& scene, const Start& start);
 
+/// The largest size of an entry, 0 where there is none.
+double largest_entry(const SparseMatrix& matrix);
+
+/// |to − from| beside |from|, in the Frobenius norm; |to| where `from` is zero.
+double relative_change(const SparseMatrix& from, const SparseMatrix& to);
+
 /// The multiplier of least norm with Aᵀλ ≈ forces in least squares.
 Vector least_multipliers(const Columns& one_forms, const Vector& forces);
 

@@ -25,16 +25,6 @@ struct BalanceAt {
   Vector left;  ///< of the forces
 };
 
-double largest_entry(const SparseMatrix& matrix) {
-  return matrix.nonZeros() > 0 ? matrix.coeffs().cwiseAbs().maxCoeff() : 0.0;
-}
-
-double relative_change(const SparseMatrix& from, const SparseMatrix& to) {
-  if (from.size() == 0) return 0.0;
-  const double size = from.norm();
-  return size > 0.0 ? (to - from).norm() / size : to.norm();
-}
-
 /// `reach` is a size of coordinates that round-off may be of.
 double variation_between(const BalanceAt& first, const BalanceAt& second, double reach) {
   const ForceBalance &a = first.balance, &b = second.balance;

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <diracstep/core/equilibrium/operating_point.hpp>
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/numerics/kernel_basis.hpp>
 #include <diracstep/core/numerics/monotone_newton.hpp>
 #include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/core/system/first_order_motions.hpp>
@@ -17,10 +18,7 @@ constexpr double contradicted_from = 1e-7;  // of the terms of an equation
 Columns kernel_of_balanced_rows(Columns matrix) {
   for (Eigen::Index r = 0; r < matrix.rows(); ++r)
     matrix.row(r) /= size_or_one(max_norm(matrix.row(r).transpose()));
-  Eigen::FullPivLU<Columns> lu;
-  lu.setThreshold(1e-12);
-  lu.compute(matrix);
-  return lu.dimensionOfKernel() == 0 ? Columns(matrix.cols(), 0) : Columns(lu.kernel());
+  return kernel_basis(matrix, 1e-12);
 }
 
 /// The equations of the header.  Unknowns x: of each coordinate its position where it rests, else its

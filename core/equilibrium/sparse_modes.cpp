@@ -12,20 +12,17 @@ constexpr double zero_of_shift = 1e-6;
 constexpr double real_part_of_round_off = 1e-12;
 constexpr double converged = 1e-8;  // residual of an eigenpair
 
-double largest_of(const SparseMatrix& matrix) {
-  return matrix.nonZeros() > 0 ? matrix.coeffs().cwiseAbs().maxCoeff() : 0.0;
-}
-
 /// The fastest rate that the sizes of the matrices allow.
 double fastest_rate(const ForceBalance& balance) {
-  const double m = largest_of(balance.mass), c = largest_of(balance.damping),
-               k = largest_of(balance.stiffness);
+  const double m = largest_entry(balance.mass), c = largest_entry(balance.damping),
+               k = largest_entry(balance.stiffness);
   if (m > 0.0 && k > 0.0) return std::sqrt(k / m);
   if (c > 0.0 && k > 0.0) return k / c;
   if (m > 0.0 && c > 0.0) return c / m;
-  const double rows = largest_of(balance.one_forms);
-  return rows > 0.0 && largest_of(balance.row_derivative) > 0.0 ? largest_of(balance.row_derivative) / rows
-                                                                : 1.0;
+  const double rows = largest_entry(balance.one_forms);
+  return rows > 0.0 && largest_entry(balance.row_derivative) > 0.0
+             ? largest_entry(balance.row_derivative) / rows
+             : 1.0;
 }
 
 /// The first `positions` rows of one, the others of the other.
@@ -88,12 +85,6 @@ double residual_of(const ShiftInverse& map, std::complex<double> theta, const Ei
   return (image - theta * x).norm() / (std::abs(theta) * x.norm());
 }
 
-double change_of(const SparseMatrix& from, const SparseMatrix& to) {
-  if (from.size() == 0) return 0.0;
-  const double size = from.norm();
-  return size > 0.0 ? (to - from).norm() / size : to.norm();
-}
-
 /// Of the matrices with the same forces of rows; `reach` is a size of coordinates that round-off may be of.
 double variation_of(const Scene& scene, const ForceBalance& here, const Equilibrium& at, const Vector& lambda,
                     double later, double reach) {
@@ -105,10 +96,10 @@ double variation_of(const Scene& scene, const ForceBalance& here, const Equilibr
     there.set_multipliers(lambda);
     for (const auto matrix :
          {&ForceBalance::mass, &ForceBalance::damping, &ForceBalance::stiffness, &ForceBalance::one_forms})
-      largest = std::max(largest, change_of(here.*matrix, there.*matrix));
+      largest = std::max(largest, relative_change(here.*matrix, there.*matrix));
     Vector left = there.forces;
     if (lambda.size() > 0) left -= there.one_forms.transpose() * lambda;
-    const double size = there.sizes.lpNorm<Eigen::Infinity>() + reach * largest_of(here.stiffness);
+    const double size = there.sizes.lpNorm<Eigen::Infinity>() + reach * largest_entry(here.stiffness);
     if (size > 0.0) largest = std::max(largest, left.lpNorm<Eigen::Infinity>() / size);
   }
   return largest;

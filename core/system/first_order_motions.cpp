@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/numerics/kernel_basis.hpp>
 #include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/core/system/first_order_motions.hpp>
 #include <diracstep/core/system/kernel_motions.hpp>
@@ -16,13 +17,6 @@ namespace {
 
 constexpr int most_coordinates_of_first_order = 1500;  // matrices are full
 constexpr double regular_to = 1e-13;
-
-Columns kernel_of(const Columns& matrix, double threshold = regular_to) {
-  Eigen::FullPivLU<Columns> lu;
-  lu.setThreshold(threshold);
-  lu.compute(matrix);
-  return lu.dimensionOfKernel() == 0 ? Columns(matrix.cols(), 0) : Columns(lu.kernel());
-}
 
 Columns stack(const Columns& upper, const Columns& lower) {
   Columns both(upper.rows() + lower.rows(), upper.cols());
@@ -121,7 +115,8 @@ FirstOrderMotions first_order_motions(const Scene& scene) {
   if (structure.separable && !by_force) return {};
   const AtTwoPoints at(scene);
   if (!at.finite()) return {};
-  const Columns w = kernel_of(at.mass), free = kernel_of(stack(at.mass, at.one_forms));
+  const Columns w = kernel_basis(at.mass, regular_to),
+                free = kernel_basis(stack(at.mass, at.one_forms), regular_to);
   const Columns reached = at.by_q.topRows(n).transpose() * free;  // momenta along `free` by positions
   const bool constant = max_norm(reached) <= 1e-12 * size_or_one(max_norm(at.by_q));
   if (FirstOrderMotions motions = kernel_motions(scene, !constant); motions.exist()) return motions;
@@ -199,17 +194,17 @@ void FirstOrderPoint::differentiate() {
 }
 
 FirstOrderVelocityProblem::FirstOrderVelocityProblem(const Scene& scene, const FirstOrderMotions& motions)
-    : n_(scene.dimension()),
-      m_(scene.rows()),
-      point_(scene, motions),
-      pattern_(SparsityPattern::dense(n_ + m_, n_ + m_)) {
+    : MomentumVelocityProblem(scene), point_(scene, motions) {
   const auto inert = static_cast<int>(motions.u.cols());
   if (inert > 0) blocks_.push_back({"momentum", inert});
   blocks_.push_back({"force", n_ - inert});
   if (m_ > 0) blocks_.push_back({"velocity", m_});
 }
 
-void FirstOrderVelocityProblem::begin(double t, ConstVectorRef q, ConstVectorRef p) {
+MomentumVelocityProblem::MomentumVelocityProblem(const Scene& scene)
+    : n_(scene.dimension()), m_(scene.rows()), pattern_(SparsityPattern::dense(n_ + m_, n_ + m_)) {}
+
+void MomentumVelocityProblem::begin(double t, ConstVectorRef q, ConstVectorRef p) {
   t_ = t;
   q_ = q;
   p_ = p;
@@ -268,7 +263,7 @@ void require_determined(const Scene& scene, const FirstOrderMotions& motions) {
   Columns matrix = values.reshaped(n + m, n + m);
   for (Eigen::Index r = 0; r < matrix.rows(); ++r)
     matrix.row(r) /= size_or_one(max_norm(matrix.row(r).transpose()));
-  const Columns open = kernel_of(matrix, motions.hide_equations() ? 1e-7 : regular_to);
+  const Columns open = kernel_basis(matrix, motions.hide_equations() ? 1e-7 : regular_to);
   if (open.cols() == 0) return;
   std::string velocities, forces;
   for (Eigen::Index k = 0; k < open.cols(); ++k) {

@@ -86,7 +86,21 @@ class FirstOrderPoint {
 /// Unknowns (v, Λ) at given t, q, p.
 class MomentumVelocityProblem : public NonlinearProblem {
  public:
-  virtual void begin(double t, ConstVectorRef q, ConstVectorRef p) = 0;
+  int size() const final { return n_ + m_; }
+  const SparsityPattern& pattern() const final { return pattern_; }
+  std::span<const ResidualBlock> blocks() const final { return blocks_; }
+  void begin(double t, ConstVectorRef q, ConstVectorRef p);
+
+ protected:
+  explicit MomentumVelocityProblem(const Scene& scene);
+
+  int n_, m_;
+  std::vector<ResidualBlock> blocks_;
+  double t_ = 0.0;
+  Vector q_, p_;
+
+ private:
+  SparsityPattern pattern_;
 };
 
 /// By the equations of FirstOrderPoint.
@@ -94,21 +108,11 @@ class FirstOrderVelocityProblem final : public MomentumVelocityProblem {
  public:
   FirstOrderVelocityProblem(const Scene& scene, const FirstOrderMotions& motions);
 
-  int size() const override { return n_ + m_; }
-  const SparsityPattern& pattern() const override { return pattern_; }
-  std::span<const ResidualBlock> blocks() const override { return blocks_; }
-
-  void begin(double t, ConstVectorRef q, ConstVectorRef p) override;
   void residual(ConstVectorRef x, VectorRef f) override;
   void jacobian(ConstVectorRef x, VectorRef values) override;
 
  private:
-  int n_, m_;
   FirstOrderPoint point_;
-  SparsityPattern pattern_;
-  std::vector<ResidualBlock> blocks_;
-  double t_ = 0.0;
-  Vector q_, p_;
 };
 
 /// The one of the two, here and in kernel_motions.hpp, that motions ask for.

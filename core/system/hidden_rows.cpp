@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/numerics/kernel_basis.hpp>
 #include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/core/system/constraint_distribution.hpp>
 #include <diracstep/core/system/first_order_motions.hpp>
@@ -56,11 +57,7 @@ struct FullDerivatives {
 
 /// A basis of the kernel, without a column where there is none.
 Columns kernel(const Columns& matrix) {
-  Eigen::FullPivLU<Columns> lu;
-  lu.setThreshold(rank_tolerance(matrix));
-  lu.compute(matrix);
-  if (lu.dimensionOfKernel() == 0) return Columns(matrix.cols(), 0);
-  Columns basis = lu.kernel();
+  Columns basis = kernel_basis(matrix, rank_tolerance(matrix));
   for (Eigen::Index j = 0; j < basis.cols(); ++j) {
     basis.col(j) /= max_norm(basis.col(j));
     Eigen::Index first = 0;

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/numerics/kernel_basis.hpp>
 #include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/core/system/kernel_motions.hpp>
 #include <diracstep/core/system/rows_along_motions.hpp>
@@ -16,7 +17,7 @@ namespace {
 
 constexpr int most_with_hidden_equations = 200;
 constexpr double difference = 1e-5;  ///< of central differences, in relation to what is varied
-constexpr double no_dependence = 1e-8;
+constexpr double no_dependence = 1e-8, regular_along_rows = 1e-11;
 
 Eigen::Index count(const std::vector<int>& places) { return static_cast<Eigen::Index>(places.size()); }
 
@@ -42,15 +43,6 @@ void divide_coordinates(const Columns& mass, FirstOrderMotions& motions) {
     (k < qr.rank() ? motions.inert : motions.along).push_back(order[k]);
   std::ranges::sort(motions.inert);
   std::ranges::sort(motions.along);
-}
-
-/// A basis of the kernel; without a column where there is none.
-Columns kernel_of_rows(const Columns& rows, Eigen::Index n) {
-  if (rows.size() == 0) return Columns::Identity(n, n);
-  Eigen::FullPivLU<Columns> lu;
-  lu.setThreshold(1e-11);
-  lu.compute(rows);
-  return lu.dimensionOfKernel() == 0 ? Columns(n, 0) : Columns(lu.kernel());
 }
 
 /// Tells those equations with entries beside their size from hidden ones.
@@ -89,8 +81,9 @@ FirstOrderMotions kernel_motions(const Scene& scene, bool first_order) {
     moves = moves || (!first && max_norm(here - w) > 1e-9 * max_norm(w));
     w = here;
     const double size = point.terms() / size_or_one(max_norm(at.v));
-    const Columns allowed = kernel_of_rows(point.full().rows(), n);
-    if (kernel_of_rows(mass * allowed, allowed.cols()).cols() == 0) return {};  // regular along the rows
+    const Columns allowed =
+        m == 0 ? Columns(Columns::Identity(n, n)) : kernel_basis(point.full().rows(), regular_along_rows);
+    if (kernel_basis(mass * allowed, regular_along_rows).cols() == 0) return {};  // regular along the rows
     keep_if_none(point.along_by_v() * w, size, 0, motions.hidden);
     keep_if_none(point.along_by_lambda(), max_norm(point.full().rows()), 0, motions.hidden);
     keep_if_none(point.full().rows() * w, max_norm(point.full().rows()), w.cols(), motions.hidden);
@@ -190,22 +183,11 @@ Vector KernelPoint::hidden_rates(double& resolved) {
 }
 
 KernelVelocityProblem::KernelVelocityProblem(const Scene& scene, const FirstOrderMotions& motions)
-    : n_(scene.dimension()),
-      m_(scene.rows()),
-      inert_(static_cast<int>(motions.inert.size())),
-      point_(scene, motions),
-      pattern_(SparsityPattern::dense(n_ + m_, n_ + m_)) {
+    : MomentumVelocityProblem(scene), inert_(static_cast<int>(motions.inert.size())), point_(scene, motions) {
   const auto hidden = static_cast<int>(std::ranges::count(motions.hidden, true));
   if (inert_ > 0) blocks_.push_back({"momentum", inert_});
   if (n_ + m_ > inert_ + hidden) blocks_.push_back({"force and velocity", n_ + m_ - inert_ - hidden});
   if (hidden > 0) blocks_.push_back({"rate of hidden equations", hidden});
-}
-
-void KernelVelocityProblem::begin(double t, ConstVectorRef q, ConstVectorRef p) {
-  t_ = t;
-  q_ = q;
-  p_ = p;
-  for (ResidualBlock& block : blocks_) block.scale = smallest_scale;
 }
 
 void KernelVelocityProblem::residual(ConstVectorRef x, VectorRef f) {

@@ -73,21 +73,12 @@ class KernelVelocityProblem final : public MomentumVelocityProblem {
  public:
   KernelVelocityProblem(const Scene& scene, const FirstOrderMotions& motions);
 
-  int size() const override { return n_ + m_; }
-  const SparsityPattern& pattern() const override { return pattern_; }
-  std::span<const ResidualBlock> blocks() const override { return blocks_; }
-
-  void begin(double t, ConstVectorRef q, ConstVectorRef p) override;
   void residual(ConstVectorRef x, VectorRef f) override;
   void jacobian(ConstVectorRef x, VectorRef values) override;
 
  private:
-  int n_, m_, inert_;
+  int inert_;
   KernelPoint point_;
-  SparsityPattern pattern_;
-  std::vector<ResidualBlock> blocks_;
-  double t_ = 0.0;
-  Vector q_, p_;
 };
 
 /// Throws InconsistentStart where a start violates a hidden equation by more than 1e-10 of its terms; names

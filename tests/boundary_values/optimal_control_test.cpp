@@ -4,6 +4,7 @@
 #include <unsupported/Eigen/MatrixFunctions>
 
 #include "combinations.hpp"
+#include "controlled.hpp"
 
 /// Optimal control by Pontryagin's principle: states and costates are the coordinates of a Lagrangian linear
 /// in v, λ·ẋ − H(x, λ), whose motions between given states are the optimal ones.
@@ -12,25 +13,11 @@ namespace {
 
 using namespace testing;
 
-/// So many first coordinates are states; conditions name coordinates (first) by value (second).
-using Values = std::vector<std::pair<int, double>>;
-
 BoundaryReport controlled(const ScenePointer& scene, const IntegratorOptions& options, long count,
-                          const Values& start, const Values& end, const GuessedMotion& guess) {
+                          const EndValues& start, const EndValues& end, const GuessedMotion& guess) {
   const int n = scene->dimension();
-  const auto rows = static_cast<Eigen::Index>(start.size() + end.size());
-  BoundaryConditions conditions{Columns::Zero(rows, 3 * n), Columns::Zero(rows, 3 * n), Vector(rows)};
-  Eigen::Index row = 0;
-  for (const auto& [i, value] : start) {
-    conditions.at_start(row, i) = 1.0;
-    conditions.value[row++] = value;
-  }
-  for (const auto& [i, value] : end) {
-    conditions.at_end(row, i) = 1.0;
-    conditions.value[row++] = value;
-  }
   return solve_boundary_values(
-      {scene, Registry::with_built_ins(), kinsol(), options, count, conditions, guess});
+      {scene, Registry::with_built_ins(), kinsol(), options, count, conditions_on(n, start, end), guess});
 }
 
 GuessedMotion resting_at(const Vector& q) {
