@@ -119,7 +119,7 @@ int main(int count, char** arguments) {
       const CatalogueScene entry = make_scene(name);
       if (entry.needs.empty() && entry.scene->dimension() + entry.scene->rows() <= 15) names.push_back(name);
     }
-    names.push_back("toda_200");
+    names.emplace_back("toda_200");
   }
   Ratios ratios;
   for (const std::string& name : names) examine(name, ratios);

@@ -22,7 +22,7 @@ void measure(const std::string& name, const std::string& method) {
   Integrator integrator(entry.scene, registry, kinsol(), options);
   const int n = entry.scene->dimension();
   Sensitivities sensitivities(integrator, registry);
-  const ReadDirections weights{Columns::Ones(n, 1), {}, {}};
+  ReadDirections weights{Columns::Ones(n, 1), {}, {}};
   const auto gradient = [&](long every) {
     integrator.reset();
     (void)sensitivities.gradient(steps, [&](long, const Sample&) { return weights; }, 0, {every});

@@ -24,6 +24,14 @@ set(diracstep_headers_library <Eigen/Core> <algorithm> <array> <cmath> <function
 set(diracstep_headers_command ${diracstep_headers_library} <CLI/App.hpp> <CLI/Config.hpp> <CLI/Formatter.hpp>
   <fmt/format.h>)
 set(diracstep_headers_test ${diracstep_headers_library} <gtest/gtest.h>)
+set(diracstep_headers_unoptimised_test ${diracstep_headers_test})  # they are read with the flags of their sources
+
+# Where DIRACSTEP_UNOPTIMISED_TESTS says so, the target is compiled without optimisation, which takes half the time.
+function(diracstep_leave_unoptimised target)
+  if(DIRACSTEP_UNOPTIMISED_TESTS)
+    target_compile_options(${target} PRIVATE -O0)
+  endif()
+endfunction()
 
 # diracstep_precompile(<target> <kind> [<libraries>...]); the libraries are those of the kind's headers.
 function(diracstep_precompile target kind)
@@ -33,7 +41,7 @@ function(diracstep_precompile target kind)
   set(common diracstep_headers_of_${kind})
   if(NOT TARGET ${common})
     set(source ${PROJECT_BINARY_DIR}/${common}.cpp)
-    if(kind STREQUAL test)  # position independent as programs are
+    if(kind MATCHES test)  # position independent as programs are
       file(CONFIGURE OUTPUT ${source} CONTENT "int main() {}\n")
       add_executable(${common} EXCLUDE_FROM_ALL ${source})
     else()
@@ -42,6 +50,9 @@ function(diracstep_precompile target kind)
     endif()
     target_link_libraries(${common} PRIVATE Eigen3::Eigen ${ARGN})
     diracstep_compile_options(${common})
+    if(kind MATCHES unoptimised)
+      diracstep_leave_unoptimised(${common})
+    endif()
     target_precompile_headers(${common} PRIVATE ${diracstep_headers_${kind}})
   endif()
   target_precompile_headers(${target} REUSE_FROM ${common})

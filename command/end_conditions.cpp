@@ -82,7 +82,7 @@ BoundaryConditions conditions_from_start(const Scene& scene, const std::vector<s
   return conditions_of(start, asked(scene, to, "--to"), n);
 }
 
-GuessedMotion through_points(Vector times, Columns q, Columns v) {
+GuessedMotion through_points(const Vector& times, const Columns& q, const Columns& v) {
   return [=](double t) {
     const Eigen::Index last = times.size() - 1;
     if (last == 0) return GuessedPoint{q.col(0), v.col(0)};

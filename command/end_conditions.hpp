@@ -20,7 +20,7 @@ BoundaryConditions conditions_at_ends(const Scene& scene, const std::vector<std:
 BoundaryConditions conditions_from_start(const Scene& scene, const std::vector<std::string>& to);
 
 /// Between points, straight.
-GuessedMotion through_points(Vector times, Columns q, Columns v);
+GuessedMotion through_points(const Vector& times, const Columns& q, const Columns& v);
 
 /// Through the points of a CSV file with columns t, coordinates and v_NAME.  Throws Misuse where one is
 /// missing.

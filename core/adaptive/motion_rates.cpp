@@ -113,7 +113,7 @@ class LinearisedMotion {
   }
 
   const Scene& scene_;
-  Eigen::Index n_;
+  int n_;
   PointwiseMotion motion_;
   Vector sizes_, units_, by_position_, by_velocity_;
 };

@@ -23,7 +23,7 @@ template <class T>
 T stumpff_series(int k, const T& s, int terms) {
   T sum(1.0);
   for (int j = terms; j > 0; --j)
-    sum = T(1.0) - s * sum * T(stumpff_ratios[static_cast<std::size_t>(2 * j + k)]);
+    sum = T(1.0) - s * sum * T(stumpff_ratios[2 * static_cast<std::size_t>(j) + static_cast<std::size_t>(k)]);
   double factorial = 1.0;
   for (int i = 2; i <= k; ++i) factorial *= i;
   return sum * T(1.0 / factorial);
