@@ -3,6 +3,7 @@
 
 #include <CLI/App.hpp>
 #include <algorithm>
+#include <atomic>
 #include <diracstep/command/arguments.hpp>
 #include <diracstep/command/files/written_file.hpp>
 #include <diracstep/command/gradient_study.hpp>
@@ -23,10 +24,15 @@
 #include <diracstep/scene_format/position_names.hpp>
 #include <diracstep/scene_format/scene_file.hpp>
 #include <diracstep/solvers/sundials_build.hpp>
+#include <exception>
 #include <filesystem>
+#include <functional>
+#include <future>
 #include <limits>
 #include <memory>
+#include <mutex>
 #include <optional>
+#include <thread>
 #include <utility>
 
 namespace diracstep::command {
@@ -52,6 +58,7 @@ const std::vector<std::string> fair_selection{"knife_edge",
 /// … and with --full these as well.
 const std::vector<std::string> more_scenes{"vertical_rolling_disk", "car_axis",   "rigid_body_quat",
                                            "point_vortices_two",    "lc_circuit", "hanging_chain"};
+constexpr int most_threads = 1024;
 constexpr double quick_time = 34.0;  // CPU seconds for all scenes, pictures left out
 
 /// Where a study of no named scenes leaves its report.
@@ -101,12 +108,13 @@ std::vector<CatalogueScene> chosen_scenes(const StudyArguments& options, const S
   return scenes;
 }
 
-/// The scenes of a study, with one line of progress for all of them.
+/// The scenes of a study, run by so many threads, with one line of progress for all of them.  The ladders of
+/// all scenes share `time` CPU seconds: each has the part of what is left that it is expected to take.
 class Course {
  public:
   Course(std::vector<CatalogueScene> scenes, const StudyOptions& options, const Session& session,
-         bool in_order)
-      : options_(options), session_(session) {
+         bool in_order, double time)
+      : options_(options), session_(session), time_(time) {
     for (CatalogueScene& scene : scenes) {
       const double seconds = expected_seconds(scene, session.registry, session.solvers, options);
       stages_.push_back({std::move(scene), seconds});
@@ -118,35 +126,81 @@ class Course {
   std::size_t size() const { return stages_.size(); }
   const CatalogueScene& scene(std::size_t i) const { return stages_[i].scene; }
 
-  /// `time` in seconds is for this scene and those after it; each has the part of it that it is expected to
-  /// take.
-  Study run(std::size_t i, double time) {
-    StudyOptions options = options_;
-    options.time_limit = time * stages_[i].seconds / std::max(all_ - done_, stages_[i].seconds);
-    Study study = convergence_study(stages_[i].scene, session_.registry, session_.solvers, options,
-                                    [&](double part, const std::string& what) {
-                                      show(part * stages_[i].seconds, what);
-                                      return !interrupted();
-                                    });
-    done_ += stages_[i].seconds;
-    progress_.wipe();
-    return study;
+  /// Calls `finished` on this thread for each scene in turn, as soon as it and those before it are done.  An
+  /// interrupt leaves out what was not begun.
+  void run(int threads, const std::function<void(std::size_t, Study)>& finished) {
+    std::vector<std::promise<std::optional<Study>>> results(stages_.size());
+    std::atomic<std::size_t> next = 0;
+    const auto work = [&] {
+      for (std::size_t i = next++; i < stages_.size(); i = next++) try {
+          results[i].set_value(interrupted() ? std::nullopt : std::optional(study(i)));
+        } catch (...) {
+          results[i].set_exception(std::current_exception());
+        }
+    };
+    std::vector<std::jthread> others;
+    if (threads > 1)
+      for (int k = 0; k < threads; ++k) others.emplace_back(work);
+    try {
+      for (std::size_t i = 0; i < stages_.size(); ++i) {
+        if (threads == 1) results[i].set_value(interrupted() ? std::nullopt : std::optional(study(i)));
+        std::optional<Study> result = results[i].get_future().get();
+        wipe();
+        if (result) finished(i, std::move(*result));
+      }
+    } catch (...) {
+      next = stages_.size();  // no thread begins another scene
+      throw;
+    }
   }
 
  private:
   struct Stage {
     CatalogueScene scene;
-    double seconds;  ///< expected
+    double seconds;     ///< expected
+    double part = 0.0;  ///< done
   };
 
-  void show(double seconds, const std::string& what) {
-    progress_.show(all_ > 0.0 ? (done_ + seconds) / all_ : 0.0, what);
+  Study study(std::size_t i) {
+    Stage& stage = stages_[i];
+    StudyOptions options = options_;
+    options.time_limit = share(stage);
+    const double begin = thread_seconds();
+    Study result = convergence_study(stage.scene, session_.registry, session_.solvers, options,
+                                     [&](double part, const std::string& what) {
+                                       show(stage, part, what);
+                                       return !interrupted();
+                                     });
+    const std::lock_guard lock(mutex_);
+    stage.part = 1.0;
+    done_ += stage.seconds;
+    time_ -= thread_seconds() - begin;
+    return result;
+  }
+
+  double share(const Stage& stage) {
+    const std::lock_guard lock(mutex_);
+    return std::max(0.0, time_) * stage.seconds / std::max(all_ - done_, stage.seconds);
+  }
+
+  void show(Stage& stage, double part, const std::string& what) {
+    const std::lock_guard lock(mutex_);
+    stage.part = part;
+    double seconds = 0.0;
+    for (const Stage& each : stages_) seconds += each.part * each.seconds;
+    progress_.show(all_ > 0.0 ? seconds / all_ : 0.0, what);
+  }
+
+  void wipe() {
+    const std::lock_guard lock(mutex_);
+    progress_.wipe();
   }
 
   const StudyOptions& options_;
   const Session& session_;
   std::vector<Stage> stages_;
-  double all_ = 0.0, done_ = 0.0;
+  std::mutex mutex_;  // for the parts, the times and the line of progress
+  double time_, all_ = 0.0, done_ = 0.0;
   Progress progress_;
 };
 
@@ -230,19 +284,15 @@ void study(const StudyArguments& options, Session& session) {
   const std::string before = options.compare.empty() ? "" : earlier_study(options.compare);
   std::optional<OutputDirectory> out = report_directory(options);
   catch_interrupts();
-  const double begin = thread_seconds();
-  const auto time_left = [&] {
-    const double passed = thread_seconds() - begin;
-    return limited(options) ? std::max(0.0, quick_time - passed) : std::numeric_limits<double>::infinity();
-  };
   for (const auto& [name, value] : build_facts())
     say(fmt::format("{}: {}", name == "diracstep" ? "version" : name, value));
   const Screen screen(options, out.has_value());
-  Course course(std::move(scenes), chosen, session, !nothing_named(options));
+  Course course(std::move(scenes), chosen, session, !nothing_named(options),
+                limited(options) ? quick_time : std::numeric_limits<double>::infinity());
   std::vector<Study> studies;
   std::vector<PageEntry> page;
-  for (std::size_t i = 0; i < course.size() && !interrupted(); ++i) {
-    studies.push_back(course.run(i, time_left()));
+  course.run(options.parallel, [&](std::size_t i, Study result) {
+    studies.push_back(std::move(result));
     if (tell_failures(studies.back(), options)) session.exit_status = failed;
     screen.show(studies.back());
     std::string failure;
@@ -251,10 +301,10 @@ void study(const StudyArguments& options, Session& session) {
       failure = out->write(studies, page, facts_of(chosen), i + 1 == course.size() || interrupted());
     }
     if (failure.empty() && !options.table.empty()) failure = write_file(options.table, tables(studies));
-    if (failure.empty()) continue;
+    if (failure.empty()) return;
     say(failure);
     session.exit_status = failed;
-  }
+  });
   if (options.json) print(studies_json(studies) + '\n');
   if (!before.empty()) say(comparison_table(compare_studies(studies, before)));
   if (out) say("the report of this study: " + out->report());
@@ -295,6 +345,11 @@ void add_study(CLI::App& app, Session& session) {
                  "Instead of motions their derivatives by the start, beside forward sensitivities by IDAS;\n"
                  "takes SCENE, --end, --set, --out and --json");
   verb->add_option("--repeat", options->repeat, "Timed runs of each row; 3, and 5 with --full");
+  verb->add_option(
+          "--parallel", options->parallel,
+          "Scenes at a time, each by a thread of its own whose CPU time is taken; 1, since threads that\n"
+          "share caches and clocks slow each other")
+      ->check(CLI::Range(1, most_threads));
   verb->add_option("--budget", options->budget,
                    "CPU seconds that a run of a ladder may take; 0.1, and 1 with --full");
   verb->add_option("--end", options->end, "End time; the scene's own without it");

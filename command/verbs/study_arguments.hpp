@@ -19,6 +19,7 @@ struct StudyArguments {
   bool without_ida = false, without_erk = false;
   bool adaptive = false, full = false;
   std::optional<int> repeat;
+  int parallel = 1;
   std::optional<double> budget;
   std::optional<double> end;
   std::string momentum = "projected";
