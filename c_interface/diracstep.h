@@ -66,7 +66,7 @@ typedef struct diracstep_source {
                                      * it are gone */
   int parameters;                   /* how many are changed; not with callbacks … */
   const diracstep_parameter *parameter; /* … and they */
-  int drop_redundant;                   /* 1: redundant constraints are left out instead of refused */
+  int drop_redundant;                   /* 1: redundant constraints are left out also where they are refused */
   int plugins;                          /* how many shared objects are loaded first … */
   const char *const *plugin;            /* … and their paths */
   int linked;                           /* plugins that are in memory, see diracstep_plugin.h … */
