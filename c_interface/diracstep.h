@@ -66,10 +66,10 @@ typedef struct diracstep_source {
                                      * it are gone */
   int parameters;                   /* how many are changed; not with callbacks … */
   const diracstep_parameter *parameter; /* … and they */
-  int drop_redundant;                   /* 1: redundant constraints are left out instead of refused */
-  int plugins;                          /* how many shared objects are loaded first … */
-  const char *const *plugin;            /* … and their paths */
-  int linked;                           /* plugins that are in memory, see diracstep_plugin.h … */
+  int drop_redundant;        /* 1: redundant constraints are left out also where they are refused */
+  int plugins;               /* how many shared objects are loaded first … */
+  const char *const *plugin; /* … and their paths */
+  int linked;                /* plugins that are in memory, see diracstep_plugin.h … */
   const struct diracstep_plugin *const *linked_plugin; /* … which stay as the callbacks do */
   int tolerances; /* how many coordinates, far smaller than others, are solved in each step to a value of
                    * their own, not to 1e-15 of the largest … */

@@ -114,7 +114,9 @@ int diracstep_open(unsigned version, const diracstep_source* source, diracstep_m
       made->name = from.name != nullptr ? from.name : "text";
       if (from.text != nullptr) made->text = from.text;
       made->changes = named_values(from.parameters, from.parameter, "parameter");
-      if (from.drop_redundant != 0) drop_redundant_rows(made->entry);
+      const bool refused = made->entry.scene->refuse_redundant_rows;
+      const bool of_a_file = made->entry.stated_start.has_value();  // which has left them out
+      if (refused ? from.drop_redundant != 0 : !of_a_file) drop_redundant_rows(made->entry);
       set_tolerances(made->entry, named_values(from.tolerances, from.tolerance, "tolerance"));
       require_flat(*made->entry.scene, "the interface of C, and with it those of Python and Julia,");
       made->scene = completed(made->entry.scene);

@@ -93,7 +93,8 @@ std::function<CatalogueScene(const Parameters&)> scene_maker(const Session& sess
   if (plugin == nullptr) file.emplace(scene_source(name));
   return [&session, name, plugin, file](const Parameters& changes) {
     CatalogueScene entry = file ? file->load(changes) : scene_of(*plugin, name, changes);
-    if (session.drop_redundant_rows) drop_redundant_rows(entry);
+    const bool refused = entry.scene->refuse_redundant_rows;
+    if (refused ? session.drop_redundant_rows : plugin != nullptr) drop_redundant_rows(entry);
     set_tolerances(entry, parameters(session.tolerances, "--tolerance"));
     return entry;
   };

@@ -74,9 +74,8 @@ void add_set_option(CLI::App& verb, std::vector<std::string>& assignments) {
 }
 
 void add_redundancy_option(CLI::App& verb, Session& session) {
-  verb.add_flag(
-      "--drop-redundant", session.drop_redundant_rows,
-      "Leave out redundant constraints of plugins' scenes and where a file refuses them, and say which");
+  verb.add_flag("--drop-redundant", session.drop_redundant_rows,
+                "Leave out redundant constraints also where a scene refuses them, and say which");
 }
 
 void add_tolerance_option(CLI::App& verb, Session& session) {

@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <cmath>
-#include <diracstep/core/equilibrium/force_balance.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/numerics/near_names.hpp>
 #include <diracstep/core/system/contradictory_rows.hpp>
@@ -32,14 +31,29 @@ void require_inputs_until(const CatalogueScene& entry, double end, const std::st
                    "; hold = true would keep its end values");
 }
 
+namespace {
+
+std::shared_ptr<const Scene> without_refusal(const std::shared_ptr<const Scene>& scene) {
+  if (!scene || !scene->refuse_redundant_rows) return scene;
+  auto copy = std::make_shared<Scene>(*scene);
+  copy->refuse_redundant_rows = false;
+  return copy;
+}
+
+}  // namespace
+
 void drop_redundant_rows(CatalogueScene& entry) {
+  entry.scene = without_refusal(entry.scene);
+  entry.all_rows = without_refusal(entry.all_rows);
   const std::shared_ptr<const Scene> scene = completed(entry.scene);
   if (!scene->start.q.allFinite() || scene->start.q.size() != scene->dimension()) return;  // refused by runs
   const std::vector<std::string> dependent = redundant_rows(*scene, scene->start);
   if (dependent.empty() || row_dependence(*scene, scene->start, dependent) != RowDependence::lasting) return;
   if (!contradiction(*scene, scene->start, dependent).empty()) return;  // refused by runs, with the reason
-  if (!entry.all_rows && entry.events.empty()) entry.all_rows = entry.scene;
-  entry.scene = with_rows_left_out(entry.scene, dependent);
+  if (entry.events.empty()) {
+    entry.all_rows = entry.scene;
+    entry.scene = with_rows_left_out(entry.scene, dependent);
+  }
   constexpr std::size_t most_names = 50;
   std::string names;
   for (const std::string& name : dependent | std::views::take(most_names))
@@ -51,19 +65,7 @@ void drop_redundant_rows(CatalogueScene& entry) {
 }
 
 Vector shown_forces(const CatalogueScene& entry, double t, const Vector& q, const Vector& lambda) {
-  constexpr Eigen::Index most_rows = 200;
-  if (!entry.all_rows || !entry.events.empty()) return lambda;
-  const std::vector<std::string> kept = entry.scene->row_names(), all = entry.all_rows->row_names();
-  const auto known = std::min(kept.size(), static_cast<std::size_t>(lambda.size()));
-  Vector forces = Vector::Zero(entry.all_rows->rows());
-  for (std::size_t row = 0, next = 0; row < all.size() && next < known; ++row)
-    if (all[row] == kept[next])
-      forces[static_cast<Eigen::Index>(row)] = lambda[static_cast<Eigen::Index>(next++)];
-  if (forces.size() > most_rows) return forces;
-  ConstraintsAtPoint rows(entry.all_rows->constraints, entry.all_rows->dimension());
-  rows.evaluate(t, q);
-  const Columns one_forms = rows.pattern().full(rows.coefficients());
-  return least_multipliers(one_forms, one_forms.transpose() * forces);
+  return entry.events.empty() ? forces_of_whole(*entry.scene, t, q, lambda) : lambda;
 }
 
 void set_tolerances(CatalogueScene& entry, const Parameters& tolerances) {

@@ -140,13 +140,13 @@ CatalogueScene make_scene(const std::string& name, const Parameters& changes = {
 /// Throws Misuse where an input of the scene has no value at the end of a motion; `what` names the end.
 void require_inputs_until(const CatalogueScene& entry, double end, const std::string& what);
 
-/// Leaves out the redundant constraints (redundant_rows.hpp) where they stay so, and notes which; without
-/// events their forces are still shown (shown_forces).
+/// Leaves out the redundant constraints (redundant_rows.hpp) where they stay so, also where the scene refuses
+/// them, and notes which; their forces are still shown (shown_forces).  Beside events, which may switch rows,
+/// they stay in the scene, and EventSteps leaves out what is redundant of the rows that are on.
 void drop_redundant_rows(CatalogueScene& entry);
 
-/// The forces of the rows that are shown, of those of the rows of `scene` at a point: where redundant rows
-/// are left out and there are no events, of all that act alike, Aᵀ Λ = A_kᵀ Λ_k, the least in the Euclidean
-/// norm; of more than 200 rows those left out get 0.  Else they are as given.
+/// The forces of the rows that are shown, of those of the rows of `scene` at a point: as forces_of_whole()
+/// without events; beside events EventSteps has given them so.
 Vector shown_forces(const CatalogueScene& entry, double t, const Vector& q, const Vector& lambda);
 
 /// Sets Scene::tolerances of the coordinates named.  Throws Misuse for a name that is none, and for a value

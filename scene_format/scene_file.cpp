@@ -161,6 +161,7 @@ CatalogueScene load(const std::shared_ptr<const CompiledScene>& compiled, const 
   set_rates_of_states(loaded, stated);
   put_on_space(*loaded, stated.start);
   Scene scene = scene_of(loaded, stated.start);
+  scene.refuse_redundant_rows = !document.drop_redundant_rows;
   CatalogueScene entry;
   entry.changes = document.notes;
   entry.all_rows = take_off_rows(document, scene);
@@ -169,9 +170,6 @@ CatalogueScene load(const std::shared_ptr<const CompiledScene>& compiled, const 
   entry.scene = std::make_shared<const Scene>(std::move(scene));
   project(*loaded, entry, stated);
   entry.stated_start = std::move(stated);
-  const auto switched_rows = entry.all_rows;
-  if (document.drop_redundant_rows) drop_redundant_rows(entry);
-  if (!document.events.empty()) entry.all_rows = switched_rows;
   entry.kind = document.kind;
   entry.description = document.description;
   entry.source = document.source;
@@ -192,6 +190,7 @@ CatalogueScene load(const std::shared_ptr<const CompiledScene>& compiled, const 
                                 loaded->program->invariants[i].value});
   add_outputs(entry, loaded);
   add_events(entry, loaded);
+  if (document.drop_redundant_rows) drop_redundant_rows(entry);
   entry.bodies = drawn_bodies(*loaded);
   for (const auto& input : document.inputs)
     if (!input.hold && loaded->program->symbols.inputs_of_time.contains(input.name))

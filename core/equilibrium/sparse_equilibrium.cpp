@@ -1,6 +1,8 @@
 #include <cmath>
 #include <diracstep/core/equilibrium/sparse_equilibrium.hpp>
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/system/contradictory_rows.hpp>
+#include <diracstep/core/system/redundant_rows.hpp>
 #include <optional>
 
 namespace diracstep {
@@ -63,7 +65,8 @@ class SparseSearch {
       : scene_(scene), balance_(scene), rest_(Vector::Zero(scene.dimension())) {
     if (balance_.on_positions < scene.rows())
       throw Misuse("scene '" + scene.name +
-                   "': with rows on velocities, equilibria are looked for with full matrices, of 2000 "
+                   "': with rows on velocities whose coefficients are not constant, equilibria are looked "
+                   "for with full matrices, of 2000 "
                    "coordinates at most");
     q_ = scene.start.q;
     size_ = q_.lpNorm<Eigen::Infinity>();
@@ -76,9 +79,7 @@ class SparseSearch {
       if (!residual.allFinite()) return ended("the forces are not finite", residual);
       const SaddleFactors factors(balance_.stiffness, balance_.one_forms, balance_.one_forms);
       if (factors.singular())
-        return ended(
-            "rows depend on each other or nothing draws a coordinate back, so that the matrix is singular",
-            residual);
+        return ended("nothing draws a coordinate back, so that the matrix is singular", residual);
       const Vector change = -factors.solve(residual);
       const double moved = change.head(q_.size()).lpNorm<Eigen::Infinity>();
       if (moved <= least_change * size_) return ended({}, residual);
@@ -175,6 +176,22 @@ Vector SaddleFactors::solve(const Vector& right) const {
   return column_scales_.cwiseProduct(factors_.solve(row_scales_.cwiseProduct(right)));
 }
 
-Equilibrium find_sparse_equilibrium(const Scene& scene) { return SparseSearch(scene).find(); }
+std::shared_ptr<const Scene> with_independent_rows_there(const std::shared_ptr<const Scene>& scene) {
+  const std::vector<std::string> dependent = redundant_rows(*scene, scene->start);
+  return dependent.empty() ? scene : with_rows_left_out(scene, dependent);
+}
+
+Equilibrium find_sparse_equilibrium(const Scene& scene) {
+  const auto independent =
+      with_independent_rows_there(std::shared_ptr<const Scene>(std::shared_ptr<void>(), &scene));
+  Equilibrium found = SparseSearch(*independent).find();
+  if (!independent->whole) return found;
+  const std::string broken = LeftOutRows(*independent).broken_at(found.time, found.q);
+  if (!broken.empty())
+    found.failure +=
+        (found.failure.empty() ? "" : "; ") + ("a row that was left out as redundant: " + broken);
+  found.lambda = forces_of_whole(*independent, found.time, found.q, found.lambda);
+  return found;
+}
 
 }  // namespace diracstep

@@ -3,6 +3,7 @@
 #include <diracstep/core/equilibrium/sparse_equilibrium.hpp>
 #include <diracstep/core/equilibrium/sparse_modes.hpp>
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/system/contradictory_rows.hpp>
 
 namespace diracstep {
 
@@ -125,7 +126,7 @@ void add_mode(NearestModes& result, std::complex<double> s, double error, const 
 
 NearestModes nearest_modes(const Scene& given, const Equilibrium& at, int count, std::optional<double> near,
                            double later, const LargestEigenpairs& eigenpairs) {
-  const auto scene = with_start(given, {at.time, at.q, at.v});
+  const auto scene = with_independent_rows_there(with_start(given, {at.time, at.q, at.v}));
   const Eigen::Index n = scene->dimension(), wanted = 2 * Eigen::Index{count};
   if (count < 1 || wanted + 2 > 2 * (n - scene->rows()))
     throw Misuse("scene '" + given.name + "' has " + std::to_string(n) + " coordinates and " +
@@ -133,7 +134,7 @@ NearestModes nearest_modes(const Scene& given, const Equilibrium& at, int count,
                  " modes by sparse matrices; full ones give all");
   ForceBalance balance(*scene);
   balance.evaluate(at.time, at.q, at.v);
-  const Vector lambda = balance.in_order_here(at.lambda);
+  const Vector lambda = balance.in_order_here(forces_of_kept(*scene, at.time, at.q, at.lambda));
   balance.set_multipliers(lambda);
   NearestModes result;
   result.near = near.value_or(1e-3 * fastest_rate(balance));
@@ -142,8 +143,7 @@ NearestModes nearest_modes(const Scene& given, const Equilibrium& at, int count,
   const ShiftInverse map(balance, result.near,
                          result.near != 0.0 ? std::abs(result.near) : fastest_rate(balance));
   if (map.singular())
-    throw Misuse("scene '" + given.name +
-                 "': the matrix is singular: rows depend on each other, or there is an eigenvalue at " +
+    throw Misuse("scene '" + given.name + "': the matrix is singular: there is an eigenvalue at " +
                  to_text(result.near) + "; choose another number to be near to");
   const Eigenpairs pairs =
       eigenpairs([&](ConstVectorRef in, VectorRef out) { map.apply(in, out); }, start_of(map, n), wanted);

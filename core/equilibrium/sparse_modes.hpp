@@ -25,8 +25,8 @@ struct NearestModes {
 /// sizes of K, C and M allow, so that the slowest motions are found.
 ///
 /// About twice `count` eigenvalues are looked for, since one of a pair is shown.  Errors are about 1e-13 |s −
-/// σ|² over the least |s − σ|.  Throws Misuse for more than the scene has, and where the matrix is singular:
-/// rows that depend on each other, or σ an eigenvalue.
+/// σ|² over the least |s − σ|.  Redundant rows are left out.  Throws Misuse for more than the scene has, and
+/// where the matrix is singular: σ is an eigenvalue.
 NearestModes nearest_modes(const Scene& scene, const Equilibrium& at, int count, std::optional<double> near,
                            double later, const LargestEigenpairs& eigenpairs);
 

@@ -18,7 +18,7 @@ struct IntegratorOptions {
   int dense_limit = as_measured;  ///< up to so many unknowns n + m full matrices; see matrix_form()
   bool force_degenerate = false;  ///< use a method on a degenerate scene that is known to be unstable there
   bool project_start = false;     ///< move an inconsistent start onto the constraints instead of refusing it
-  bool drop_redundant_rows = false;  ///< leave out redundant constraints at the start instead of refusing
+  bool drop_redundant_rows = false;  ///< leave out redundant constraints also where the scene refuses them
   int substeps = 1;  ///< a step that cannot be solved is taken in 2, 4, … up to so many smaller ones
   bool compensated_sums = false;  ///< sums of a step in extended precision, what rounding drops carried on:
                                   ///< round-off in the energy then grows like a random walk, see

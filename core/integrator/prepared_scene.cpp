@@ -72,16 +72,22 @@ std::vector<std::string> dependent_rows(const Scene& scene, bool may_be_left_out
 
 }  // namespace
 
+std::shared_ptr<const Scene> with_independent_rows(const std::shared_ptr<const Scene>& scene,
+                                                   bool also_refused) {
+  const std::vector<std::string> dependent =
+      dependent_rows(*scene, also_refused || !scene->refuse_redundant_rows);
+  return dependent.empty() ? scene : with_rows_left_out(scene, dependent);
+}
+
 PreparedScene prepared(std::shared_ptr<const Scene> given, const IntegratorOptions& options,
                        const SolverFactory& solvers) {
   PreparedScene result{completed(std::move(given)), {}};
   auto& scene = result.scene;
   require_size("scene '" + scene->name + "': the start q", scene->start.q.size(), scene->storage_size());
-  if (const std::vector<std::string> dropped = dependent_rows(*scene, options.drop_redundant_rows);
-      !dropped.empty()) {
-    scene = with_rows_left_out(scene, dropped);
-    result.lines.push_back({"dropped rows", joined(dropped), "redundant constraints at the start"});
-  }
+  scene = with_independent_rows(scene, options.drop_redundant_rows);
+  if (scene->whole)
+    result.lines.push_back({"dropped rows", joined(rows_left_out(*scene)),
+                            "redundant constraints at the start; forces_of_whole() gives the forces of all"});
   if (scene->by_hamiltonian()) require_regular_rows(*scene);
   const int own_rows = scene->rows();
   scene = with_hidden_rows(scene);

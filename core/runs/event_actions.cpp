@@ -1,7 +1,9 @@
 #include <algorithm>
 #include <cmath>
+#include <diracstep/core/integrator/prepared_scene.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/runs/event_actions.hpp>
+#include <diracstep/core/system/contradictory_rows.hpp>
 #include <diracstep/core/system/row_subset.hpp>
 #include <diracstep/core/system/saddle_point.hpp>
 #include <regex>
@@ -133,8 +135,13 @@ EventActions::Outcome EventActions::act(const Event& event, const Sample& at, co
   for (const std::string& name : event.on) on[row(name)] = true;
   for (const std::string& name : event.off) on[row(name)] = false;
   outcome.switched = on != on_;
-  auto scene =
-      outcome.switched ? without(on) : std::shared_ptr<const Scene>(std::shared_ptr<void>(), &current);
+  std::shared_ptr<const Scene> scene(std::shared_ptr<void>(), &current);
+  if (outcome.switched) try {
+      scene = scene_with(on, {at.time, outcome.q, outcome.v});
+    } catch (const Misuse& misuse) {
+      outcome.failure = "event '" + event.name + "' at t = " + to_text(at.time, 10) + ": " + misuse.what();
+      return outcome;
+    }
 
   Vector lq(outcome.v.size());
   scene->lagrangian->gradient(at.time, outcome.q, outcome.v, lq, outcome.p);
@@ -188,21 +195,29 @@ double EventActions::contact_rate(const Event& event, const Sample& at) {
   return rate_of_row(*event.contact, at.time, at.q, at.v);
 }
 
-std::shared_ptr<const Scene> EventActions::without(const std::vector<bool>& on) const {
-  std::vector<std::string> off;
-  for (std::size_t r = 0; r < names_.size(); ++r)
-    if (!on[r]) off.push_back(names_[r]);
-  return without_rows(*all_, off);
-}
-
-std::shared_ptr<const Scene> EventActions::scene_from(double t, const Vector& q, const Vector& v) const {
-  auto scene = std::make_shared<Scene>(*without(on_));
-  scene->start = {t, q, v};
+std::shared_ptr<const Scene> EventActions::scene_with(const std::vector<bool>& on, const Start& start) const {
+  std::shared_ptr<const Scene>& known = known_[on];
+  if (!known) {
+    std::vector<std::string> off;
+    for (std::size_t r = 0; r < names_.size(); ++r)
+      if (!on[r]) off.push_back(names_[r]);
+    auto rows = std::make_shared<Scene>(*without_rows(*all_, off));
+    rows->start = start;
+    known = with_independent_rows(rows);
+  }
+  auto scene = std::make_shared<Scene>(*known);
+  scene->start = start;
   return scene;
 }
 
-Vector EventActions::forces_of_all(const std::vector<std::string>& names, const Vector& lambda) const {
-  Vector all = Vector::Zero(static_cast<Eigen::Index>(names_.size()));
+std::shared_ptr<const Scene> EventActions::scene_from(double t, const Vector& q, const Vector& v) const {
+  return scene_with(on_, {t, q, v});
+}
+
+Vector EventActions::forces_of_all(const Scene& stepped, const Sample& at) const {
+  const std::vector<std::string> names = (stepped.whole ? *stepped.whole : stepped).row_names();
+  const Vector lambda = forces_of_whole(stepped, at.time, at.q, at.lambda);
+  Vector all = Vector::Zero(std::ssize(names_));
   for (std::size_t r = 0; r < names_.size(); ++r)
     if (const auto found = std::ranges::find(names, names_[r]);
         found != names.end() && found - names.begin() < lambda.size())

@@ -4,6 +4,7 @@
 #include <diracstep/core/runs/event_search.hpp>
 #include <diracstep/core/system/event.hpp>
 #include <diracstep/core/system/scene.hpp>
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -43,11 +44,14 @@ class EventActions {
   const std::vector<bool>& on() const { return on_; }
   void set_on(const std::vector<bool>& on) { on_ = on; }
 
-  /// The forces of all rows, 0 where they are off; `names` are those that `lambda` has values of.
-  Vector forces_of_all(const std::vector<std::string>& names, const Vector& lambda) const;
+  /// The forces of all rows at a point of a scene that is stepped, 0 where they are off; redundant ones as
+  /// forces_of_whole().
+  Vector forces_of_all(const Scene& stepped, const Sample& at) const;
 
  private:
-  std::shared_ptr<const Scene> without(const std::vector<bool>& on) const;
+  /// The scene of these rows from a start, without redundant ones.  Which are left out is found where the
+  /// rows are first on, and kept.
+  std::shared_ptr<const Scene> scene_with(const std::vector<bool>& on, const Start& start) const;
   std::size_t row(const std::string& name) const;
 
   std::shared_ptr<const Scene> start_, all_;
@@ -56,6 +60,7 @@ class EventActions {
   const std::vector<Event>& events_;
   std::vector<std::string> names_;  ///< of all rows
   std::vector<bool> on_;
+  mutable std::map<std::vector<bool>, std::shared_ptr<const Scene>> known_;  ///< of scene_with()
 };
 
 }  // namespace diracstep

@@ -89,7 +89,7 @@ class EventSteps {
   /// the first that does, and `reached` is false.
   StepReport read_up_to(double t, Sample& sample, bool& reached);
 
-  /// With the forces of all rows, those that are off 0.
+  /// With the forces of all rows, those that are off 0, redundant ones as forces_of_whole().
   SolveReport sample(Sample& sample) {
     const SolveReport report = stepper().sample(momentum_, sample);
     if (report.ok()) show_all_rows(sample);
@@ -139,7 +139,7 @@ class EventSteps {
     return *current_->beside;
   }
   void show_all_rows(Sample& sample) const {
-    if (!search_.empty()) sample.lambda = actions_.forces_of_all(scene().row_names(), sample.lambda);
+    if (!search_.empty()) sample.lambda = actions_.forces_of_all(scene(), sample);
   }
   detail::Node node() const {
     const Integrator& at = Stepping::integrator(stepper());

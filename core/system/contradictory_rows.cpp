@@ -168,17 +168,6 @@ std::vector<std::string> combined_rows(const Scene& scene, const Start& start, c
   return RowsBesideOthers(scene, dependent).combined(number, start.time, start.q);
 }
 
-namespace {
-
-std::vector<std::string> names_left_out(const Scene& scene) {
-  const std::vector<std::string> kept = scene.row_names();
-  std::vector<std::string> names = scene.whole->row_names();
-  std::erase_if(names, [&](const std::string& name) { return std::ranges::find(kept, name) != kept.end(); });
-  return names;
-}
-
-}  // namespace
-
 std::shared_ptr<const Scene> with_rows_left_out(const std::shared_ptr<const Scene>& scene,
                                                 const std::vector<std::string>& dependent) {
   auto left = std::make_shared<Scene>(*without_rows(*scene, dependent));
@@ -186,8 +175,15 @@ std::shared_ptr<const Scene> with_rows_left_out(const std::shared_ptr<const Scen
   return left;
 }
 
+std::vector<std::string> rows_left_out(const Scene& scene) {
+  const std::vector<std::string> kept = scene.row_names();
+  std::vector<std::string> names = scene.whole->row_names();
+  std::erase_if(names, [&](const std::string& name) { return std::ranges::find(kept, name) != kept.end(); });
+  return names;
+}
+
 LeftOutRows::LeftOutRows(const Scene& scene)
-    : rows_(std::make_unique<RowsBesideOthers>(*scene.whole, names_left_out(scene))),
+    : rows_(std::make_unique<RowsBesideOthers>(*scene.whole, rows_left_out(scene))),
       has_rates_(scene.whole->rows() <= most_rows &&
                  !std::ranges::all_of(scene.whole->constraints,
                                       [](const auto& block) { return block->workless(); })) {}

@@ -22,6 +22,22 @@ std::string contradiction(const Scene& scene, const Start& start, const std::vec
 std::shared_ptr<const Scene> with_rows_left_out(const std::shared_ptr<const Scene>& scene,
                                                 const std::vector<std::string>& dependent);
 
+/// Names of the rows of Scene::whole that the scene is without.
+std::vector<std::string> rows_left_out(const Scene& scene);
+
+/// The forces of all rows of Scene::whole at a point, of those of the rows of the scene, whose one-forms are
+/// independent there: of all that act alike,
+///
+///   A_wᵀ Λ = Aᵀ λ,   the Λ that is least in the Euclidean norm of its numbers.
+///
+/// `lambda` may go on beyond the scene's own rows, with the forces of hidden ones, which do not count.  As
+/// given where none were left out.
+Vector forces_of_whole(const Scene& scene, double t, const Vector& q, const Vector& lambda);
+
+/// The forces of the scene's own rows that act as those of all rows of Scene::whole do, Aᵀ λ = A_wᵀ Λ.  As
+/// given where none were left out.
+Vector forces_of_kept(const Scene& scene, double t, const Vector& q, const Vector& of_whole);
+
 /// Holds a motion to the rows that were left out of its scene: what is redundant at the start may demand
 /// something else later.  Rates of more than 100 rows are not looked at.
 class LeftOutRows {

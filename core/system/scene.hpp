@@ -53,6 +53,9 @@ struct Scene {
   /// The scene with all its rows, where some were left out as redundant (with_rows_left_out()); null where
   /// none were.  An Integrator holds every step to them.
   std::shared_ptr<const Scene> whole = {};
+  /// Redundant constraints are a mistake and refused by name; else those that stay redundant are left out
+  /// (with_independent_rows()).
+  bool refuse_redundant_rows = false;
   /// Null in R^n.  Else velocities, momenta, one-forms and forces are left-trivialised: increments multiply
   /// from the right, velocities and momenta are in the body (spaces/space.hpp); L, rows and force are made by
   /// on_space(), `coordinates` name the components of a velocity, and there is no Hamiltonian.

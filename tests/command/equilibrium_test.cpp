@@ -187,6 +187,29 @@ TEST_F(EquilibriumVerb, AFewModesBySparseMatricesAreThoseOfFullOnes) {
 }
 
 /// At u = 0, found from sin(2πx), forces are round-off of what was moved: no change with the time.
+TEST_F(EquilibriumVerb, SparseModesLeaveOutRedundantRows) {
+  if (!has_sparse_modes()) GTEST_SKIP() << "built without Spectra";
+  const auto pendulums = [&](const std::string& name, const std::string& rows) {
+    return nlohmann::json::parse(
+        run("equilibrium '" +
+            scene(name,
+                  "lagrangian = \"sum(j = 1..3, (v_x[j]^2 + v_y[j]^2)/2 - j*y[j])\"\n[coordinates]\n"
+                  "x = { for = \"j = 1..3\" }\ny = { for = \"j = 1..3\" }\n" +
+                      rows + "[start]\nx = 0.6\ny = -0.8\n[span]\nend = 1\nstep = 0.1\n") +
+            "' --modes 2 --json")
+            .out);
+  };
+  const std::string a = "[[rows]]\nname = \"a\"\nfor = \"j = 1..3\"\nequation = \"x[j]^2 + y[j]^2 = 1\"\n";
+  const auto twice = pendulums("twice", a + "[[rows]]\nname = \"b\"\nfor = \"j = 1..3\"\n"
+                                            "equation = \"2*(x[j]^2 + y[j]^2) = 2\"\n");
+  ASSERT_EQ(twice["modes"].size(), 2u) << twice;
+  EXPECT_NEAR(twice["modes"][0]["eigenvalue"][1].get<double>(), 1.0, 1e-9);
+  EXPECT_NEAR(twice["modes"][1]["eigenvalue"][1].get<double>(), std::sqrt(2.0), 1e-9);
+  // The weight j is carried by Λ_a 2 + Λ_b 4.
+  EXPECT_NEAR(std::abs(twice["lambda"]["a_3"].get<double>()), 3.0 / 10.0, 1e-10);
+  EXPECT_NEAR(std::abs(twice["lambda"]["b_3"].get<double>()), 6.0 / 10.0, 1e-10);
+}
+
 TEST_F(EquilibriumVerb, SparseModesOfAFieldWithoutTimeAreNotDoubted) {
   if (!has_sparse_modes()) GTEST_SKIP() << "built without Spectra";
   std::ofstream(path("string.toml"))

@@ -74,6 +74,59 @@ TEST_F(Refusals, ForcesOfRedundantRowsAreTheLeastOnes) {
   }
 }
 
+/// Beside events as well, also where they switch rows: another row that demands the same then holds on.
+TEST_F(Refusals, RedundantRowsHoldOnWhereAnEventSwitchesTheOthersOff) {
+  const auto rod = [&](const std::string& name, const std::string& rows, const std::string& event) {
+    std::ofstream(path(name + ".toml"))
+        << "name = \"" + name +
+               "\"\nlagrangian = \"(v_x^2 + v_y^2)/2 - 9.81*y\"\n[coordinates]\nx = {}\ny = {}\n" + rows +
+               "[start]\nx = 1\n[span]\nend = 1\nstep = 0.02\n[[events]]\nname = \"low\"\n"
+               "when = \"y + 0.5\"\ndirection = \"falling\"\n" +
+               event + "[outputs]\nsecond = \"lambda_b\"\n";
+    return nlohmann::json::parse(run("run '" + path(name + ".toml") + "' --json").out);
+  };
+  const std::string a = "[[rows]]\nname = \"a\"\nequation = \"x^2 + y^2 = 1\"\n",
+                    b = "[[rows]]\nname = \"b\"\nequation = \"2*(x^2 + y^2) = 2\"\n";
+  const auto twice = rod("twice", a + b, "");
+  const double force_of_b = rod("b_alone", b, "")["end"]["lambda"]["b"];
+  const auto expect = [&](const nlohmann::json& found, double of_a, double of_b) {
+    ASSERT_TRUE(found.contains("end")) << found;
+    for (const char* name : {"x", "y"})
+      EXPECT_NEAR(found["end"]["q"][name].get<double>(), twice["end"]["q"][name].get<double>(), 1e-10)
+          << name;
+    EXPECT_NEAR(found["end"]["lambda"]["a"].get<double>(), of_a, 1e-7);
+    EXPECT_NEAR(found["end"]["lambda"]["b"].get<double>(), of_b, 1e-7);
+    EXPECT_NEAR(found["outputs"]["second"].get<double>(), of_b, 1e-7);
+  };
+  // Λ_a + 2 Λ_b = 2 Λ of b alone.
+  expect(twice, 0.4 * force_of_b, 0.8 * force_of_b);
+  expect(rod("a_off", a + b, "off = [\"a\"]\n"), 0.0, force_of_b);
+  expect(rod("b_off", a + b, "off = [\"b\"]\n"), 2.0 * force_of_b, 0.0);
+  expect(rod("b_on", a + b + "on = false\n", "on = [\"b\"]\n"), 0.4 * force_of_b, 0.8 * force_of_b);
+}
+
+/// 120 pendulums with two rods each: 240 rows.
+TEST_F(Refusals, ForcesOfManyRedundantRowsAreTheLeastOnes) {
+  const auto pendulums = [&](const std::string& name, const std::string& rows) {
+    std::ofstream(path(name + ".toml"))
+        << "name = \"" + name +
+               "\"\nlagrangian = \"sum(j = 1..N, (v_x[j]^2 + v_y[j]^2)/2 - j*y[j])\"\n[sizes]\nN = 120\n"
+               "[coordinates]\nx = { for = \"j = 1..N\" }\ny = { for = \"j = 1..N\" }\n" +
+               rows + "[start]\nx = 1\n[span]\nend = 0.1\nstep = 0.01\n";
+    return nlohmann::json::parse(run("run '" + path(name + ".toml") + "' --json").out)["end"]["lambda"];
+  };
+  const std::string a = "[[rows]]\nname = \"a\"\nfor = \"j = 1..N\"\nequation = \"x[j]^2 + y[j]^2 = 1\"\n";
+  const auto once = pendulums("once", a);
+  const auto twice = pendulums("twice", a + "[[rows]]\nname = \"b\"\nfor = \"j = 1..N\"\n"
+                                            "equation = \"2*(x[j]^2 + y[j]^2) = 2\"\n");
+  ASSERT_EQ(twice.size(), 240u);
+  for (const char* j : {"1", "60", "120"}) {
+    const double force = once[std::string("a_") + j];
+    EXPECT_NEAR(twice[std::string("a_") + j].get<double>(), force / 5.0, 1e-9) << j;
+    EXPECT_NEAR(twice[std::string("b_") + j].get<double>(), 2.0 * force / 5.0, 1e-9) << j;
+  }
+}
+
 TEST_F(Refusals, FormulasWithoutAValueAreNoZero) {
   for (const char* force : {"0/0", "(0/0)*v_x", "k/k", "k*log(k)"}) {
     const Outcome outcome = run("run '" +

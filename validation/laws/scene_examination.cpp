@@ -40,11 +40,13 @@ Finding examine_dimensions(const Scene& scene) {
     return {"dimensions", false, misuse.what()};
   }
   const int n = scene.dimension(), m = scene.rows();
-  return {"dimensions", m <= n,
+  return {"dimensions", m <= n || !scene.refuse_redundant_rows,
           fmt::format("{} coordinates, {} rows{}", n, m,
                       m < n    ? ""
                       : m == n ? ": they alone determine the motion"
-                               : ": more rows than coordinates; --drop-redundant leaves out redundant ones")};
+                      : scene.refuse_redundant_rows
+                          ? ": more rows than coordinates; --drop-redundant leaves out redundant ones"
+                          : ": more rows than coordinates, which depend on each other")};
 }
 
 Finding examine_start(const Scene& scene) {
@@ -71,7 +73,9 @@ Finding examine_rank(const Scene& scene) {
   for (const std::string& name : dependent)
     finding.detail += fmt::format("{}'{}'", &name == dependent.data() ? "; redundant: " : ", ", name);
   const std::string kept_for = why_not_left_out(row_dependence(scene, scene.start, dependent));
-  finding.detail += kept_for.empty()
+  finding.passed = kept_for.empty() && !scene.refuse_redundant_rows;
+  finding.detail += finding.passed ? ", left out of the steps"
+                    : kept_for.empty()
                         ? "; remove it, or leave it out with --drop-redundant or redundant = \"drop\""
                         : "; " + kept_for;
   return finding;

@@ -274,15 +274,14 @@ void add_scaled_rows(Cases& cases) {
 
 void add_redundant_rows(Cases& cases) {
   for (const auto& [name, energy] : constrained)
-    for (const bool drop : {false, true}) {
-      const CatalogueScene entry = changed(make_scene(name), [](Scene& scene) {
+    for (const bool refused : {true, false}) {
+      const CatalogueScene entry = changed(make_scene(name), [refused](Scene& scene) {
         scene.constraints.push_back(scaled_rows(scene.constraints.front(), 3.0, ", again"));
+        scene.refuse_redundant_rows = refused;
       });
-      StabilityCase that =
-          over_steps(name + ", rows given twice", drop ? 1.0 : 0.0,
-                     name + (drop ? " row twice, dropped" : " row twice"), entry, energy, 0.2, 485);
-      that.drop_redundant_rows = drop;
-      cases.push_back(std::move(that));
+      cases.push_back(over_steps(name + ", rows given twice", refused ? 0.0 : 1.0,
+                                 name + (refused ? " row twice, refused" : " row twice"), entry, energy, 0.2,
+                                 485));
     }
 }
 

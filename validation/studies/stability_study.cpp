@@ -4,11 +4,11 @@
 #include <array>
 #include <cmath>
 #include <ctime>
+#include <diracstep/core/integrator/prepared_scene.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/runs/run.hpp>
 #include <diracstep/core/runs/run_checks.hpp>
 #include <diracstep/core/system/consistent_start.hpp>
-#include <diracstep/core/system/redundant_rows.hpp>
 #include <diracstep/validation/references/ida_reference.hpp>
 #include <diracstep/validation/studies/stability_study.hpp>
 #include <diracstep/validation/studies/study_run.hpp>
@@ -173,8 +173,7 @@ IdaBeside run_ida_beside(const StabilityCase& that, const ReferenceEnd& referenc
   IdaBeside beside{.rtol = rtol};
   try {
     const auto given = completed(that.scene.scene);
-    const auto without =
-        that.drop_redundant_rows ? without_rows(*given, redundant_rows(*given, given->start)) : given;
+    const auto without = given->refuse_redundant_rows ? given : with_independent_rows(given);
     const Scene& scene = *without;
     const ReferenceRun run =
         integrate_with_ida(scene, that.t_end, {.rtol = rtol, .max_steps = ida_max_steps});
@@ -267,10 +266,7 @@ StabilityRow run_stability_case(const StabilityCase& that, const Registry& regis
   try {
     const StepGrid grid = fit_steps(that.scene.scene->start.time, that.t_end, that.step);
     Integrator integrator(that.scene.scene, registry, solvers,
-                          {.method = method.name,
-                           .order = method.order,
-                           .step = grid.step,
-                           .drop_redundant_rows = that.drop_redundant_rows});
+                          {.method = method.name, .order = method.order, .step = grid.step});
     row.order = integrator.options().order;
     CaseRun(that, integrator, row, going_on).run(grid.steps);
   } catch (const Misuse& misuse) {

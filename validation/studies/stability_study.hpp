@@ -30,8 +30,7 @@ struct StabilityCase {
   double step = 0.0;
   double t_end = 0.0;
   std::vector<Watch> watches = {};
-  double accuracy = 1e-3;            ///< a smaller relative error at the end is called accurate
-  bool drop_redundant_rows = false;  ///< as in IntegratorOptions
+  double accuracy = 1e-3;  ///< a smaller relative error at the end is called accurate
 };
 
 /// How a run ended.

@@ -4,6 +4,7 @@
 #include <diracstep/constraints/holonomic.hpp>
 #include <diracstep/constraints/pfaffian.hpp>
 #include <diracstep/core/equilibrium/eigenmodes.hpp>
+#include <diracstep/core/equilibrium/sparse_equilibrium.hpp>
 
 namespace diracstep {
 namespace {
@@ -81,6 +82,23 @@ TEST(Equilibrium, VibrationsOfThePendulumAboutBothEquilibria) {
     else
       EXPECT_NEAR(found[1].real(), rate, 1e-13);
   }
+}
+
+/// The rod also stated twice over: of Λ_1 + 2 Λ_2 = Λ the least are Λ/5 and 2 Λ/5.
+TEST(Equilibrium, SparseMatricesLeaveOutRedundantRows) {
+  const Scene once = spherical_pendulum(Vector{{0.1, 0.2, -std::sqrt(0.95)}}, Vector::Zero(3));
+  Scene twice = once;
+  twice.constraints.push_back(holonomic<3, 1>(
+      []<class T>(const std::array<T, 3>& x) {
+        return std::array<T, 1>{2.0 * (x[0] * x[0] + x[1] * x[1] + x[2] * x[2] - 1.0)};
+      },
+      {"again"}));
+  const Equilibrium known = find_sparse_equilibrium(once), found = find_sparse_equilibrium(twice);
+  ASSERT_TRUE(found.ok()) << found.failure;
+  EXPECT_NEAR(found.q[2], -1.0, 1e-13);
+  ASSERT_EQ(found.lambda.size(), 2);
+  EXPECT_NEAR(found.lambda[0], known.lambda[0] / 5.0, 1e-11);
+  EXPECT_NEAR(found.lambda[1], 2.0 * known.lambda[0] / 5.0, 1e-11);
 }
 
 TEST(Equilibrium, RowsAreReducedToTheDegreesOfFreedom) {

@@ -2,6 +2,7 @@
 
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/system/consistent_start.hpp>
+#include <diracstep/core/system/contradictory_rows.hpp>
 #include <diracstep/core/system/redundant_rows.hpp>
 
 #include "scenes.hpp"
@@ -107,9 +108,11 @@ TEST(RedundantRows, AreNamedWhateverTheirUnits) {
     EXPECT_TRUE(redundant_rows(*independent, independent->start).empty()) << independent->name;
 }
 
-TEST(RedundantRows, AreRefusedOrDroppedAsAsked) {
+TEST(RedundantRows, AreLeftOutUnlessTheSceneRefusesThem) {
+  auto refusing = std::make_shared<Scene>(*redundant());
+  refusing->refuse_redundant_rows = true;
   try {
-    const Integrator taken(redundant(), Registry::with_built_ins(), kinsol(), {.step = 0.1});
+    const Integrator taken(refusing, Registry::with_built_ins(), kinsol(), {.step = 0.1});
     FAIL() << "dependent rows were taken";
   } catch (const Misuse& misuse) {
     EXPECT_NE(std::string(misuse.what()).find("contact"), std::string::npos) << misuse.what();
@@ -120,9 +123,42 @@ TEST(RedundantRows, AreRefusedOrDroppedAsAsked) {
     return std::array<std::array<T, 3>, 2>{{{T(1.0), T(0.0), q[1]}, {T(0.0), T(1.0), T(0.0)}}};
   })};
   const auto expected = testing::samples_of(clean, {.step = 0.1}, 10).back();
-  const auto dropped =
-      testing::samples_of(redundant(), {.step = 0.1, .drop_redundant_rows = true}, 10).back();
-  EXPECT_LT((dropped.q - expected.q).norm(), 1e-13);
+  const auto left_out = testing::samples_of(redundant(), {.step = 0.1}, 10).back();
+  const auto asked = testing::samples_of(refusing, {.step = 0.1, .drop_redundant_rows = true}, 10).back();
+  EXPECT_LT((left_out.q - expected.q).norm(), 1e-13);
+  EXPECT_EQ(asked.q, left_out.q);
+}
+
+/// Of a force Λ of a row r that is also given as 2 r and 3 r: the least that act as it does are Λ/14, 2 Λ/14
+/// and 3 Λ/14.
+TEST(RedundantRows, HaveTheLeastForcesOfAll) {
+  constexpr auto rod = []<class T>(const std::array<T, 2>& x) { return x[0] * x[0] + x[1] * x[1] - 1.0; };
+  auto once = std::make_shared<Scene>();
+  once->name = "pendulum";
+  once->coordinates = {"x", "y"};
+  once->lagrangian = lagrangian<2>(
+      [](const auto& x, const auto& v) { return 0.5 * (v[0] * v[0] + v[1] * v[1]) - 9.81 * x[1]; });
+  once->constraints = {
+      holonomic<2, 1>([=]<class T>(const std::array<T, 2>& x) { return std::array<T, 1>{rod(x)}; }, {"rod"})};
+  once->start = {0.0, Vector{{1.0, 0.0}}, Vector::Zero(2)};
+  auto thrice = std::make_shared<Scene>(*once);
+  thrice->constraints.push_back(holonomic<2, 2>(
+      [=]<class T>(const std::array<T, 2>& x) {
+        return std::array<T, 2>{2.0 * rod(x), 3.0 * rod(x)};
+      },
+      {"twice", "thrice"}));
+  const double force = testing::samples_of(once, {.step = 0.05}, 10).back().lambda[0];
+  Integrator integrator(thrice, Registry::with_built_ins(), kinsol(), {.step = 0.05});
+  ASSERT_EQ(integrator.scene().rows(), 1);
+  for (int k = 0; k < 10; ++k) ASSERT_TRUE(integrator.step().ok());
+  Sample end;
+  ASSERT_TRUE(integrator.sample(Momentum::projected, end).ok());
+  const Vector forces = forces_of_whole(integrator.scene(), end.time, end.q, end.lambda);
+  ASSERT_EQ(forces.size(), 3);
+  for (int k = 0; k < 3; ++k) EXPECT_NEAR(forces[k], (k + 1) * force / 14.0, 1e-12) << k;
+  const Vector kept = forces_of_kept(integrator.scene(), end.time, end.q, forces);
+  ASSERT_EQ(kept.size(), 1);
+  EXPECT_NEAR(kept[0], end.lambda[0], 1e-12);
 }
 
 }  // namespace
