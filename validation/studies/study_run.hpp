@@ -35,7 +35,7 @@ struct StudyRow {
   int order = 0;                 ///< 0 for a baseline
   double step = none;            ///< ours: the step size, fitted to the interval, or eps of variable steps
   double rtol = none;            ///< a baseline's
-  std::string formulation = {};  ///< of IDA
+  std::string formulation = {};  ///< of IDA, or the code of the explicit baseline
   std::string status = "ok";
   double error_q = none;
   double error_p = none;
