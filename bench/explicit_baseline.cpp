@@ -79,19 +79,32 @@ void compare_rates(const Case& at) {
   y[0] += 0.01, y[1] += 0.02;  // no entry is zero by chance
   const auto n = static_cast<Eigen::Index>(y.size());
   Vector rate(n), by_size(n), by_hand(n);
-  const auto repeated = [](const std::function<void()>& call) {
-    return std::function<void()>([call] {
-      for (int k = 0; k < calls; ++k) call();
+  // A call waits for the one before it, as a stage does for the stages before.
+  const double first = y[0];
+  const auto repeated = [&](Vector& to, const std::function<void()>& call) {
+    return std::function<void()>([&, call] {
+      for (int k = 0; k < calls; ++k) {
+        call();
+        y[0] = first + 1e-30 * to.sum();
+      }
     });
   };
-  const auto ns =
-      fewest_nanoseconds({repeated([&] { general.rate(0.0, Eigen::Map<const Vector>(y.data(), n), rate); }),
-                          repeated([&] { sized->rate(y.data(), by_size.data()); }),
-                          repeated([&] { at.by_hand->rate(y.data(), by_hand.data()); })},
-                         calls, 15);
+  const auto ns = fewest_nanoseconds(
+      {repeated(rate, [&] { general.rate(0.0, Eigen::Map<const Vector>(y.data(), n), rate); }),
+       repeated(by_size, [&] { sized->rate(y.data(), by_size.data()); }),
+       repeated(by_hand, [&] { at.by_hand->rate(y.data(), by_hand.data()); })},
+      calls, 15);
   std::printf(
       "%-20s%10.0f%10.0f%10.0f%14.1f%10.0e\n", at.scene, ns[0], ns[1], ns[2], ns[1] / ns[2],
       std::max((by_size - rate).lpNorm<Eigen::Infinity>(), (by_hand - rate).lpNorm<Eigen::Infinity>()));
+}
+
+/// Half decades from 1e-2 to 1e-14.
+std::vector<double> tolerances() {
+  std::vector<double> all;
+  for (int k = 4; k < 28; ++k) all.push_back(std::pow(10.0, -0.5 * k));
+  all.push_back(1e-14);  // no less is allowed
+  return all;
 }
 
 double fewest(int rounds, const std::function<double()>& seconds) {
@@ -122,7 +135,7 @@ std::vector<WorkPoint> of_library(const CatalogueScene& entry, const ReferenceEn
 std::vector<WorkPoint> of_code(const CatalogueScene& entry, const ReferenceEnd& reference,
                                ExplicitCode code) {
   std::vector<WorkPoint> points;
-  for (double rtol = 1e-2; rtol > 1e-13; rtol /= std::sqrt(10.0)) {
+  for (const double rtol : tolerances()) {
     ReferenceRun run;
     const double seconds = fewest(rounds, [&] {
       run = integrate_explicitly(*entry.scene, entry.t_end, {.rtol = rtol}, code);
@@ -137,7 +150,7 @@ std::vector<WorkPoint> of_hand(const CatalogueScene& entry, const ReferenceEnd& 
                                SizedEquations& equations, ExplicitCode code) {
   std::vector<WorkPoint> points;
   const Eigen::Index n = entry.scene->dimension();
-  for (double rtol = 1e-2; rtol > 1e-13; rtol /= std::sqrt(10.0)) {
+  for (const double rtol : tolerances()) {
     std::vector<double> y;
     ReferenceRun run;
     const double seconds = fewest(rounds, [&] {

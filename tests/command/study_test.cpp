@@ -84,6 +84,8 @@ TEST_F(StudyCommand, WritesTablesAndPictures) {
   const auto rows_of = [&](const std::string& start) {
     return std::ranges::count_if(csv, [&](const std::string& row) { return row.starts_with(start); });
   };
+  for (const std::string& row : csv)  // no name has a comma in it
+    EXPECT_EQ(std::ranges::count(row, ','), std::ranges::count(csv[0], ',')) << row;
   for (const std::string scene : {"knife_edge", "pendulum_cartesian"}) {
     EXPECT_EQ(rows_of(scene + ",type1/midpoint,"), 6) << scene;
     EXPECT_GE(rows_of(scene + ",ida,"), 2)

@@ -174,9 +174,9 @@ const char* name(ExplicitCode code) {
     case ExplicitCode::arkode:
       return "ARKODE";
     case ExplicitCode::fehlberg78:
-      return "Boost.odeint, Fehlberg 7(8)";
+      return "odeint-fehlberg78";
     case ExplicitCode::bulirsch_stoer:
-      return "Boost.odeint, Bulirsch–Stoer";
+      return "odeint-bulirsch-stoer";
   }
   return "unknown";
 }

@@ -46,7 +46,7 @@ enum class ExplicitCode {
   bulirsch_stoer,  ///< extrapolation of the modified midpoint rule in Boost.odeint
 };
 
-/// "ARKODE", "Boost.odeint, Fehlberg 7(8)" or "Boost.odeint, Bulirsch–Stoer".
+/// "ARKODE", "odeint-fehlberg78" or "odeint-bulirsch-stoer".
 const char* name(ExplicitCode code);
 
 /// Those that take a scene: ARKODE all of them; Boost.odeint, where the build has it, those that

@@ -284,7 +284,7 @@ namespace {
 /// compared as methods of order 8, of which a tenth of the error takes 10^(1/8) times as long.
 ExplicitCode quickest_code(const Scene& scene, double t_end, const ReferenceOptions& options,
                            const ReferenceEnd& reference) {
-  constexpr double order = 8.0, smallest_error = 1e-16;
+  constexpr double order_of_all = 8.0, least_error = 1e-16;
   const std::vector<ExplicitCode> codes = explicit_codes(scene);
   if (codes.size() == 1) return codes.front();
   ExplicitCode quickest = codes.front();
@@ -294,7 +294,7 @@ ExplicitCode quickest_code(const Scene& scene, double t_end, const ReferenceOpti
     const ReferenceRun run = integrate_explicitly(scene, t_end, options, code);
     if (!run.ok()) continue;
     const double error = reference.missing.empty() ? reference.distance(run.end) : options.rtol;
-    const double time = run.cpu_seconds * std::pow(std::max(error, smallest_error), 1.0 / order);
+    const double time = run.cpu_seconds * std::pow(std::max(error, least_error), 1.0 / order_of_all);
     if (!(time < least)) continue;
     least = time;
     quickest = code;
