@@ -243,10 +243,10 @@ std::string section(const PageEntry& entry, std::ptrdiff_t number, const std::fi
 
 constexpr std::string_view introduction =
     "<h1>Error against run time</h1>\n"
-    "<p>DiracStep beside SUNDIALS IDA on the implicit Lagrangian system and ARKODE's explicit Runge–Kutta "
-    "method of "
-    "order 8 on the index-reduced equations, which drifts off the constraints. For each scene: the CPU time "
-    "in which "
+    "<p>DiracStep beside SUNDIALS IDA on the implicit Lagrangian system and the faster of explicit codes "
+    "(ARKODE's Runge–Kutta method of order 8; on small scenes Boost.odeint's Fehlberg 7(8) and "
+    "Bulirsch–Stoer) "
+    "on the index-reduced equations, which drift off the constraints. For each scene: the CPU time in which "
     "the end of the motion is reached with a given relative error of q and p.</p>\n";
 
 /// The data must not end the element they stand in.

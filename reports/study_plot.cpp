@@ -139,7 +139,7 @@ void add_baselines(std::vector<StudyCurve>& curves, const Study& study, const Ab
     add_rows(
         curves.back(), study, [&](const StudyRow& row) { return row.formulation == formulations[i]; }, x);
   }
-  curves.push_back({"explicit RK 8",
+  curves.push_back({"explicit",
                     "with linespoints linewidth 2 dashtype (6,4) pointtype 8 pointsize 0.95 "
                     "linecolor '#707070'"});
   add_rows(
@@ -360,7 +360,7 @@ std::string draw_summary(const std::vector<Study>& studies, const std::filesyste
           erk.empty() ? "NaN NaN\n" : erk) +
       "plot $ida with points pointtype 5 pointsize 1.2 linecolor '#000000' title 'IDA', $erk with points "
       "pointtype 9 "
-      "pointsize 1.3 linecolor '#707070' title 'explicit RK 8'\n";
+      "pointsize 1.3 linecolor '#707070' title 'explicit'\n";
   return render(script, (directory / "summary").string(), 860, std::max<std::size_t>(260, 120 + 34 * place));
 }
 

@@ -316,8 +316,8 @@ void study(const StudyArguments& options, Session& session) {
 }  // namespace
 
 void add_study(CLI::App& app, Session& session) {
-  CLI::App* verb = app.add_subcommand(
-      "study", "Error against run time, beside SUNDIALS IDA and an explicit Runge–Kutta method");
+  CLI::App* verb =
+      app.add_subcommand("study", "Error against run time, beside SUNDIALS IDA and an explicit code");
   add_solver_options(*verb, session);
   const auto options = std::make_shared<StudyArguments>();
   verb->add_option("SCENE", options->scenes,
@@ -338,7 +338,7 @@ void add_study(CLI::App& app, Session& session) {
                    "best: on each scene those that are fastest to 1e-3, 1e-6 or 1e-9")
       ->capture_default_str();
   verb->add_flag("--without-ida", options->without_ida, "No runs of IDA");
-  verb->add_flag("--without-erk", options->without_erk, "No runs of the explicit Runge–Kutta method");
+  verb->add_flag("--without-erk", options->without_erk, "No runs of the explicit code");
   verb->add_flag("--full", options->full,
                  "More methods, tolerances, repeats and, where none are named, scenes; no limit of time");
   verb->add_flag("--sensitivities", options->sensitivities,

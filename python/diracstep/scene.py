@@ -379,7 +379,7 @@ class Scene:
     def study(self, *, methods: Sequence[str] = (), orders: Sequence[int] = (), steps: Sequence[float] = (),
               rtols: Sequence[float] = (), until: float | None = None, ida: bool = True, erk: bool = True, repeat: int = 1,
               budget: float = 0.2) -> Study:
-        """Error against run time of methods, beside SUNDIALS IDA and an explicit Runge–Kutta method.
+        """Error against run time of methods, beside SUNDIALS IDA and an explicit code.
 
         Made by the command ``diracstep study``, which must be installed; the scene goes there as its file's text.
         """

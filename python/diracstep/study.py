@@ -1,4 +1,4 @@
-"""Studies by the command: error against run time, beside SUNDIALS IDA and an explicit Runge–Kutta method.
+"""Studies by the command: error against run time, beside SUNDIALS IDA and an explicit code.
 
 References and baselines are parts of the command and not of libdiracstep, so it is the command that measures.
 """

@@ -12,13 +12,13 @@ function seconds(value) {
 }
 
 const ida = { method: 'ida', label: 'IDA', colour: 'var(--baseline-ida)', marker: 1, hollow: true };
-const erk = { method: 'erk', label: 'explicit RK 8', colour: 'var(--baseline-erk)', marker: 2, hollow: true, dash: '6,4' };
+const erk = { method: 'erk', label: 'explicit', colour: 'var(--baseline-erk)', marker: 2, hollow: true, dash: '6,4' };
 const styles = data.styles.map(style => ({ ...style, colour: `var(--series-${style.colour % 6})`,
   dash: ['', '9,4', '2,3', '9,3,2,3'][style.marker % 4], hollow: style.marker % 12 >= 6 }));
 
 const errorOf = row => row.error_q === null || row.error_p === null ? NaN : Math.max(row.error_q, row.error_p);
 const rowsOf = (study, style) => study.rows.filter(row => row.status === 'ok' && row.method === style.method &&
-  row.order === style.order && row.formulation === style.formulation && errorOf(row) <= largestDrawn &&
+  row.order === style.order && (style.formulation === undefined || row.formulation === style.formulation) && errorOf(row) <= largestDrawn &&
   errorOf(row) > (study.reference.self_error || 0));
 
 // IDA has a curve for each formulation it runs in.
@@ -28,7 +28,7 @@ function baselines(study) {
 }
 
 function rowTip(row, style) {
-  const rate = row.step === undefined ? `${row.formulation ? `formulation ${row.formulation}, ` : ''}rtol ${row.rtol}` : `step ${number(row.step, 4)}`;
+  const rate = row.step === undefined ? `${row.formulation ? `${row.formulation}, ` : ''}rtol ${row.rtol}` : `step ${number(row.step, 4)}`;
   return () => [style.label, `${rate}, ${row.steps} steps`, `error of q ${exponent(row.error_q)}, of p ${exponent(row.error_p)}`,
     `CPU ${seconds(row.cpu_seconds.median)} (${seconds(row.cpu_seconds.min)} to ${seconds(row.cpu_seconds.max)})`,
     `rows violated by ${exponent(row.constraint)}`].join('\n');

@@ -8,6 +8,7 @@ BEGIN {
   library["KLU"] = "^(suitesparse/|(klu|amd|btf|colamd)[.]h)"
   library["Spectra"] = "^Spectra/"
   library["Ipopt"] = "^Ip[A-Z]"
+  library["Boost"] = "^boost/"
   library["fmt"] = "^fmt/"
   library["toml++"] = "^toml[+][+]/"
   library["CLI11"] = "^CLI/"
@@ -77,7 +78,7 @@ function check_library_include(path, room, included, name) {
   for (name in library) {
     if (included !~ library[name]) continue
     if (!((room, name) in sees)) fault(path ": " room " must not include " name " (" included ")")
-    else if (name ~ /^(SUNDIALS|KLU|Spectra|Ipopt)$/ && path ~ /[.]hpp$/ && path !~ /\/detail\//)
+    else if (name ~ /^(SUNDIALS|KLU|Spectra|Ipopt|Boost)$/ && path ~ /[.]hpp$/ && path !~ /\/detail\//)
       fault(path ": " name " is for sources and detail/ only (" included ")")
   }
 }

@@ -4,6 +4,7 @@
 #include <diracstep/core/system/hidden_rows.hpp>
 #include <diracstep/solvers/detail/shells.hpp>
 #include <diracstep/validation/references/explicit_reference.hpp>
+#include <diracstep/validation/references/odeint_steps.hpp>
 #include <sstream>
 #include <utility>
 
@@ -73,7 +74,7 @@ class ExplicitIntegration {
     if (y.size() > scene.dimension()) y.tail(scene.dimension()) = scene.start.v;
   }
 
-  ReferenceRun run(double t_end) {
+  ReferenceRun run_arkode(double t_end) {
     set_up(t_end);
     ReferenceRun run;
     double t = scene_.start.time;
@@ -83,6 +84,18 @@ class ExplicitIntegration {
     run.cpu_seconds = thread_seconds() - before;
     if (code < 0) run.failure = describe_failure(code, t);
     read_counters(run);
+    read_end(t, run);
+    return run;
+  }
+
+  ReferenceRun run_odeint(ExplicitCode code, double t_end) {
+    const std::unique_ptr<SizedEquations> equations = sized_equations(scene_);
+    if (!equations) throw Misuse(std::string(name(code)) + " does not take scene '" + scene_.name + "'");
+    ReferenceRun run;
+    double t = scene_.start.time;
+    const double before = thread_seconds();
+    integrate_by_odeint(*equations, code, t_end, options_, map(y_.get()).data(), t, run);
+    run.cpu_seconds = thread_seconds() - before;
     read_end(t, run);
     return run;
   }
@@ -156,10 +169,30 @@ class ExplicitIntegration {
 
 }  // namespace
 
-ReferenceRun integrate_explicitly(const Scene& given, double t_end, const ReferenceOptions& options) {
+const char* name(ExplicitCode code) {
+  switch (code) {
+    case ExplicitCode::arkode:
+      return "ARKODE";
+    case ExplicitCode::fehlberg78:
+      return "odeint-fehlberg78";
+    case ExplicitCode::bulirsch_stoer:
+      return "odeint-bulirsch-stoer";
+  }
+  return "unknown";
+}
+
+std::vector<ExplicitCode> explicit_codes(const Scene& given) {
+  if (!has_odeint() || !sized_equations(*with_hidden_rows(with_lagrangian(given))))
+    return {ExplicitCode::arkode};
+  return {ExplicitCode::arkode, ExplicitCode::fehlberg78, ExplicitCode::bulirsch_stoer};
+}
+
+ReferenceRun integrate_explicitly(const Scene& given, double t_end, const ReferenceOptions& options,
+                                  ExplicitCode code) {
   const auto scene = with_hidden_rows(with_lagrangian(given));
-  require_reference("ARKODE", *scene, t_end, options);
-  return ExplicitIntegration(*scene, options).run(t_end);
+  require_reference(name(code), *scene, t_end, options);
+  ExplicitIntegration integration(*scene, options);
+  return code == ExplicitCode::arkode ? integration.run_arkode(t_end) : integration.run_odeint(code, t_end);
 }
 
 }  // namespace diracstep

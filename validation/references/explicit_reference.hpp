@@ -5,6 +5,7 @@
 #include <diracstep/solvers/detail/linear_solver.hpp>
 #include <diracstep/validation/references/reference_run.hpp>
 #include <memory>
+#include <vector>
 
 namespace diracstep {
 
@@ -38,10 +39,25 @@ class ReducedEquations {
   Vector zero_, values_, solution_;
 };
 
-/// Integrates the equations above from the scene's start to `t_end` with SUNDIALS ARKODE's explicit
-/// Runge–Kutta method of order 8 with an embedded one of order 7 (Fehlberg, 13 stages).  Counts: one residual
-/// evaluation is one right-hand side.  Throws Misuse for a bad scene, start, end or option; what a user's
-/// function throws passes through.
-ReferenceRun integrate_explicitly(const Scene& scene, double t_end, const ReferenceOptions& options);
+/// Who takes the steps of an explicit baseline.
+enum class ExplicitCode {
+  arkode,  ///< SUNDIALS ARKODE: the Runge–Kutta method of order 8 with an embedded one of order 7 (Fehlberg)
+  fehlberg78,      ///< the same method in Boost.odeint
+  bulirsch_stoer,  ///< extrapolation of the modified midpoint rule in Boost.odeint
+};
+
+/// "ARKODE", "odeint-fehlberg78" or "odeint-bulirsch-stoer".
+const char* name(ExplicitCode code);
+
+/// Those that take a scene: ARKODE all of them; Boost.odeint, where the build has it, those that
+/// sized_equations() takes.
+std::vector<ExplicitCode> explicit_codes(const Scene& scene);
+
+/// Integrates the equations above from the scene's start to `t_end`: ARKODE those of ReducedEquations,
+/// Boost.odeint those of SizedEquations, with the number of unknowns known when it is compiled.  Counts: one
+/// residual evaluation is one right-hand side.  Throws Misuse for a bad scene, start, end or option, and for
+/// a code that does not take the scene; what a user's function throws passes through.
+ReferenceRun integrate_explicitly(const Scene& scene, double t_end, const ReferenceOptions& options,
+                                  ExplicitCode code = ExplicitCode::arkode);
 
 }  // namespace diracstep

@@ -20,7 +20,7 @@ struct CpuSeconds {
   int repeats = 0;
 };
 
-/// The method names of the baselines: SUNDIALS IDA, and ARKODE's explicit Runge–Kutta method of order 8.
+/// The method names of the baselines: SUNDIALS IDA, and the fastest explicit code (explicit_reference.hpp).
 inline constexpr const char* ida_method = "ida";
 inline constexpr const char* erk_method = "erk";
 
@@ -35,7 +35,7 @@ struct StudyRow {
   int order = 0;                 ///< 0 for a baseline
   double step = none;            ///< ours: the step size, fitted to the interval, or eps of variable steps
   double rtol = none;            ///< a baseline's
-  std::string formulation = {};  ///< of IDA
+  std::string formulation = {};  ///< of IDA, or the code of the explicit baseline
   std::string status = "ok";
   double error_q = none;
   double error_p = none;
