@@ -31,7 +31,9 @@ TEST_P(OwnScenes, MeetTheirClosedForms) {
 INSTANTIATE_TEST_SUITE_P(Examples, OwnScenes,
                          ::testing::Values("trammel", "coin_on_incline", "rlc_circuit", "vortex_ring",
                                            "relativistic_charge", "canonical_vortices", "turning_skate",
-                                           "heavy_top_so3", "suslov_so3", "knife_edge_se2"),
+                                           "heavy_top_so3", "suslov_so3", "knife_edge_se2",
+                                           "first_order_nonholonomic", "first_order_holonomic",
+                                           "mixed_orders", "massless_slider", "moving_kernel"),
                          [](const auto& of) { return of.param; });
 
 /// Every key of the format stands in the schema for editors, and no other.
