@@ -6,8 +6,8 @@
 
 namespace diracstep {
 
-/// The constraint algorithm (Gotay, Nester, Hinds 1978) on the equations K_0(t,z,w) = 0 of a degenerate
-/// Lagrangian, z = (q, p_i) and w = (v, Λ),
+/// The constraint algorithm (M. J. Gotay, J. M. Nester, G. Hinds, J. Math. Phys. 19, 1978) on the equations
+/// K_0(t,z,w) = 0 of a degenerate Lagrangian, z = (q, p_i) and w = (v, Λ),
 ///
 ///   ∂L/∂v_i − p_i = 0,   E = 0,   A v + b = 0                                    (kernel_motions.hpp),
 ///
@@ -31,8 +31,8 @@ class LevelledEquations {
   const Vector& rate() const { return rate_; }          ///< g
   const Vector& momentum() const { return momentum_; }  ///< ∂L/∂v, n numbers
   double terms() const { return terms_; }               ///< size of what cancels in K_0
-  double rate_terms() const;                      ///< of its rates, as far as round-off of differences goes
-  double resolved() const { return resolved_; }         ///< shortest time that rates are differenced over
+  double rate_terms() const;                     ///< of its rates, as far as round-off of differences goes
+  double resolved() const { return resolved_; }  ///< shortest time that rates are differenced over
 
   /// φ, and the left rows of K_l of each level: N K_l at a w that solves K = 0.
   Vector constraints(double t, ConstVectorRef z, ConstVectorRef w);

@@ -1,11 +1,11 @@
 #include <Eigen/LU>
-#include <Eigen/QR>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/core/system/detail/constraint_levels.hpp>
 #include <diracstep/core/system/detail/differenced.hpp>
+#include <numeric>
 
 namespace diracstep {
 
@@ -37,11 +37,10 @@ std::vector<int> independent_rows(Columns matrix, const std::vector<int>& first)
   return taken;
 }
 
-/// The unknowns that rows are solved for.
-std::vector<int> pivots_of(const Columns& rows) {
-  Eigen::ColPivHouseholderQR<Columns> qr(rows);
-  const auto& order = qr.colsPermutation().indices();
-  return {order.data(), order.data() + rows.rows()};
+std::vector<int> first_numbers(int count) {
+  std::vector<int> numbers(static_cast<std::size_t>(count));
+  std::iota(numbers.begin(), numbers.end(), 0);
+  return numbers;
 }
 
 /// A point near the start that shares no special position with it.
@@ -92,55 +91,76 @@ bool affine_at(LevelledEquations& equations, const Place& place, const Vector& z
   return true;
 }
 
-}  // namespace
-
-FirstOrderMotions levelled_motions(const Scene& scene) {
-  const int n = scene.dimension(), unknowns = n + scene.rows();
-  if (unknowns > most_with_levels) return {};
-  std::array places{Place(scene, 0.8), Place(scene, 1.9)};
+/// Kernel, `along`, `inert` and `affine` of a scene; none where ∂²L/∂v² is regular at a place, or cannot be
+/// taken.
+FirstOrderMotions without_levels(const Scene& scene, const std::array<Place, 2>& places) {
+  const Place& at = places.front();
   LagrangianDerivatives l(*scene.lagrangian);
-  l.take_second(*scene.lagrangian, places[0].t, places[0].q, places[0].v);
+  l.take_second(*scene.lagrangian, at.t, at.q, at.v);
   const Columns mass = scene.lagrangian->pattern().full(l.vv);
   FirstOrderMotions motions;
   if (!mass.allFinite()) return {};
   divide_coordinates(mass, motions);
   if (motions.along.empty()) return {};
   KernelPoint point(scene, motions);
-  point.evaluate(places[0].t, places[0].q, places[0].v, Vector::Zero(scene.rows()));
-  motions.w = point.kernel();
-  motions.u = Columns(Columns::Identity(n, n))(Eigen::all, motions.inert);
-  if (!motions.w.allFinite() || max_norm(mass * motions.w) > 1e-9 * max_norm(mass) * max_norm(motions.w))
-    return {};
-  motions.affine = true;
+  point.evaluate(at.t, at.q, at.v, Vector::Zero(scene.rows()));
+  const Columns& w = point.kernel();
+  if (!w.allFinite() || max_norm(mass * w) > 1e-9 * max_norm(mass) * max_norm(w)) return {};
+  motions.w = w;
+  motions.u = Columns(Columns::Identity(w.rows(), w.rows()))(Eigen::all, motions.inert);
+  LevelledEquations equations(scene, motions);
+  motions.affine = std::ranges::all_of(places, [&](const Place& place) {
+    return affine_at(equations, place, equations.state(place.q, place.p));
+  });
+  return motions;
+}
+
+/// Of the level after those of `motions`, the same at both places; nothing kept where it is not.  Equations
+/// of motion are kept before rows of the scene, and solved for velocities before forces: so the choice stays
+/// good along the motion.
+ConstraintLevel next_level(const Scene& scene, const FirstOrderMotions& motions,
+                           const std::array<Place, 2>& places) {
+  const int n = scene.dimension(), unknowns = n + scene.rows();
+  const std::size_t number = motions.levels.size();
+  LevelledEquations equations(scene, motions);
+  ConstraintLevel level;
   for (const Place& place : places) {
-    LevelledEquations equations(scene, motions);
-    motions.affine = motions.affine && affine_at(equations, place, equations.state(place.q, place.p));
-  }
-  for (std::size_t number = 0;; ++number) {
-    LevelledEquations equations(scene, motions);
-    ConstraintLevel level;
-    for (const Place& place : places) {
-      const bool first = &place == places.data();
-      const auto of = [&](const Vector& w) {
-        return equations.at(number, place.t, equations.state(place.q, place.p), w);
-      };
-      const Columns by_w = differenced(of, place.w, n, 1e-4, number > 0);
-      if (!by_w.allFinite()) return {};
-      const std::vector<int> kept =
-          independent_rows(by_w, number > 0 ? motions.levels.back().kept : std::vector<int>());
-      if (first) {
-        level = {kept, others(kept, unknowns), pivots_of(by_w(kept, Eigen::all))};
-      } else if (kept.size() != level.kept.size() ||
-                 independent_rows(by_w(level.kept, level.by), {}).size() != kept.size()) {
-        return {};
-      }
+    const auto of = [&](const Vector& w) {
+      return equations.at(number, place.t, equations.state(place.q, place.p), w);
+    };
+    const Columns by_w = differenced(of, place.w, n, 1e-4, number > 0);
+    if (!by_w.allFinite()) return {};
+    const std::vector<int> kept =
+        independent_rows(by_w, number > 0 ? motions.levels.back().kept : first_numbers(n));
+    if (&place == places.data()) {
+      const Columns rows = by_w(kept, Eigen::all);
+      level = {kept, others(kept, unknowns), independent_rows(rows.transpose(), first_numbers(n))};
     }
+    const Columns solved = by_w(level.kept, level.by);
+    if (kept.size() != level.kept.size() || level.by.size() != kept.size() ||
+        independent_rows(solved, {}).size() != kept.size())
+      return {};
+  }
+  return level;
+}
+
+}  // namespace
+
+FirstOrderMotions levelled_motions(const Scene& scene) {
+  if (scene.dimension() + scene.rows() > most_with_levels) return {};
+  std::array places{Place(scene, 0.8), Place(scene, 1.9)};
+  FirstOrderMotions motions = without_levels(scene, places);
+  if (!motions.exist()) return {};
+  for (std::size_t number = 0; number <= most_levels; ++number) {
+    ConstraintLevel level = next_level(scene, motions, places);
+    if (level.kept.empty()) return {};
     if (level.left.empty()) return number > 0 ? motions : FirstOrderMotions{};
-    if (number == most_levels) return {};
+    LevelledEquations equations(scene, motions);
     for (Place& place : places)
       solve_kept(equations, number, level, place.t, equations.state(place.q, place.p), place.w);
     motions.levels.push_back(std::move(level));
   }
+  return {};
 }
 
 }  // namespace diracstep
