@@ -71,7 +71,7 @@ void solve_kept(LevelledEquations& equations, std::size_t number, const Constrai
     const auto of = [&](const Vector& there) {
       return Vector(equations.at(number, t, z, there)(level.kept));
     };
-    const Columns by_w = differenced(of, w, z.size(), solving_difference, false);
+    const Columns by_w = differenced(of, w, w.size(), solving_difference, false);
     const Vector change = Columns(by_w(Eigen::all, level.by)).partialPivLu().solve(of(w));
     w(level.by) -= change;
     if (!(max_norm(change) > 1e-14 * size_or_one(max_norm(w)))) return;

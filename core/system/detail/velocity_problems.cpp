@@ -104,8 +104,7 @@ void require_determined(const Scene& scene, const FirstOrderMotions& motions) {
                "': its Lagrangian has motions of first order, whose equations together with the rows do not "
                "determine at the start: " +
                what +
-               "; rows are kept where they restrict velocities that these equations leave open, and of a "
-               "Hamiltonian (hamiltonian = …) also where they restrict positions alone");
+               "; constraints that these equations hide, and rates of these, are followed over two levels");
 }
 
 }  // namespace diracstep
