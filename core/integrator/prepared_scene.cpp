@@ -106,6 +106,7 @@ PreparedScene prepared(std::shared_ptr<const Scene> given, const IntegratorOptio
     scene = copy;
     result.lines.push_back({"velocities",
                             motions.by_force           ? "by forces"
+                            : !motions.levels.empty()  ? "by the constraint algorithm"
                             : motions.hide_equations() ? "along the kernel of the masses"
                                                        : "of motions of first order",
                             std::to_string(motions.w.cols()) + " of " + std::to_string(scene->dimension()) +
