@@ -50,16 +50,19 @@ std::vector<PlanLine> Integrator::plan() const {
     const ConstraintRule rule = options_.constraint_rule.value_or(method_.info.constraint_rule);
     const FirstOrderMotions motions = first_order_motions(*scene_);
     const bool first_order = motions.exist() && !motions.by_force && !method_.info.damped;
-    lines.push_back({"multipliers", std::to_string(m) + (method_.info.rows_inside ? " a node" : ""),
-                     first_order && motions.hide_equations()
-                         ? "hidden equations and holonomic rows at the Lobatto, others at the Gauss nodes"
-                     : first_order         ? "all rows at the Gauss nodes: motions of first order"
-                     : method_.info.damped ? "all rows, and the rates of holonomic rows, at the Radau nodes"
-                     : method_.info.rows_inside
-                         ? "nonholonomic rows at the Gauss, holonomic rows at the Lobatto nodes"
-                         : std::string("nonholonomic rows by the ") + rule.description() +
-                               " rule, holonomic rows at the end of the step"});
-    if (first_order && motions.hide_equations())
+    lines.push_back(
+        {"multipliers", std::to_string(m) + (method_.info.rows_inside ? " a node" : ""),
+         first_order && !motions.levels.empty() ? "all rows at the Gauss nodes: constraints of levels"
+         : first_order && motions.hide_equations()
+             ? "hidden equations and holonomic rows at the Lobatto, others at the Gauss nodes"
+         : first_order              ? "all rows at the Gauss nodes: motions of first order"
+         : method_.info.damped      ? "all rows, and the rates of holonomic rows, at the Radau nodes"
+         : method_.info.rows_inside ? "nonholonomic rows at the Gauss, holonomic rows at the Lobatto nodes"
+                                    : std::string("nonholonomic rows by the ") + rule.description() +
+                                          " rule, holonomic rows at the end of the step"});
+    if (first_order && !motions.levels.empty())
+      lines.push_back({"projection", "at both ends", "onto rows and the constraints of all levels"});
+    else if (first_order && motions.hide_equations())
       lines.push_back(
           {"projection", "left out", "a step ends on all rows and equations without accelerations"});
     else if (first_order)

@@ -29,7 +29,7 @@ std::string joined(const std::vector<std::string>& names) {
 void require_start(const Scene& scene, const FirstOrderMotions& motions = {}) {
   try {
     if (motions.hide_equations()) require_on_hidden(scene, motions);
-    require_consistent(scene, scene.start);
+    if (motions.levels.empty()) require_consistent(scene, scene.start);  // else velocities are not given
   } catch (const InconsistentStart& off) {
     throw InconsistentStart(
         std::string(off.what()) +
@@ -99,7 +99,7 @@ PreparedScene prepared(std::shared_ptr<const Scene> given, const IntegratorOptio
   }
   if (const FirstOrderMotions motions = first_order_motions(*scene);
       motions.exist() && scene->start.v.size() == scene->dimension() &&
-      (motions.u.cols() > 0 || scene->rows() > 0 || scene->force)) {
+      (motions.hide_equations() || motions.u.cols() > 0 || scene->rows() > 0 || scene->force)) {
     if (motions.hide_equations() && options.project_start) {
       auto moved = std::make_shared<Scene>(*scene);
       moved->start = project_start(*scene, scene->start, solvers).start;
@@ -112,6 +112,7 @@ PreparedScene prepared(std::shared_ptr<const Scene> given, const IntegratorOptio
     scene = copy;
     result.lines.push_back({"velocities",
                             motions.by_force           ? "by forces"
+                            : !motions.levels.empty()  ? "by the constraint algorithm"
                             : motions.hide_equations() ? "along the kernel of the masses"
                                                        : "of motions of first order",
                             std::to_string(motions.w.cols()) + " of " + std::to_string(scene->dimension()) +
@@ -128,6 +129,18 @@ PreparedScene prepared(std::shared_ptr<const Scene> given, const IntegratorOptio
   }
   require_start(*scene);
   return result;
+}
+
+std::shared_ptr<const Scene> with_determined_start(std::shared_ptr<const Scene> scene,
+                                                   const SolverFactory& solvers) {
+  if (scene->start.v.size() != scene->dimension() || !first_order_motions(*scene).exist()) return scene;
+  auto copy = std::make_shared<Scene>(*scene);
+  try {
+    PointReader(scene, solvers, true).determine(copy->start);
+  } catch (const Misuse&) {
+    return scene;
+  }
+  return copy;
 }
 
 }  // namespace diracstep

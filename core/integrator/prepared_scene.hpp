@@ -29,4 +29,9 @@ std::shared_ptr<const Scene> with_independent_rows(const std::shared_ptr<const S
 PreparedScene prepared(std::shared_ptr<const Scene> given, const IntegratorOptions& options,
                        const SolverFactory& solvers);
 
+/// A completed scene with the velocities of its start that are no data of a motion
+/// (PointReader::determine()), or as it is where there are none or they are not found, which the steps tell.
+std::shared_ptr<const Scene> with_determined_start(std::shared_ptr<const Scene> scene,
+                                                   const SolverFactory& solvers);
+
 }  // namespace diracstep

@@ -6,6 +6,7 @@
 #include <diracstep/core/steps/gauss_lobatto/first_order_step.hpp>
 #include <diracstep/core/steps/gauss_lobatto/hamiltonian_step.hpp>
 #include <diracstep/core/steps/gauss_lobatto/kernel_step.hpp>
+#include <diracstep/core/steps/gauss_lobatto/levelled_step.hpp>
 #include <diracstep/core/steps/gauss_lobatto/phase_space_step.hpp>
 #include <diracstep/core/steps/gauss_lobatto/step.hpp>
 #include <diracstep/core/steps/gauss_lobatto/tableau.hpp>
@@ -27,6 +28,7 @@ FirstOrderMotions own_motions(const Scene& scene, const StepChoices& choices) {
 
 std::unique_ptr<StepProblem> step_of_first_order(int s, const Scene& scene, const FirstOrderMotions& motions,
                                                  bool dense) {
+  if (!motions.levels.empty()) return levelled_step(s, scene, motions);
   if (motions.hide_equations()) return kernel_step(s, scene, motions);
   const bool alone = scene.rows() == 0 && !scene.force && scene.lagrangian->structure().phase_space();
   return alone ? phase_space_step(s, scene, dense) : first_order_step(s, scene, motions);

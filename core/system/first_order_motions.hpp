@@ -9,6 +9,12 @@
 
 namespace diracstep {
 
+/// Of the equations of one level of the constraint algorithm: those that determine unknowns, those that do
+/// not beside them, and the unknowns that the former are solved for.
+struct ConstraintLevel {
+  std::vector<int> kept, left, by;
+};
+
 /// The motions of first order of a Lagrangian: the columns of W span the constant kernel of ∂²L/∂v², and
 /// their momenta Wᵀ ∂L/∂v depend on positions, so that their equations of motion
 ///
@@ -25,14 +31,20 @@ namespace diracstep {
 /// `hidden`: the kernel moves, or equations along it hold no velocity along it and are constraints
 /// (kernel_motions.hpp); w is the kernel near the start, and momenta of the coordinates `inert` are the
 /// state.
+///
+/// `levels`: combinations of these equations and of the rows are constraints, or constraints have rates that
+/// are constraints again (detail/constraint_levels.hpp); `along` and `inert` as above, and `affine` where the
+/// equations of all of them are affine in velocities and forces.
 struct FirstOrderMotions {
   Columns w, u;
   bool by_force = false;
   std::vector<int> along = {}, inert = {};
   std::vector<bool> hidden = {};
+  std::vector<ConstraintLevel> levels = {};
+  bool affine = false;
 
   bool exist() const { return w.cols() > 0; }
-  bool hide_equations() const { return !hidden.empty(); }
+  bool hide_equations() const { return !hidden.empty() || !levels.empty(); }
 };
 
 /// Whether ∂²L/∂v² at the start is positive definite whatever the units of the coordinates: the cheap test
@@ -118,6 +130,12 @@ class FirstOrderVelocityProblem final : public MomentumVelocityProblem {
 /// The one of the two, here and in kernel_motions.hpp, that motions ask for.
 std::unique_ptr<MomentumVelocityProblem> velocity_problem(const Scene& scene,
                                                           const FirstOrderMotions& motions);
+
+constexpr int most_coordinates_of_first_order = 1500;  ///< matrices are full
+constexpr double regular_to = 1e-13;
+
+/// Directions of (v, Λ), as columns, that the equations of velocity_problem() leave open at the start.
+Columns open_directions(const Scene& scene, const FirstOrderMotions& motions);
 
 /// Throws Misuse where the equations of velocity_problem() do not determine (v, Λ) at the start, with the
 /// velocities and the forces of rows that they leave open.

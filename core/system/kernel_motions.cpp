@@ -6,6 +6,7 @@
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/numerics/kernel_basis.hpp>
 #include <diracstep/core/numerics/scales.hpp>
+#include <diracstep/core/system/detail/constraint_levels.hpp>
 #include <diracstep/core/system/kernel_motions.hpp>
 #include <diracstep/core/system/rows_along_motions.hpp>
 #include <sstream>
@@ -33,7 +34,15 @@ Start near_start(const Start& start, double phase) {
   return {start.time + 0.37 * phase, varied(start.q, 1e-2, phase), varied(start.v, 0.3, 2.0 * phase)};
 }
 
-/// `along` and `inert` by the pivots of M; both empty where M is regular.
+/// Tells those equations with entries beside their size from hidden ones.
+void keep_if_none(const Columns& derivatives, double size, Eigen::Index first, std::vector<bool>& hidden) {
+  for (Eigen::Index i = 0; i < derivatives.rows(); ++i)
+    if (max_norm(derivatives.row(i)) > no_dependence * size)
+      hidden[static_cast<std::size_t>(first + i)] = false;
+}
+
+}  // namespace
+
 void divide_coordinates(const Columns& mass, FirstOrderMotions& motions) {
   Eigen::ColPivHouseholderQR<Columns> qr;
   qr.setThreshold(1e-11);
@@ -44,15 +53,6 @@ void divide_coordinates(const Columns& mass, FirstOrderMotions& motions) {
   std::ranges::sort(motions.inert);
   std::ranges::sort(motions.along);
 }
-
-/// Tells those equations with entries beside their size from hidden ones.
-void keep_if_none(const Columns& derivatives, double size, Eigen::Index first, std::vector<bool>& hidden) {
-  for (Eigen::Index i = 0; i < derivatives.rows(); ++i)
-    if (max_norm(derivatives.row(i)) > no_dependence * size)
-      hidden[static_cast<std::size_t>(first + i)] = false;
-}
-
-}  // namespace
 
 FirstOrderMotions kernel_motions(const Scene& scene, bool first_order) {
   const Eigen::Index n = scene.dimension(), m = scene.rows();
@@ -95,9 +95,7 @@ FirstOrderMotions kernel_motions(const Scene& scene, bool first_order) {
   const bool hides = std::ranges::find(motions.hidden, true) != motions.hidden.end();
   if (!moves && !holds_velocities && !(first_order && hides)) return {};
   motions.w = w;
-  motions.u = Columns::Zero(n, n - w.cols());
-  for (Eigen::Index k = 0; k < motions.u.cols(); ++k)
-    motions.u(motions.inert[static_cast<std::size_t>(k)], k) = 1.0;
+  motions.u = Columns(Columns::Identity(n, n))(Eigen::all, motions.inert);
   return motions;
 }
 
@@ -227,6 +225,7 @@ void KernelVelocityProblem::jacobian(ConstVectorRef x, VectorRef values) {
 }
 
 void require_on_hidden(const Scene& scene, const FirstOrderMotions& motions) {
+  if (!motions.levels.empty()) return require_on_levels(scene, motions);
   const Start& start = scene.start;
   KernelPoint point(scene, motions);
   point.evaluate(start.time, start.q, start.v, Vector::Zero(scene.rows()));

@@ -25,6 +25,9 @@ namespace diracstep {
 /// hidden_rows() deal with those, and with ranks that change nothing does.  At most 200 coordinates and rows.
 FirstOrderMotions kernel_motions(const Scene& scene, bool first_order);
 
+/// `along` and `inert` by the pivots of ∂²L/∂v²; both empty where that is regular.
+void divide_coordinates(const Columns& mass, FirstOrderMotions& motions);
+
 /// E and r at a point, and their derivatives.
 class KernelPoint {
  public:

@@ -139,6 +139,10 @@ bool are_multipliers(const Scene& scene, const Columns& directions) {
   return true;
 }
 
+int rows_at_shown_points(const ConstraintRows& rows) {
+  return dynamic_cast<const MultiplierRows*>(&rows) != nullptr ? rows.rows() / 2 : rows.rows();
+}
+
 void show_multipliers(const Scene& scene, ConstVectorRef lambda, Vector& q) {
   Eigen::Index row = 0;
   for (const auto& block : scene.constraints) {

@@ -43,6 +43,10 @@ class MultiplierRows final : public ConstraintRows {
 /// the start.
 bool are_multipliers(const Scene& scene, const Columns& directions);
 
+/// How many of the rows of a block hold at q as shown, where multipliers do not stand still: the first so
+/// many.
+int rows_at_shown_points(const ConstraintRows& rows);
+
 /// q with the multipliers among the coordinates in place of what stands for them; `lambda` are the forces of
 /// all rows of the scene.
 void show_multipliers(const Scene& scene, ConstVectorRef lambda, Vector& q);

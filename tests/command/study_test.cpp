@@ -50,6 +50,37 @@ TEST_F(StudyCommand, ScenesSideBySideHaveTheRowsOfScenesInTurn) {
   expect_misuse("study knife_edge --parallel 0", {"--parallel", "1"});
 }
 
+/// All baselines come to the reference, which holds the multiplier; rows that are not the scene's are none.
+TEST_F(StudyCommand, MultipliersAsCoordinatesAreThoseOfTheReference) {
+  const Outcome outcome = run("study " DIRACSTEP_SOURCE
+                              "/examples/scenes/pendulum_tension.toml --json "
+                              "--methods type1/gl:3 --orders 6 --steps 0.1 --rtols 1e-9 --repeat 1");
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  const Json rows = Json::parse(outcome.out)["studies"][0]["rows"];
+  EXPECT_GE(rows.size(), 3u);
+  for (const Json& row : rows) {
+    EXPECT_EQ(row["status"], "ok") << row;
+    EXPECT_LT(row["error_q"].get<double>(), 1e-5) << row;
+    EXPECT_LT(row["constraint"].get<double>(), 1e-5) << row;
+  }
+}
+
+/// A start without velocities is the same for IDA as for the steps; an explicit method says why it has none.
+TEST_F(StudyCommand, VelocitiesThatAreNoDataOfAMotionAreFoundForBaselinesToo) {
+  const Outcome outcome = run("study " DIRACSTEP_SOURCE
+                              "/examples/scenes/first_order_nonholonomic.toml --json "
+                              "--methods type1/gl:3 --orders 6 --steps 0.1 --rtols 1e-9 --repeat 1");
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  for (const Json& row : Json::parse(outcome.out)["studies"][0]["rows"]) {
+    if (row["method"] == "erk") {
+      EXPECT_NE(row["status"].get<std::string>().find("not explicit: "), std::string::npos) << row;
+      continue;
+    }
+    EXPECT_EQ(row["status"], "ok") << row;
+    EXPECT_LT(row["error_q"].get<double>(), 1e-5) << row;
+  }
+}
+
 TEST_F(StudyCommand, JsonHasTheKeysOfTheContract) {
   const Outcome outcome = run("study knife_edge --json " + small);
   ASSERT_EQ(outcome.status, 0) << outcome.err;

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <diracstep/core/adaptive/damping_survey.hpp>
 #include <diracstep/core/integrator/integrator.hpp>
-#include <diracstep/core/integrator/point_reader.hpp>
+#include <diracstep/core/integrator/prepared_scene.hpp>
 #include <diracstep/core/methods/default_method.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/runs/event_steps.hpp>
@@ -116,6 +116,9 @@ std::string why_velocities(const Integrator& integrator) {
   if (scene.lagrangian->structure().phase_space())
     return "L is linear in v: the velocity follows from the position, not from the momentum";
   if (scene.lagrangian->structure().y_hessian_zero) return "L holds no v: the rows determine the velocity";
+  if (first_order_motions(scene).exist())
+    return "∂²L/∂v² is singular: beside momenta, the equations of motion along its kernel determine "
+           "velocities";
   return "∂²L/∂v² is regular along the rows";
 }
 
@@ -218,20 +221,6 @@ void examine_events(const CatalogueScene& entry, const Registry& registry, const
     events.detail = misuse.what();
   }
   findings.push_back(std::move(events));
-}
-
-/// With the velocities that are no data of a motion, or as it is where they are not found, which the steps
-/// tell.
-std::shared_ptr<const Scene> with_determined_start(std::shared_ptr<const Scene> scene,
-                                                   const SolverFactory& solvers) {
-  if (scene->start.v.size() != scene->dimension() || !first_order_motions(*scene).exist()) return scene;
-  auto copy = std::make_shared<Scene>(*scene);
-  try {
-    PointReader(scene, solvers, true).determine(copy->start);
-  } catch (const Misuse&) {
-    return scene;
-  }
-  return copy;
 }
 
 std::vector<std::string> advise(const CatalogueScene& entry, const DefaultMethod& choice,

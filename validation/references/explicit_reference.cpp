@@ -1,7 +1,10 @@
 #include <arkode/arkode_erkstep.h>
 
 #include <cstdlib>
+#include <diracstep/core/adaptive/rate_monitor.hpp>
+#include <diracstep/core/system/first_order_motions.hpp>
 #include <diracstep/core/system/hidden_rows.hpp>
+#include <diracstep/core/system/multiplier_rows.hpp>
 #include <diracstep/solvers/detail/shells.hpp>
 #include <diracstep/validation/references/explicit_reference.hpp>
 #include <diracstep/validation/references/odeint_steps.hpp>
@@ -147,6 +150,7 @@ class ExplicitIntegration {
     end.p.resize(scene_.dimension());
     scene_.lagrangian->gradient(t, end.q, end.v, force, end.p);
     end.energy = scene_.energy(t, end.q, end.v);
+    if (scene_.rows() > 0) show_multipliers(scene_, end.lambda, end.q);
   }
 
   static int rate(sunrealtype t, N_Vector y, N_Vector f, void* data) noexcept {
@@ -191,6 +195,13 @@ ReferenceRun integrate_explicitly(const Scene& given, double t_end, const Refere
                                   ExplicitCode code) {
   const auto scene = with_hidden_rows(with_lagrangian(given));
   require_reference(name(code), *scene, t_end, options);
+  const FirstOrderMotions motions = first_order_motions(*scene);
+  const bool alone = motions.u.cols() == 0 && scene->rows() == 0 && !scene->force;
+  if (motions.exist() && !motions.by_force && (motions.hide_equations() || !alone)) {
+    ReferenceRun run;
+    run.failure = "not explicit: " + why_no_accelerations(*scene);
+    return run;
+  }
   ExplicitIntegration integration(*scene, options);
   return code == ExplicitCode::arkode ? integration.run_arkode(t_end) : integration.run_odeint(code, t_end);
 }

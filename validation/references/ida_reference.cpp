@@ -4,9 +4,11 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <diracstep/core/integrator/prepared_scene.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/system/first_order_motions.hpp>
 #include <diracstep/core/system/hidden_rows.hpp>
+#include <diracstep/core/system/multiplier_rows.hpp>
 #include <diracstep/core/system/saddle_point.hpp>
 #include <diracstep/solvers/detail/linear_solver.hpp>
 #include <diracstep/solvers/detail/shells.hpp>
@@ -216,6 +218,7 @@ class IdaIntegration {
     if (scene_.rows() == 0) return;
     const SolveReport report = solve_acceleration(t, end.q, end.v);
     end.lambda = acceleration_.tail(scene_.rows());
+    show_multipliers(scene_, end.lambda, end.q);
     if (run.ok() && !report.ok()) run.failure = std::string("forces at the end: ") + describe(report.status);
   }
 
@@ -285,7 +288,7 @@ std::vector<DaeFormulation> formulations_of(const Scene& given) {
 }
 
 ReferenceRun integrate_with_ida(const Scene& given, double t_end, const ReferenceOptions& options) {
-  const auto scene = with_hidden_rows(with_lagrangian(given));
+  const auto scene = with_determined_start(with_hidden_rows(with_lagrangian(given)), kinsol());
   require_reference("IDA", *scene, t_end, options);
   if (const FirstOrderMotions motions = first_order_motions(*scene); motions.hide_equations())
     return integrate_kernel_with_ida(*scene, motions, t_end, options);

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <diracstep/core/adaptive/adaptive_run.hpp>
+#include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/core/runs/step_loop.hpp>
+#include <diracstep/core/system/multiplier_rows.hpp>
 #include <diracstep/validation/references/explicit_reference.hpp>
 #include <diracstep/validation/references/ida_reference.hpp>
 #include <diracstep/validation/studies/study_run.hpp>
@@ -42,7 +44,8 @@ double violation(const ConstraintRows& rows, const Sample& end) {
   rows.coefficients(end.time, end.q, a, residual);
   rows.pattern().multiply_add(a.data(), end.v.data(), residual.data());
   if (rows.holonomic()) rows.position(end.time, end.q, phi);
-  return std::max(residual.lpNorm<Eigen::Infinity>(), phi.lpNorm<Eigen::Infinity>());
+  const int shown = rows_at_shown_points(rows);
+  return std::max(max_norm(residual.head(shown)), max_norm(phi.head(shown)));
 }
 
 /// In the first formulation that completes of those that keep φ = 0.

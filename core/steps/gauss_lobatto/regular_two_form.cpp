@@ -26,12 +26,14 @@ void require_regular_two_form(const Scene& scene) {
   for (int i = 0; i < n; ++i)
     if (kernel.row(i).lpNorm<Eigen::Infinity>() > 1e-8)
       open += " '" + scene.coordinates[static_cast<std::size_t>(i)] + "'";
-  throw Misuse("scene '" + scene.name +
-               "': its Lagrangian θ(q)·v − H(q) is linear in v, and the two-form dθ has rank " +
-               std::to_string(two_form.rank()) + " of " + std::to_string(n) +
-               " at the start, so nothing determines the velocities of" + open +
-               "; a phase-space Lagrangian pairs every coordinate with another one" +
-               (n % 2 == 1 ? ", which an odd number of them cannot be" : ""));
+  throw Misuse(
+      "scene '" + scene.name +
+      "': its Lagrangian θ(q)·v − H(q) is linear in v, and the two-form dθ has rank " +
+      std::to_string(two_form.rank()) + " of " + std::to_string(n) +
+      " at the start, so nothing determines the velocities of" + open +
+      "; a phase-space Lagrangian pairs coordinates, and others must follow from constraints of at most "
+      "two levels" +
+      (n % 2 == 1 ? ", as one of an odd number must" : ""));
 }
 
 }  // namespace diracstep

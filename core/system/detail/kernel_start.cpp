@@ -2,8 +2,10 @@
 #include <algorithm>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/numerics/scales.hpp>
+#include <diracstep/core/system/detail/constraint_levels.hpp>
 #include <diracstep/core/system/detail/kernel_start.hpp>
 #include <diracstep/core/system/kernel_motions.hpp>
+#include <utility>
 
 namespace diracstep {
 
@@ -21,6 +23,7 @@ void positions_of(const ConstraintBlocks& holonomic, double t, ConstVectorRef q,
 
 Start moved_onto_hidden(const Scene& scene, const FirstOrderMotions& motions, Start start,
                         const std::vector<bool>& may_move) {
+  if (!motions.levels.empty()) return moved_onto_levels(scene, motions, std::move(start), may_move);
   constexpr int most_iterations = 50;
   const Eigen::Index n = scene.dimension(), m = scene.rows(), k = std::ssize(motions.along);
   const ConstraintBlocks holonomic = only_holonomic(scene.constraints);

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/LU>
 #include <diracstep/core/dirac/dirac_structure.hpp>
 #include <diracstep/core/dirac/discrete_action.hpp>
 #include <diracstep/core/methods/registry.hpp>

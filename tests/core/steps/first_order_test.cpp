@@ -322,22 +322,21 @@ TEST(FirstOrderStep, IsSelfAdjoint) {
 }
 
 TEST(FirstOrderStep, WhatIsNotDeterminedIsRefusedWithItsDirection) {
-  Scene scene;  // a pendulum in (x, y, px, py): its row restricts positions whose rates are momenta
-  scene.name = "pendulum";
+  Scene scene;  // constraints x, py, y and px of four levels
+  scene.name = "four levels";
   scene.coordinates = {"x", "y", "px", "py"};
   scene.lagrangian = lagrangian<4>([](const auto& q, const auto& v) {
-    return q[2] * v[0] + q[3] * v[1] - 0.5 * (q[2] * q[2] + q[3] * q[3]) - q[1];
+    return q[2] * v[0] + q[3] * v[1] - q[2] * q[3] - 0.5 * (q[0] * q[0] + q[1] * q[1]);
   });
-  scene.constraints = {holonomic<4, 1>(
-      []<class T>(const std::array<T, 4>& q) { return std::array<T, 1>{q[0] * q[0] + q[1] * q[1] - 1.0}; },
-      {"rod"})};
-  scene.start = {0.0, Vector{{1.0, 0.0, 0.0, 0.0}}, Vector::Zero(4)};
+  scene.constraints = {
+      holonomic<4, 1>([]<class T>(const std::array<T, 4>& q) { return std::array<T, 1>{q[0]}; }, {"wall"})};
+  scene.start = {0.0, Vector::Zero(4), Vector::Zero(4)};
   testing::expect_misuse(
       [&] {
         const Integrator taken(std::make_shared<const Scene>(scene), Registry::with_built_ins(), kinsol(),
                                {.method = gl(2), .step = 0.1});
       },
-      {"'pendulum'", "the velocity along 'px'", "the force of row 'rod'", "hamiltonian"});
+      {"'four levels'", "the velocity along 'px'", "the force of row 'wall'", "two levels"});
 }
 
 }  // namespace
