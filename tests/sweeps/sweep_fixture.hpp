@@ -9,6 +9,7 @@
 #include <fstream>
 #include <sstream>
 #include <string>
+#include <vector>
 
 namespace diracstep::testing {
 
@@ -34,6 +35,19 @@ class SweepTest : public ::testing::Test {
   static std::string contents(const std::string& file) {
     std::ifstream stream(file, std::ios::binary);
     return (std::ostringstream() << stream.rdbuf()).str();
+  }
+
+  static std::vector<std::string> fields(const std::string& line) {
+    std::vector<std::string> all;
+    std::istringstream stream(line);
+    for (std::string field; std::getline(stream, field, ',');) all.push_back(field);
+    return all;
+  }
+  std::vector<std::string> rows(const std::string& folder) const {
+    std::istringstream stream(contents(path(folder + "/results.csv")));
+    std::vector<std::string> all;
+    for (std::string line; std::getline(stream, line);) all.push_back(line);
+    return all;
   }
 
   static SweepReport run(const Sweep& sweep, const SweepOptions& options) {
