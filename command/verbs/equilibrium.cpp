@@ -10,7 +10,7 @@
 #include <diracstep/reports/json.hpp>
 #include <diracstep/reports/modes_plot.hpp>
 #include <diracstep/reports/report.hpp>
-#include <diracstep/solvers/largest_eigenpairs.hpp>
+#include <diracstep/eigenvalues/largest_eigenpairs.hpp>
 #include <memory>
 #include <numbers>
 #include <numeric>
