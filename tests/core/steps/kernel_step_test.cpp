@@ -97,7 +97,7 @@ TEST(KernelStep, StartsOffTheHiddenEquationAreToldAndMoved) {
   expect_misuse([&] { (void)take(false); }, {"'inner coordinate'", "along 's'", "holds no acceleration"});
   EXPECT_NO_THROW((void)take(true));
   Guesses guesses{{false, true}, {false, false}};
-  const ConsistentStart moved = project_start(off, off.start, kinsol(), guesses);
+  const ProjectedStart moved = project_start(off, off.start, kinsol(), guesses);
   EXPECT_NEAR(moved.start.q[1], s, 1e-14);
   EXPECT_EQ(moved.start.q[0], off.start.q[0]);
 }
