@@ -206,11 +206,8 @@ IntegratorOptions run_once(const RunArguments& options, const CatalogueScene& en
   } else {
     const StepGrid grid = fitted_steps(entry, end, chosen.step, options);
     chosen.step = grid.step;
-    const auto make = [&](const std::shared_ptr<const Scene>& scene) {
-      return std::make_unique<Integrator>(scene, session.registry, session.solvers, chosen);
-    };
     EventSteps<Integrator> motion(entry.scene, entry.all_rows, entry.events, session.solvers, result.momentum,
-                                  make);
+                                  integrators(session.registry, session.solvers, chosen));
     run_fixed(options, entry, session, motion, grid.steps, file, result);
     chosen = motion.stepper().options();
   }
