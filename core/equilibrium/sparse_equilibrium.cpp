@@ -77,7 +77,7 @@ class SparseSearch {
       const SaddleFactors factors(balance_.stiffness, balance_.one_forms, balance_.one_forms);
       if (factors.singular())
         return ended(
-            "rows depend on each other or nothing draws a coordinate back, so that the matrix is singular",
+            "constraints are redundant or nothing draws a coordinate back, so that the matrix is singular",
             residual);
       const Vector change = -factors.solve(residual);
       const double moved = change.head(q_.size()).lpNorm<Eigen::Infinity>();

@@ -143,7 +143,7 @@ NearestModes nearest_modes(const Scene& given, const Equilibrium& at, int count,
                          result.near != 0.0 ? std::abs(result.near) : fastest_rate(balance));
   if (map.singular())
     throw Misuse("scene '" + given.name +
-                 "': the matrix is singular: rows depend on each other, or there is an eigenvalue at " +
+                 "': the matrix is singular: constraints are redundant, or there is an eigenvalue at " +
                  to_text(result.near) + "; choose another number to be near to");
   const Eigenpairs pairs =
       eigenpairs([&](ConstVectorRef in, VectorRef out) { map.apply(in, out); }, start_of(map, n), wanted);
