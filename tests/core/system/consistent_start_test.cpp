@@ -4,6 +4,7 @@
 #include <diracstep/core/system/consistent_start.hpp>
 #include <diracstep/core/system/redundant_rows.hpp>
 
+#include "misuse.hpp"
 #include "scenes.hpp"
 #include "stepping.hpp"
 
@@ -37,6 +38,14 @@ TEST(ProjectedStart, AConsistentStartStays) {
     const ProjectedStart projected = project_start(*scene, scene->start, kinsol());
     EXPECT_LT(projected.position_moved + projected.velocity_moved, 1e-14) << scene->name;
   }
+}
+
+TEST(ProjectedStart, APositionThatMayNotMoveIsToldAsOneWhateverTheSceneIsCalled) {
+  const auto scene = inconsistent();
+  scene->name = "A v + b";
+  const Guesses none_of_q{std::vector<bool>(static_cast<std::size_t>(scene->dimension()), false), {}};
+  testing::expect_misuse([&] { (void)project_start(*scene, scene->start, kinsol(), none_of_q); },
+                         {"φ(q) = ", "no position is named as a guess"});
 }
 
 TEST(ProjectedStart, TheIntegratorRefusesOrProjectsAsAsked) {
