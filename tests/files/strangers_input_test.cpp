@@ -12,7 +12,6 @@
 #include <diracstep/files/shown_text.hpp>
 #include <filesystem>
 #include <fstream>
-#include <sstream>
 #include <string>
 
 /// Files and texts of unknown origin, and outputs that must not meet anything else.

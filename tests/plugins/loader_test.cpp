@@ -4,9 +4,7 @@
 #include <diracstep/plugins/loaded_plugin.hpp>
 #include <diracstep/plugins/plugin.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
-#include <fstream>
 #include <law_scenes.hpp>
-#include <sstream>
 
 #include "misuse.hpp"
 #include "temporary_folder.hpp"

@@ -7,9 +7,6 @@
 #include <diracstep/reports/study_page.hpp>
 #include <diracstep/reports/study_plot.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
-#include <filesystem>
-#include <fstream>
-#include <sstream>
 #include <string>
 
 #include "misuse.hpp"
