@@ -95,8 +95,8 @@ int main() {
   const auto exponential = by_rotation(space(spaces::SO3{})),
              cayley = by_rotation(space(spaces::RotationsBy<spaces::Retraction::cayley>{})),
              quaternion = by_quaternion();
-  Run truth{exponential, kinsol(), "type1/gl:4", 800, {}};
-  truth();
+  Run reference{exponential, kinsol(), "type1/gl:4", 800, {}};
+  reference();
   std::printf(
       "%-10s %-7s %6s  %s\n", "method", "solver", "steps",
       "microseconds a step, iterations, error: rotation | Cayley | quaternion and row | time over that");
@@ -115,7 +115,7 @@ int main() {
       std::printf("%-10s %-7s %6d ", method, name, steps);
       for (std::size_t i = 0; i < 3; ++i)
         std::printf(" %7.2f %4.1f %7.1e |", 1e-3 * times[i], runs[i].iterations,
-                    std::min((runs[i].end - truth.end).norm(), (runs[i].end + truth.end).norm()));
+                    std::min((runs[i].end - reference.end).norm(), (runs[i].end + reference.end).norm()));
       std::printf(" %.2f %.2f\n", times[0] / times[2], times[1] / times[2]);
     }
   return 0;

@@ -39,7 +39,7 @@ struct StepChecks {
   std::string text() const;
   void see(const Sample& point);
   void begin_anew();
-  void forget();
+  void clear();
 };
 
 }  // namespace diracstep::c_interface

@@ -203,7 +203,7 @@ int diracstep_reset(diracstep_integrator* integrator, double time, const double*
         q == nullptr ? std::nullopt : std::optional<Start>({time, column(q, handle), column(v, handle), {}});
     FixedMotion* const fixed = start ? &fixed_of(handle, "another start") : nullptr;
     handle.doubt.clear();
-    handle.checks.forget();
+    handle.checks.clear();
     if (!handle.entry.events.empty())
       handle.motion = handle.make(start ? &*start : nullptr);
     else if (start)

@@ -109,7 +109,7 @@ void StepChecks::begin_anew() {
   pushed.reset();
 }
 
-void StepChecks::forget() {
+void StepChecks::clear() {
   begin_anew();
   found.clear();
 }

@@ -48,7 +48,7 @@ if(DIRACSTEP_WITH_IPOPT)
   list(APPEND solver_libraries ipopt)
 endif()
 pkg_config_file(diracstep "${PROJECT_DESCRIPTION}" REQUIRES eigen3
-  LIBS diracstep_boundary_values diracstep_sensitivities diracstep_solvers diracstep_constraints diracstep_core PRIVATE_LIBS ${solver_libraries} pthread)
+  LIBS diracstep_boundary_values diracstep_sensitivities diracstep_eigenvalues diracstep_solvers diracstep_constraints diracstep_core PRIVATE_LIBS ${solver_libraries} pthread)
 if(DIRACSTEP_BUILD_PLUGINS)
   pkg_config_file(diracstep-plugins "DiracStep: plugins, written and loaded" REQUIRES diracstep
     LIBS diracstep_plugins PRIVATE_LIBS ${CMAKE_DL_LIBS})

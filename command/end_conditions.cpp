@@ -1,19 +1,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <diracstep/command/arguments.hpp>
 #include <diracstep/command/end_conditions.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/numerics/near_names.hpp>
-#include <diracstep/core/runs/run.hpp>
-#include <diracstep/files/csv_table.hpp>
 
 namespace diracstep::command {
 
 namespace {
-
-constexpr std::size_t most_guess_bytes = 100'000'000;
 
 /// What is asked of one end, by columns of (q, v, p).
 using Asked = std::vector<std::pair<Eigen::Index, double>>;
@@ -80,72 +75,6 @@ BoundaryConditions conditions_from_start(const Scene& scene, const std::vector<s
   for (int i = 0; i < n; ++i) start.emplace_back(i, scene.start.q[i]);
   for (int i = 0; i < n; ++i) start.emplace_back(n + i, scene.start.v[i]);
   return conditions_of(start, asked(scene, to, "--to"), n);
-}
-
-GuessedMotion through_points(const Vector& times, const Columns& q, const Columns& v) {
-  return [=](double t) {
-    const Eigen::Index last = times.size() - 1;
-    if (last == 0) return GuessedPoint{q.col(0), v.col(0)};
-    const double sign = times[last] > times[0] ? 1.0 : -1.0;
-    Eigen::Index k = 0;
-    while (k < last - 1 && sign * (times[k + 1] - t) < 0.0) ++k;
-    const double part = std::clamp((t - times[k]) / (times[k + 1] - times[k]), 0.0, 1.0);
-    return GuessedPoint{q.col(k) + part * (q.col(k + 1) - q.col(k)),
-                        v.col(k) + part * (v.col(k + 1) - v.col(k))};
-  };
-}
-
-GuessedMotion guess_from_file(const std::string& path, const Scene& scene) {
-  const CsvTable table = read_csv(path, "--guess", most_guess_bytes, 2, EmptyFields::missing);
-  if (table.lines.empty()) throw Misuse(fmt::format("--guess: '{}' has no lines of data", path));
-  const int n = scene.dimension();
-  const auto count = static_cast<Eigen::Index>(table.lines.size());
-  Vector times(count);
-  Columns states = Columns::Zero(2 * n, count);
-  const std::vector<std::string> known = names_at_an_end(scene);
-  const auto read = [&](const std::string& name, const auto& put) {
-    const auto found = std::ranges::find(table.names, name);
-    if (found == table.names.end()) return false;
-    for (Eigen::Index k = 0; k < count; ++k) {
-      const double number =
-          table.lines[static_cast<std::size_t>(k)][static_cast<std::size_t>(found - table.names.begin())];
-      if (!std::isfinite(number))
-        throw Misuse(fmt::format("--guess: '{}': a field of the column '{}' is empty", path, name));
-      put(k, number);
-    }
-    return true;
-  };
-  if (!read("t", [&](Eigen::Index k, double t) { times[k] = t; }))
-    throw Misuse(fmt::format("--guess: '{}' has no column t", path));
-  for (Eigen::Index k = 1; k < count; ++k)
-    if (!((times[k] - times[k - 1]) * (times[count - 1] - times[0]) > 0.0))
-      throw Misuse(fmt::format("--guess: '{}': t = {:g} does not follow {:g}", path, times[k], times[k - 1]));
-  for (int i = 0; i < 2 * n; ++i) {
-    const std::string& name = known[static_cast<std::size_t>(i)];
-    if (!read(name, [&](Eigen::Index k, double value) { states(i, k) = value; }))
-      throw Misuse(fmt::format("--guess: '{}' has no column '{}'", path, name));
-  }
-  return through_points(times, states.topRows(n), states.bottomRows(n));
-}
-
-GuessedMotion guess_from_start(const std::shared_ptr<const Scene>& scene, const Session& session,
-                               const IntegratorOptions& options, long steps) {
-  Integrator integrator(scene, session.registry, session.solvers, options);
-  const int n = scene->dimension();
-  Vector times(steps + 1);
-  Columns q(n, steps + 1), v(n, steps + 1);
-  Eigen::Index k = 0;
-  const RunReport run = run_steps(integrator, steps, Momentum::projected, 1, [&](const Sample& sample) {
-    times[k] = sample.time;
-    q.col(k) = sample.q;
-    v.col(k) = sample.v.size() > 0 ? sample.v : Vector::Zero(n);
-    return ++k <= steps;
-  });
-  if (k <= steps)
-    throw Error(
-        fmt::format("the motion from the start, which is the guess, fails: {}; --guess FILE gives another",
-                    run.last.failure));
-  return through_points(times, q, v);
 }
 
 }  // namespace diracstep::command

@@ -1,8 +1,6 @@
 #pragma once
 
 #include <diracstep/boundary_values/boundary_values.hpp>
-#include <diracstep/command/session.hpp>
-#include <memory>
 #include <string>
 #include <vector>
 
@@ -18,16 +16,5 @@ BoundaryConditions conditions_at_ends(const Scene& scene, const std::vector<std:
 
 /// The coordinate and the velocity of the scene's start, all of them, and --to.
 BoundaryConditions conditions_from_start(const Scene& scene, const std::vector<std::string>& to);
-
-/// Between points, straight.
-GuessedMotion through_points(const Vector& times, const Columns& q, const Columns& v);
-
-/// Through the points of a CSV file with columns t, coordinates and v_NAME.  Throws Misuse where one is
-/// missing.
-GuessedMotion guess_from_file(const std::string& path, const Scene& scene);
-
-/// The motion from the start of the scene.  Throws Error where it fails.
-GuessedMotion guess_from_start(const std::shared_ptr<const Scene>& scene, const Session& session,
-                               const IntegratorOptions& options, long steps);
 
 }  // namespace diracstep::command

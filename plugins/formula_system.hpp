@@ -54,7 +54,7 @@ class HostFunction {
   }
 
   /// Before the first pass of an evaluation, and before each pass.
-  void forget() { answers_known_ = 0; }
+  void clear() { answers_known_ = 0; }
   void rewind() { next_ = 0; }
 
   /// f(t, x, y) with x_i = x(i), y_i = y(i).
@@ -184,9 +184,9 @@ class System {
     return hamiltonian_(t, q, p);
   }
 
-  void forget() {
-    lagrangian_.forget();
-    hamiltonian_.forget();
+  void clear() {
+    lagrangian_.clear();
+    hamiltonian_.clear();
   }
   void rewind() {
     lagrangian_.rewind();

@@ -64,14 +64,14 @@ class Instance {
   }
 
   void value(diracstep_interval step, const double* y, double* s) {
-    values_.forget();
+    values_.clear();
     values_.rewind();
     *s = formula_(std::as_const(values_), step, Columns<double>(y, values_.dimension()));
   }
 
   void gradient(diracstep_interval step, const double* y, double* g) {
     constexpr std::size_t width = Variables<First>::count;
-    slopes_.forget();
+    slopes_.clear();
     for (std::size_t begin = 0; begin < first_.size(); begin += width) {
       const std::size_t end = std::min(begin + width, first_.size());
       for (std::size_t k = 0; k < first_.size(); ++k) first_[k] = First(y[k]);
@@ -89,7 +89,7 @@ class Instance {
     const diracstep_system& host = curvatures_.host();
     const diracstep_pattern pattern =
         needs_full_pattern(claims_) ? diracstep_pattern{} : host.lagrangian.pattern;
-    curvatures_.forget();
+    curvatures_.clear();
     for (std::size_t k = 0; k < second_.size(); ++k) second_[k] = Second(y[k]);
     for (std::size_t a = 0; a < columns; ++a)
       for (std::size_t b = a; b < columns; ++b)

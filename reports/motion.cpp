@@ -23,7 +23,7 @@ SymbolNote note_of(const CatalogueScene& entry, const std::string& coordinate) {
   return {coordinate, "", ""};
 }
 
-Motion::Coordinate coordinate(const CatalogueScene& entry, int index) {
+DrawnMotion::Coordinate coordinate(const CatalogueScene& entry, int index) {
   const auto place = static_cast<std::size_t>(index);
   const Scene& scene = *entry.scene;
   const std::string name = scene.space ? position_names(scene)[place] : scene.coordinates[place];
@@ -32,7 +32,7 @@ Motion::Coordinate coordinate(const CatalogueScene& entry, int index) {
 
 std::string family(const std::string& name) { return name.substr(0, name.find_last_of('_')); }
 
-void add_body(Motion& motion, const CatalogueScene& entry, const std::string& name, int x, int y) {
+void add_body(DrawnMotion& motion, const CatalogueScene& entry, const std::string& name, int x, int y) {
   const int place = static_cast<int>(motion.coordinates.size());
   motion.coordinates.push_back(coordinate(entry, x));
   motion.coordinates.push_back(coordinate(entry, y));
@@ -40,7 +40,7 @@ void add_body(Motion& motion, const CatalogueScene& entry, const std::string& na
 }
 
 /// The points whose coordinates are named x… and y…, of one unit.
-void find_bodies(Motion& motion, const CatalogueScene& entry) {
+void find_bodies(DrawnMotion& motion, const CatalogueScene& entry) {
   const std::vector<std::string> names = position_names(*entry.scene);
   std::map<std::string_view, int> index;
   for (std::size_t i = 0; i < names.size(); ++i) index[names[i]] = static_cast<int>(i);
@@ -54,7 +54,7 @@ void find_bodies(Motion& motion, const CatalogueScene& entry) {
   }
 }
 
-void find_heading(Motion& motion, const CatalogueScene& entry) {
+void find_heading(DrawnMotion& motion, const CatalogueScene& entry) {
   const std::vector<std::string> names = position_names(*entry.scene);
   for (std::size_t i = 0; i < names.size() && motion.bodies.size() == 1; ++i) {
     const SymbolNote note = note_of(entry, names[i]);
@@ -68,7 +68,8 @@ void find_heading(Motion& motion, const CatalogueScene& entry) {
 /// Finds the bars among the holonomic rows, from their derivatives at the start.
 class Bars {
  public:
-  Bars(Motion& motion, const Scene& scene) : motion_(motion), q_(scene.start.q), time_(scene.start.time) {
+  Bars(DrawnMotion& motion, const Scene& scene)
+      : motion_(motion), q_(scene.start.q), time_(scene.start.time) {
     for (std::size_t b = 0; b < motion.bodies.size(); ++b) {
       body_[motion.coordinates[static_cast<std::size_t>(motion.bodies[b].x)].index] = static_cast<int>(b);
       body_[motion.coordinates[static_cast<std::size_t>(motion.bodies[b].y)].index] = static_cast<int>(b);
@@ -129,7 +130,7 @@ class Bars {
   }
 
   std::pair<int, int> indices(int body) const {
-    const Motion::Body& b = motion_.bodies[static_cast<std::size_t>(body)];
+    const DrawnMotion::Body& b = motion_.bodies[static_cast<std::size_t>(body)];
     return {motion_.coordinates[static_cast<std::size_t>(b.x)].index,
             motion_.coordinates[static_cast<std::size_t>(b.y)].index};
   }
@@ -143,14 +144,14 @@ class Bars {
     return {value(x), value(y)};
   }
 
-  Motion& motion_;
+  DrawnMotion& motion_;
   const Vector& q_;
   double time_;
   std::map<int, int> body_;  ///< of a coordinate
 };
 
 /// The elements of a scene whose coordinates are one long family, some left out where there are too many.
-bool find_profile(Motion& motion, const CatalogueScene& entry) {
+bool find_profile(DrawnMotion& motion, const CatalogueScene& entry) {
   const std::vector<std::string> names = position_names(*entry.scene);
   if (names.size() < fewest_elements) return false;
   for (const std::string& name : names)
@@ -158,15 +159,15 @@ bool find_profile(Motion& motion, const CatalogueScene& entry) {
   const std::size_t every = (names.size() + max_elements - 1) / max_elements;
   for (std::size_t i = 0; i < names.size(); i += every)
     motion.coordinates.push_back(coordinate(entry, static_cast<int>(i)));
-  motion.form = Motion::Form::profile;
+  motion.form = DrawnMotion::Form::profile;
   return true;
 }
 
-bool find_plane(Motion& motion, const CatalogueScene& entry) {
+bool find_plane(DrawnMotion& motion, const CatalogueScene& entry) {
   find_bodies(motion, entry);
   if (motion.bodies.empty() && entry.scene->storage_size() == 2) add_body(motion, entry, "", 0, 1);
   if (motion.bodies.empty()) return false;
-  motion.form = Motion::Form::plane;
+  motion.form = DrawnMotion::Form::plane;
   find_heading(motion, entry);
   Bars bars(motion, *entry.scene);
   for (const auto& rows : entry.scene->constraints)
@@ -174,18 +175,18 @@ bool find_plane(Motion& motion, const CatalogueScene& entry) {
   return true;
 }
 
-bool find_solids(Motion& motion, const CatalogueScene& entry) {
+bool find_solids(DrawnMotion& motion, const CatalogueScene& entry) {
   for (const DrawnBody& body : entry.bodies) {
     if (motion.solids.size() == max_bodies) break;
-    Motion::Solid& solid =
-        motion.solids.emplace_back(Motion::Solid{body.name, body.shape, body.size, {}, body.fixed});
+    DrawnMotion::Solid& solid =
+        motion.solids.emplace_back(DrawnMotion::Solid{body.name, body.shape, body.size, {}, body.fixed});
     for (const int index : body.coordinates) {
       solid.places.push_back(static_cast<int>(motion.coordinates.size()));
       motion.coordinates.push_back(coordinate(entry, index));
     }
   }
   if (motion.solids.empty()) return false;
-  motion.form = Motion::Form::space;
+  motion.form = DrawnMotion::Form::space;
   return true;
 }
 
@@ -201,8 +202,8 @@ bool speaks_of(const std::string& unit, std::string_view symbol) {
 
 }  // namespace
 
-Motion motion_of(const CatalogueScene& entry) {
-  Motion motion;
+DrawnMotion motion_of(const CatalogueScene& entry) {
+  DrawnMotion motion;
   if (find_solids(motion, entry) || find_plane(motion, entry) || find_profile(motion, entry)) return motion;
   const std::size_t count = std::min(static_cast<std::size_t>(entry.scene->storage_size()), max_curves);
   for (std::size_t i = 0; i < count; ++i)
@@ -210,15 +211,15 @@ Motion motion_of(const CatalogueScene& entry) {
   return motion;
 }
 
-const char* name(Motion::Form form) {
+const char* name(DrawnMotion::Form form) {
   switch (form) {
-    case Motion::Form::space:
+    case DrawnMotion::Form::space:
       return "space";
-    case Motion::Form::plane:
+    case DrawnMotion::Form::plane:
       return "plane";
-    case Motion::Form::profile:
+    case DrawnMotion::Form::profile:
       return "profile";
-    case Motion::Form::curves:
+    case DrawnMotion::Form::curves:
       return "curves";
   }
   return "unknown";

@@ -17,7 +17,7 @@ namespace diracstep {
 ///
 /// Of a plane, a row (P − Q)·(P − Q) = const of two points is a bar between them, one of a single point a bar
 /// to a pin, and an angle that is called a heading points the way of the only body.
-struct Motion {
+struct DrawnMotion {
   enum class Form { space, plane, profile, curves };
   struct Coordinate {
     int index;  ///< in q
@@ -49,10 +49,10 @@ struct Motion {
 };
 
 /// At most some hundred coordinates, however large the scene.
-Motion motion_of(const CatalogueScene& entry);
+DrawnMotion motion_of(const CatalogueScene& entry);
 
 /// "space", "plane", "profile" or "curves".
-const char* name(Motion::Form form);
+const char* name(DrawnMotion::Form form);
 
 /// The unit of time that the units of a scene's symbols speak of: "s", "d", "1" where all are without a unit;
 /// empty where that is not known.

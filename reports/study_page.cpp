@@ -258,7 +258,7 @@ std::string inside_script(const std::string& json) {
 
 std::string scripts(const std::vector<PageEntry>& entries) {
   const bool bodies = std::ranges::any_of(
-      entries, [](const PageEntry& entry) { return entry.history.motion.form == Motion::Form::space; });
+      entries, [](const PageEntry& entry) { return entry.history.motion.form == DrawnMotion::Form::space; });
   const std::string view =
       bodies ? fmt::format("<script>\n{}</script>\n", study_page_parts::body_view) : std::string();
   return view +

@@ -24,7 +24,7 @@ Json rounded(const std::vector<double>& values) {
   return list;
 }
 
-Json body_json(const Motion::Body& body) {
+Json body_json(const DrawnMotion::Body& body) {
   Json json{{"name", body.name}, {"x", body.x}, {"y", body.y}};
   if (body.heading >= 0) json["heading"] = body.heading;
   return json;
@@ -39,7 +39,7 @@ std::size_t stride(const History& history) {
 }
 
 Json motion_json(const History& history) {
-  const Motion& motion = history.motion;
+  const DrawnMotion& motion = history.motion;
   const std::size_t every = stride(history);
   Json json{{"form", name(motion.form)}, {"time", Json::array()}};
   for (std::size_t k = 0; k < history.track_time.size(); k += every)
@@ -55,10 +55,10 @@ Json motion_json(const History& history) {
       values.push_back(rounded(history.positions[k][static_cast<Eigen::Index>(i)]));
     json["values"].push_back(std::move(values));
   }
-  for (const Motion::Body& body : motion.bodies) json["bodies"].push_back(body_json(body));
-  for (const Motion::Bar& bar : motion.bars) json["bars"].push_back({bar.from, bar.to});
+  for (const DrawnMotion::Body& body : motion.bodies) json["bodies"].push_back(body_json(body));
+  for (const DrawnMotion::Bar& bar : motion.bars) json["bars"].push_back({bar.from, bar.to});
   for (const auto& pin : motion.pins) json["pins"].push_back({rounded(pin[0]), rounded(pin[1])});
-  for (const Motion::Solid& solid : motion.solids)
+  for (const DrawnMotion::Solid& solid : motion.solids)
     json["solids"].push_back({{"name", solid.name},
                               {"shape", solid.shape},
                               {"size", rounded({solid.size.begin(), solid.size.end()})},

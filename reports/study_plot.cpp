@@ -198,10 +198,10 @@ std::string error_script(const History& history, const std::string& title, const
 }
 
 /// The range of a coordinate of all bodies.
-std::string tics(const char* axis, const History& history, int Motion::Body::*coordinate) {
+std::string tics(const char* axis, const History& history, int DrawnMotion::Body::*coordinate) {
   double least = std::numeric_limits<double>::infinity(), most = -least;
   for (const Vector& at : history.positions)
-    for (const Motion::Body& body : history.motion.bodies) {
+    for (const DrawnMotion::Body& body : history.motion.bodies) {
       least = std::min(least, at[body.*coordinate]);
       most = std::max(most, at[body.*coordinate]);
     }
@@ -209,19 +209,19 @@ std::string tics(const char* axis, const History& history, int Motion::Body::*co
 }
 
 std::string plane_script(const History& history) {
-  const Motion& motion = history.motion;
+  const DrawnMotion& motion = history.motion;
   const auto& x = motion.coordinates[static_cast<std::size_t>(motion.bodies[0].x)];
   const auto& y = motion.coordinates[static_cast<std::size_t>(motion.bodies[0].y)];
   std::vector<StudyCurve> curves;
   const std::size_t every = (motion.bodies.size() + max_trails - 1) / max_trails;
   for (std::size_t i = every - 1; i < motion.bodies.size(); i += every) {
-    const Motion::Body& body = motion.bodies[i];
+    const DrawnMotion::Body& body = motion.bodies[i];
     curves.push_back(curve(body.name, curves.size(), component(history.positions, body.x),
                            component(history.positions, body.y)));
   }
   const std::string key = curves.size() < 2 ? "set key off\n" : "";
   const std::string equal = x.unit == y.unit ? "set size ratio -1\n" : "";
-  return key + equal + tics("x", history, &Motion::Body::x) + tics("y", history, &Motion::Body::y) +
+  return key + equal + tics("x", history, &DrawnMotion::Body::x) + tics("y", history, &DrawnMotion::Body::y) +
          axes("", in_unit(motion.bodies.size() > 1 ? "x" : x.name, x.unit),
               in_unit(motion.bodies.size() > 1 ? "y" : y.name, y.unit)) +
          plotted(curves);
@@ -260,7 +260,7 @@ std::string curves_script(const History& history, const std::string& time) {
 std::string space_script(const History& history) {
   std::string data, plots;
   std::size_t drawn = 0;
-  for (const Motion::Solid& solid : history.motion.solids) {
+  for (const DrawnMotion::Solid& solid : history.motion.solids) {
     if (solid.places.empty() || drawn == max_trails) continue;
     data += fmt::format("$body{} << EOD\n", drawn);
     for (const Vector& at : history.positions)
@@ -278,13 +278,13 @@ std::string space_script(const History& history) {
 std::string motion_script(const History& history, const std::string& time) {
   const std::string linear = std::string(study_style) + "unset logscale\nunset mxtics\nset format '%g'\n";
   switch (history.motion.form) {
-    case Motion::Form::space:
+    case DrawnMotion::Form::space:
       return linear + space_script(history);
-    case Motion::Form::plane:
+    case DrawnMotion::Form::plane:
       return linear + plane_script(history);
-    case Motion::Form::profile:
+    case DrawnMotion::Form::profile:
       return linear + profile_script(history);
-    case Motion::Form::curves:
+    case DrawnMotion::Form::curves:
       break;
   }
   return linear + curves_script(history, time);

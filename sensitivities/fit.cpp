@@ -19,7 +19,7 @@ constexpr double infinity = std::numeric_limits<double>::infinity();
 /// back.
 constexpr double no_motion = 1e100;
 
-struct Motion {
+struct FittedMotion {
   std::string failure;               ///< empty, or why it has none
   Columns values;                    ///< as FitData::values
   std::vector<Columns> derivatives;  ///< of each row by the parameters, one line for each column
@@ -30,8 +30,8 @@ class MotionAt {
  public:
   MotionAt(const FitProblem& problem, const FitData& data) : problem_(problem), data_(data) {}
 
-  Motion operator()(const Vector& parameters) {
-    Motion motion;
+  FittedMotion operator()(const Vector& parameters) {
+    FittedMotion motion;
     try {
       outputs_ = outputs_at(parameters);
       compute(problem_.scene(parameters), motion);
@@ -42,7 +42,7 @@ class MotionAt {
   }
 
  private:
-  void compute(const ParametricScene& scene, Motion& motion) {
+  void compute(const ParametricScene& scene, FittedMotion& motion) {
     Integrator integrator(scene.scene, problem_.registry, problem_.solvers, problem_.steps);
     Sensitivities sensitivities(integrator, problem_.registry, scene);
     Directions z = sensitivities.by_parameters();
@@ -63,7 +63,7 @@ class MotionAt {
   }
 
   bool read(Integrator& integrator, Sensitivities& sensitivities, const Directions& z, Eigen::Index k,
-            Motion& motion) const {
+            FittedMotion& motion) const {
     Sample sample;
     if (!integrator.sample(Momentum::projected, sample).ok()) {
       motion.failure = "the velocity at t = " + to_text(integrator.time()) + " was not found";
@@ -183,7 +183,7 @@ class Residuals {
   }
 
   /// The motion there, once for the residuals and their derivatives.
-  const Motion& at(const Vector& parameters) {
+  const FittedMotion& at(const Vector& parameters) {
     if (parameters_.size() != parameters.size() || parameters_ != parameters) {
       motion_ = motion_at_(parameters);
       parameters_ = parameters;
@@ -200,7 +200,7 @@ class Residuals {
   const FitData& data_;
   std::vector<std::pair<Eigen::Index, Eigen::Index>> measured_;
   Vector parameters_;
-  Motion motion_;
+  FittedMotion motion_;
   int evaluations_ = 0;
 };
 
@@ -324,7 +324,7 @@ FitReport fit(const FitProblem& problem, const FitData& data, const Vector& para
   measure_uncertainty(problem, residuals, report);
   report.evaluations = residuals.evaluations();
   report.residuals = Columns::Constant(data.values.rows(), data.values.cols(), nan);
-  const Motion& end = residuals.at(report.parameters);
+  const FittedMotion& end = residuals.at(report.parameters);
   if (end.failure.empty())
     for (Eigen::Index c = 0; c < data.values.cols(); ++c)
       report.residuals.col(c) =

@@ -262,9 +262,7 @@ MemberResult MemberRuns::run_by_local_error(const CatalogueScene& entry, const I
 MemberResult MemberRuns::run_through_events(const CatalogueScene& entry, const IntegratorOptions& options,
                                             long steps, Recorded& recorded) const {
   EventSteps<Integrator> motion(entry.scene, entry.all_rows, entry.events, solvers_, Momentum::projected,
-                                [&](const std::shared_ptr<const Scene>& scene) {
-                                  return std::make_unique<Integrator>(scene, registry_, solvers_, options);
-                                });
+                                integrators(registry_, solvers_, options));
   Sample end;
   SolveReport read = motion.sample(end);
   std::string failure;
@@ -278,8 +276,7 @@ MemberResult MemberRuns::run_through_events(const CatalogueScene& entry, const I
     recorded.see(entry, hit.sample);
     recorded.see_event(entry.events[hit.event].name, hit.sample.time);
   }
-  if (motion.stopped())
-    end = motion.hits().back().after ? *motion.hits().back().after : motion.hits().back().sample;
+  if (motion.stopped()) end = motion.end_of_stopped();
   recorded.see(entry, end);
   return result_of(failure, "", entry, end, recorded);
 }

@@ -4,7 +4,7 @@
 /// continuous system, to which the derivatives of the steps must converge.
 ///
 /// Both by exact derivatives of the equations; IDAS with the sensitivities in its error test, all at once
-/// with the motion and one after the other.  The truth is GL(6) with small steps.
+/// with the motion and one after the other.  The reference is GL(6) with small steps.
 ///
 ///   diracstep-gradients OUT.csv SCENE END [NAME=VALUE]…     END 0: that of the scene
 ///
@@ -238,9 +238,9 @@ class Idas {
   void* memory_ = nullptr;
 };
 
-double error_of(const Measured& measured, const Columns& truth) {
+double error_of(const Measured& measured, const Columns& reference) {
   if (measured.derivatives.size() == 0) return std::numeric_limits<double>::quiet_NaN();
-  return (measured.derivatives - truth).lpNorm<Eigen::Infinity>() / truth.lpNorm<Eigen::Infinity>();
+  return (measured.derivatives - reference).lpNorm<Eigen::Infinity>() / reference.lpNorm<Eigen::Infinity>();
 }
 
 /// Columns: side (0 IDAS at once, 1 IDAS one after the other, s GL(s)), its tolerance or number of steps,
@@ -257,12 +257,13 @@ void compare(const std::string& file, const std::string& name, double stated_end
   const double end = stated_end != 0.0 ? stated_end : entry.t_end;
   const auto base = static_cast<long>(std::ceil((end - scene.start.time) / entry.natural_step));
   require_no_jump(shared, end, 4 * base + 1);  // off the nodes of the others
-  const Columns truth = by_steps(scene, shared, "type1/gl:6", end, 4 * base).derivatives;
-  if (truth.size() == 0) throw Error("scene '" + scene.name + "': the motion that is the truth fails");
+  const Columns reference = by_steps(scene, shared, "type1/gl:6", end, 4 * base).derivatives;
+  if (reference.size() == 0)
+    throw Error("scene '" + scene.name + "': the motion that is the reference fails");
   std::string text = "side,setting,seconds,error\n";
   const auto add = [&](int side, double setting, const Measured& measured) {
     std::array<char, 120> line{};
-    const double error = error_of(measured, truth);
+    const double error = error_of(measured, reference);
     if (std::isfinite(error) && std::isfinite(measured.seconds))
       std::snprintf(line.data(), line.size(), "%d,%.17g,%.6g,%.6g\n", side, setting, measured.seconds, error);
     else

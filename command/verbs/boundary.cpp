@@ -4,45 +4,24 @@
 #include <algorithm>
 #include <cmath>
 #include <diracstep/boundary_values/boundary_values.hpp>
-#include <diracstep/command/arguments.hpp>
 #include <diracstep/command/end_conditions.hpp>
+#include <diracstep/command/motion_search.hpp>
 #include <diracstep/command/verbs.hpp>
 #include <diracstep/core/numerics/errors.hpp>
-#include <diracstep/core/runs/run.hpp>
-#include <diracstep/files/output_file.hpp>
 #include <diracstep/reports/json.hpp>
 #include <diracstep/reports/report.hpp>
-#include <diracstep/scene_format/position_names.hpp>
 #include <memory>
-#include <optional>
 
 namespace diracstep::command {
 
 namespace {
 
-struct BoundaryArguments {
-  std::string scene, guess, out;
-  std::vector<std::string> from, to, set;
-  bool periodic = false, json = false;
-  MethodChoice method;
-  std::optional<double> end, step;
+struct BoundaryArguments : MotionSearchArguments {
+  bool periodic = false;
 };
 
 constexpr int most_conditions_shown = 40;  // coordinates, multipliers
 constexpr long most_boundary_steps = 10'000'000;
-
-GuessedMotion guess_of(const BoundaryArguments& arguments, const BoundaryProblem& problem,
-                       const Session& session) {
-  if (!arguments.guess.empty()) return guess_from_file(arguments.guess, *problem.scene);
-  const BoundaryConditions& conditions = problem.conditions;
-  if (!conditions.start_held || !conditions.end_held)
-    return guess_from_start(problem.scene, session, problem.options, problem.steps);
-  const int n = problem.scene->dimension();
-  const double t0 = problem.scene->start.time;
-  return straight_line(t0, conditions.value.head(n),
-                       t0 + static_cast<double>(problem.steps) * problem.options.step,
-                       conditions.value.tail(n));
-}
 
 std::string multiplier_text(std::complex<double> value) {
   if (value.imag() == 0.0) return fmt::format("{:.10g}", value.real());
@@ -55,9 +34,7 @@ std::string boundary_text(const BoundaryReport& report, const BoundaryProblem& p
   const Scene& scene = *problem.scene;
   const int n = scene.dimension();
   const Eigen::Index last = report.times.size() - 1;
-  std::string text =
-      fmt::format("{} from t = {:g} to {:g}: {} steps with {}, {} iterations\n\n", scene.name,
-                  report.times[0], report.times[last], problem.steps, method, report.iterations);
+  std::string text = first_line(scene, report.times, problem.steps, method, report.iterations) + "\n\n";
   std::vector<std::vector<std::string>> rows{
       {"coordinate", "q at the start", "v", "p", "q at the end", "v", "p"}};
   for (int i = 0; i < std::min(n, most_conditions_shown); ++i) {
@@ -125,21 +102,6 @@ std::string boundary_json(const BoundaryReport& report, const BoundaryProblem& p
   return to_text(json, 2) + '\n';
 }
 
-void write_motion(const std::string& path, const BoundaryReport& report, const Scene& scene) {
-  std::string text = "t";
-  for (const std::string& name : names_at_an_end(scene)) text += "," + csv_field(name);
-  text += '\n';
-  for (Eigen::Index k = 0; k < report.times.size(); ++k) {
-    text += fmt::format("{:.17g}", report.times[k]);
-    for (const Columns* of : {&report.q, &report.v, &report.p})
-      for (const double value : of->col(k)) text += fmt::format(",{:.17g}", value);
-    text += '\n';
-  }
-  OutputFile file(path, OutputFile::Mode::fresh);
-  file.write(text);
-  file.close();
-}
-
 BoundaryConditions conditions_of(const BoundaryArguments& arguments, const Scene& scene) {
   const int n = scene.dimension();
   if (arguments.periodic) {
@@ -196,15 +158,8 @@ std::string other_motion(BoundaryProblem problem, const BoundaryReport& found, c
 }
 
 void run_boundary(BoundaryArguments arguments, Session& session) {
-  const CatalogueScene entry = make_scene(session, arguments.scene, parameters(arguments.set));
-  require_flat(*entry.scene, "boundary");
-  if (!entry.events.empty())
-    throw Misuse("boundary does not go with the events of the scene: when one is met is not known before");
-  take_recommendation(entry, arguments.method, arguments.step);
-  const double end = arguments.end.value_or(entry.t_end);
-  const StepGrid grid = fit_steps(entry.scene->start.time, end, arguments.step.value_or(entry.natural_step));
-  if (grid.steps > most_boundary_steps)
-    throw Misuse(fmt::format("{} steps; {} are the most", grid.steps, most_boundary_steps));
+  const CatalogueScene entry = searched_scene(arguments, session, "boundary");
+  const StepGrid grid = searched_steps(arguments, entry, most_boundary_steps);
   BoundaryProblem problem{entry.scene,
                           session.registry,
                           session.solvers,
@@ -213,11 +168,13 @@ void run_boundary(BoundaryArguments arguments, Session& session) {
                           conditions_of(arguments, *entry.scene),
                           {}};
   problem.options.step = grid.step;
-  problem.guess = guess_of(arguments, problem, session);
+  problem.guess =
+      guess_of(arguments, entry.scene, session, problem.options, problem.steps, problem.conditions);
   BoundaryReport report = solve_boundary_values(problem);
   const bool places = report.converged && problem.conditions.start_held && problem.conditions.end_held;
   if (places && report.doubt.empty()) report.doubt = doubt_of_steps(problem, report);
-  if (!arguments.out.empty()) write_motion(arguments.out, report, *entry.scene);
+  if (!arguments.out.empty())
+    write_motion(arguments.out, *entry.scene, {report.times, report.q, report.v, report.p});
   const std::string method =
       Integrator(entry.scene, session.registry, session.solvers, problem.options).method().name;
   print(arguments.json ? boundary_json(report, problem, method) : boundary_text(report, problem, method));
@@ -238,8 +195,6 @@ void add_boundary(CLI::App& app, Session& session) {
   CLI::App* verb = app.add_subcommand(
       "boundary", "The motion between two places, with other conditions on both ends, or a periodic one");
   const auto arguments = std::make_shared<BoundaryArguments>();
-  add_solver_options(*verb, session);
-  add_redundancy_option(*verb, session);
   verb->add_option("SCENE", arguments->scene, "A scene; see diracstep list scenes")->required();
   verb->add_option("--from", arguments->from,
                    "A coordinate at the start, v_ or p_ before it its velocity or momentum; without, all "
@@ -247,18 +202,14 @@ void add_boundary(CLI::App& app, Session& session) {
       ->type_name("NAME=VALUE");
   verb->add_option("--to", arguments->to, "The same at the end")->type_name("NAME=VALUE");
   verb->add_flag("--periodic", arguments->periodic, "Coordinates and velocities at the end as at the start");
-  verb->add_option("--end", arguments->end, "Time of the end; the scene's own without it");
-  verb->add_option("--step", arguments->step, "Step size; the scene's own without it");
   verb->add_option(
           "--guess", arguments->guess,
           "CSV file with columns t, coordinates and v_NAME, as --out of run and this verb writes "
           "them; without, a straight line between two places, else the motion from the scene's start")
       ->type_name("FILE");
-  add_method_options(*verb, arguments->method);
   verb->add_option("--out", arguments->out, "CSV file for the motion: t, coordinates, v_NAME, p_NAME")
       ->type_name("FILE");
-  add_set_option(*verb, arguments->set);
-  verb->add_flag("--json", arguments->json, "One JSON document on standard output");
+  add_search_options(*verb, session, *arguments);
   verb->footer(
       "Examples:\n"
       "  diracstep boundary kepler_e06 --from x=1 y=0 --to x=-0.3 y=1.1 --end 2.1 --out transfer.csv\n"

@@ -6,31 +6,24 @@
 #include <diracstep/boundary_values/optimal_control.hpp>
 #include <diracstep/command/arguments.hpp>
 #include <diracstep/command/end_conditions.hpp>
+#include <diracstep/command/motion_search.hpp>
 #include <diracstep/command/verbs.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/numerics/near_names.hpp>
-#include <diracstep/core/runs/run.hpp>
-#include <diracstep/files/output_file.hpp>
 #include <diracstep/reports/json.hpp>
 #include <diracstep/reports/report.hpp>
 #include <diracstep/scene_format/parametric_scene_file.hpp>
-#include <diracstep/scene_format/position_names.hpp>
 #include <limits>
 #include <memory>
-#include <optional>
 
 namespace diracstep::command {
 
 namespace {
 
-struct ControlArguments {
-  std::string scene, guess, out;
-  std::vector<std::string> from, to, set, at_least, at_most;
-  bool json = false;
+struct ControlArguments : MotionSearchArguments {
+  std::vector<std::string> at_least, at_most;
   int degree = 0, iterations = 500;
   double tolerance = 1e-9;
-  MethodChoice method;
-  std::optional<double> end, step;
 };
 
 constexpr int most_coordinates_of_control = 40;  // shown
@@ -56,21 +49,6 @@ void take_bounds(const std::vector<std::string>& assignments, const std::string&
   }
 }
 
-GuessedMotion guess_of_control(const ControlArguments& arguments, const ControlProblem& problem,
-                               const Session& session) {
-  const Scene& scene = *problem.controlled.scene;
-  if (!arguments.guess.empty()) return guess_from_file(arguments.guess, scene);
-  const BoundaryConditions& conditions = problem.conditions;
-  if (!conditions.start_held || !conditions.end_held)
-    return guess_from_start(problem.controlled.scene, session, problem.options, problem.steps);
-  const int n = scene.dimension();
-  const double t0 = scene.start.time;
-  // Places at the end are the last conditions.
-  return straight_line(t0, conditions.value.head(n),
-                       t0 + static_cast<double>(problem.steps) * problem.options.step,
-                       conditions.value.tail(n));
-}
-
 /// 0 where it is round-off beside others of its kind.
 std::string shown_of(double value, double largest) {
   constexpr double round_off = 1e-15;
@@ -82,9 +60,7 @@ std::string control_text(const OptimalControlReport& report, const ControlProble
   const Scene& scene = *problem.controlled.scene;
   const int n = scene.dimension();
   const Eigen::Index last = report.times.size() - 1;
-  std::string text =
-      fmt::format("{} from t = {:g} to {:g}: {} steps with {}, {} iterations\n\n", scene.name,
-                  report.times[0], report.times[last], problem.steps, method, report.iterations);
+  std::string text = first_line(scene, report.times, problem.steps, method, report.iterations) + "\n\n";
   std::vector<std::vector<std::string>> rows{{"coordinate", "q at the start", "v", "q at the end", "v"}};
   for (int i = 0; i < std::min(n, most_coordinates_of_control); ++i) {
     auto& row = rows.emplace_back(std::vector<std::string>{scene.coordinates[static_cast<std::size_t>(i)]});
@@ -145,36 +121,17 @@ std::string control_json(const OptimalControlReport& report, const ControlProble
 /// step ends.
 void write_controlled(const std::string& path, const OptimalControlReport& report,
                       const ControlProblem& problem) {
-  std::string text = "t";
-  for (const std::string& name : names_at_an_end(*problem.controlled.scene)) text += "," + csv_field(name);
-  for (const std::string& name : problem.controlled.controls) text += "," + csv_field(name);
-  text += '\n';
   const Eigen::Index points = report.controls.cols() / problem.steps;
-  for (Eigen::Index k = 0; k < report.times.size(); ++k) {
-    text += fmt::format("{:.17g}", report.times[k]);
-    for (const Columns* of : {&report.q, &report.v, &report.p})
-      for (const double value : of->col(k)) text += fmt::format(",{:.17g}", value);
-    for (const double value : report.controls.col(std::min(k * points, report.controls.cols() - 1)))
-      text += fmt::format(",{:.17g}", value);
-    text += '\n';
-  }
-  OutputFile file(path, OutputFile::Mode::fresh);
-  file.write(text);
-  file.close();
+  write_motion(path, *problem.controlled.scene, {report.times, report.q, report.v, report.p},
+               problem.controlled.controls, [&](Eigen::Index k) -> Vector {
+                 return report.controls.col(std::min(k * points, report.controls.cols() - 1));
+               });
 }
 
 ControlProblem control_problem(ControlArguments& arguments, Session& session) {
-  const Parameters changes = parameters(arguments.set);
-  const CatalogueScene entry = make_scene(session, arguments.scene, changes);
-  require_flat(*entry.scene, "control");
-  if (!entry.events.empty())
-    throw Misuse("control does not go with the events of the scene: when one is met is not known before");
-  SceneControl control = scene_control(arguments.scene, entry, changes);
-  take_recommendation(entry, arguments.method, arguments.step);
-  const StepGrid grid = fit_steps(entry.scene->start.time, arguments.end.value_or(entry.t_end),
-                                  arguments.step.value_or(entry.natural_step));
-  if (grid.steps > most_control_steps)
-    throw Misuse(fmt::format("{} steps; {} are the most", grid.steps, most_control_steps));
+  const CatalogueScene entry = searched_scene(arguments, session, "control");
+  SceneControl control = scene_control(arguments.scene, entry, parameters(arguments.set));
+  const StepGrid grid = searched_steps(arguments, entry, most_control_steps);
   if (arguments.to.empty() && !control.end_cost)
     throw Misuse(
         "--to NAME=VALUE says what is asked of the end, or 'end_cost' of [control] what an end costs");
@@ -198,7 +155,8 @@ ControlProblem control_problem(ControlArguments& arguments, Session& session) {
   problem.upper_q = -problem.lower_q;
   take_bounds(arguments.at_least, "--at-least", true, problem);
   take_bounds(arguments.at_most, "--at-most", false, problem);
-  problem.guess = guess_of_control(arguments, problem, session);
+  problem.guess =
+      guess_of(arguments, entry.scene, session, problem.options, problem.steps, problem.conditions);
   return problem;
 }
 
@@ -229,8 +187,6 @@ void add_control(CLI::App& app, Session& session) {
   CLI::App* verb = app.add_subcommand(
       "control", "Controls that cost least, for a scene with a table [control]; needs Ipopt");
   const auto arguments = std::make_shared<ControlArguments>();
-  add_solver_options(*verb, session);
-  add_redundancy_option(*verb, session);
   verb->add_option("SCENE", arguments->scene, "A scene file with [control]")->required();
   verb->add_option("--from", arguments->from,
                    "A coordinate at the start, v_ or p_ before it its velocity or momentum; without, all "
@@ -242,8 +198,6 @@ void add_control(CLI::App& app, Session& session) {
                    "Lower bound of a coordinate at the ends of steps, or of a control")
       ->type_name("NAME=VALUE");
   verb->add_option("--at-most", arguments->at_most, "Upper bound of the same")->type_name("NAME=VALUE");
-  verb->add_option("--end", arguments->end, "Time of the end; the scene's own without it");
-  verb->add_option("--step", arguments->step, "Step size; the scene's own without it");
   verb->add_option("--degree", arguments->degree,
                    "Of the polynomials in t that controls are in each step; below the points of a step")
       ->check(CLI::Range(0, 8))
@@ -258,12 +212,10 @@ void add_control(CLI::App& app, Session& session) {
                    "CSV file with columns t, coordinates and v_NAME; without, a straight line between two "
                    "places, else the motion from the scene's start")
       ->type_name("FILE");
-  add_method_options(*verb, arguments->method);
   verb->add_option("--out", arguments->out,
                    "CSV file for the motion: t, coordinates, v_NAME, p_NAME, controls")
       ->type_name("FILE");
-  add_set_option(*verb, arguments->set);
-  verb->add_flag("--json", arguments->json, "One JSON document on standard output");
+  add_search_options(*verb, session, *arguments);
   verb->footer(
       "Examples:\n"
       "  diracstep control blade.toml --to x=1 y=1 h=0 v_x=0 v_y=0 v_h=0 --out parking.csv\n"

@@ -7,10 +7,10 @@
 #include <diracstep/command/verbs.hpp>
 #include <diracstep/core/equilibrium/eigenmodes.hpp>
 #include <diracstep/core/equilibrium/sparse_modes.hpp>
+#include <diracstep/eigenvalues/largest_eigenpairs.hpp>
 #include <diracstep/reports/json.hpp>
 #include <diracstep/reports/modes_plot.hpp>
 #include <diracstep/reports/report.hpp>
-#include <diracstep/solvers/largest_eigenpairs.hpp>
 #include <memory>
 #include <numbers>
 #include <numeric>

@@ -92,7 +92,7 @@ StepReport go_on_behind_kinks(Integrator& side, RateMeter& meter, double eps, do
     const double left = t - side.time();
     report.solve = meter.motion().velocity(side.time(), side.position(), side.momentum(), v);
     for (int k = 0; k < 2 && report.ok(); ++k) {  // the width of its differences follows the step
-      const double ahead = side.kinks_passed().empty() ? 0.0 : 4e-3 * size;
+      const double ahead = side.kinks_passed().empty() ? 0.0 : RateMeter::beside_kink * size;
       const Rate rate = meter.rate(side.time() + ahead, side.position() + ahead * v, v, size);
       if (rate.ok()) size = std::copysign(std::min(eps / rate.rate, std::abs(left)), left);
     }

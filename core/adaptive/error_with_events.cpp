@@ -43,10 +43,7 @@ class EventRuns {
     }
     if (const SolveReport solve = motion->sample(run.end); !solve.ok() && run.failure.empty())
       run.failure = describe(solve.status);
-    if (motion->stopped()) {
-      const EventHit& last = motion->hits().back();
-      run.end = last.after ? *last.after : last.sample;
-    }
+    if (motion->stopped()) run.end = motion->end_of_stopped();
     for (const EventHit& hit : motion->hits()) run.met.push_back(hit.event);
     run.work = motion->work();
     solves_ += run.work.solves;
@@ -93,13 +90,10 @@ ErrorControlReport solve_events_to_error(const std::shared_ptr<const Scene>& sta
   integrator.method = options.method;
   integrator.order = options.order;
   integrator.step = std::copysign(options.first_step, end - start->start.time);
-  const auto stepper = [&](const std::shared_ptr<const Scene>& scene) {
-    return std::make_unique<Integrator>(scene, registry, solvers, integrator);
-  };
   const auto make = [&](double step) {
     integrator.step = step;
     return std::make_unique<EventSteps<Integrator>>(start, all, events, solvers, Momentum::projected,
-                                                    stepper);
+                                                    integrators(registry, solvers, integrator));
   };
   ErrorControlReport report;
   {

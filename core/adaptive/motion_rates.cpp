@@ -27,9 +27,9 @@ Columns tangents_of(Columns rows) {
 }  // namespace
 
 /// The motion linearised about its points.
-class LinearisedMotion {
+class PointwiseLinearisation {
  public:
-  LinearisedMotion(const Scene& scene, const SolverFactory& solvers)
+  PointwiseLinearisation(const Scene& scene, const SolverFactory& solvers)
       : scene_(scene), n_(scene.dimension()), motion_(scene, solvers), sizes_(Vector::Zero(2 * n_)) {}
 
   /// The largest rates at a point; NaN where there is no acceleration, 0 before anything has moved.
@@ -198,7 +198,7 @@ class MasslessMotion {
 
 MotionRates::MotionRates(const Scene& scene, const SolverFactory& solvers) {
   if (has_accelerations(scene))
-    with_mass_ = std::make_unique<LinearisedMotion>(scene, solvers);
+    with_mass_ = std::make_unique<PointwiseLinearisation>(scene, solvers);
   else
     massless_ = std::make_unique<MasslessMotion>(scene, solvers);
 }

@@ -7,7 +7,7 @@
 
 namespace diracstep {
 
-class LinearisedMotion;
+class PointwiseLinearisation;
 class MasslessMotion;
 
 /// How fast a motion linearised about its points decays and oscillates, as survey_damping() says.
@@ -29,7 +29,7 @@ class MotionRates {
   Rates at(const Sample& point);
 
  private:
-  std::unique_ptr<LinearisedMotion> with_mass_;
+  std::unique_ptr<PointwiseLinearisation> with_mass_;
   std::unique_ptr<MasslessMotion> massless_;
 };
 

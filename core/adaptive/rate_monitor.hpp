@@ -51,6 +51,9 @@ struct MonitorScales {
 /// whatever its truncation error, and that is all that reversibility needs.
 class RateMeter {
  public:
+  /// Of a step: so far ahead of a kink that was just crossed no difference reaches back across it.
+  static constexpr double beside_kink = 4e-3;
+
   RateMeter(const Scene& scene, const SolverFactory& solvers, Monitor monitor, MonitorScales scales);
   RateMeter(RateMeter&&) noexcept;
   ~RateMeter();

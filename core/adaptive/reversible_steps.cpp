@@ -12,7 +12,6 @@ namespace {
 
 constexpr double lowest_ratio = 0.8, highest_ratio = 1.25;  // of z to ω before the guard acts
 constexpr double size_tolerance = 1e-10;  // relative, of an equation in the step: below it is round-off
-constexpr double beside_kink = 4e-3;      // of a step: beyond the widths of the meter's differences
 constexpr int max_sizes = 30;             // tried for one step
 
 }  // namespace
@@ -23,7 +22,7 @@ bool AdaptiveIntegrator::measure(bool growth) {
   const double t = main_.time();
   const SolveReport report = meter_->motion().velocity(t, main_.position(), main_.momentum(), v_);
   // At a kink just crossed it is measured where no difference reaches across.
-  const double ahead = main_.kinks_passed().empty() ? 0.0 : beside_kink * next_size_;
+  const double ahead = main_.kinks_passed().empty() ? 0.0 : RateMeter::beside_kink * next_size_;
   const auto rate_at = [&](const Vector& q) {
     return growth ? meter_->rate_and_growth(t + ahead, q, v_, next_size_)
                   : meter_->rate(t + ahead, q, v_, next_size_);

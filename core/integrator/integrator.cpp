@@ -52,13 +52,13 @@ Integrator::Integrator(PreparedScene prepared, const Registry& registry, const S
       preparation_(std::move(prepared.lines)),
       options_(checked(std::move(options))),
       method_(chosen_method(*scene_, registry, options_, preparation_)),
-      matrices_(matrix_form(*scene_, options_.dense_limit)),
-      reader_(std::make_unique<PointReader>(scene_, solvers, matrices_.full)),
+      reader_(
+          std::make_unique<PointReader>(scene_, solvers, matrix_form(*scene_, options_.dense_limit).full)),
       sequence_(std::make_unique<StepSequence>(
-          scene_, design_step(scene_, registry, method_, options_, matrices_.full), solvers, *reader_)),
+          scene_, design_step(scene_, registry, method_, options_, reader_->full_matrices()), solvers,
+          *reader_)),
       division_(std::make_unique<StepDivision>(scene_, options_.step, has_node_at_end(method_.info, options_),
                                                *reader_, *sequence_)),
-      solved_stages_(std::make_unique<std::vector<SolvedStage>>()),
       left_out_(scene_->whole ? std::make_unique<LeftOutRows>(*scene_) : nullptr) {
   if (method_.info.damped) division_->resolve_to_first_kink();
   reset(scene_->start);
@@ -135,15 +135,11 @@ StepReport Integrator::take(double h, Guess guess) {
   const std::vector<Interval>& parts = division_->parts();
   std::size_t pieces = parts.size();
   for (int more = 2; !outcome.ok() && more <= options_.substeps; more *= 2) {
-    pieces_.clear();
-    for (const Interval& part : parts)
-      for (int k = 0; k < more; ++k)
-        pieces_.push_back({part.start + k * (part.size / more), part.size / more});
-    StepSequence::Outcome divided = sequence_->solve(pieces_, state_, Guess::plain, work_);
+    StepSequence::Outcome divided = division_->solve_finer(more, state_, work_);
     if (!divided.ok()) continue;
     ++work_.retries.divided_steps;
     outcome = std::move(divided);
-    pieces = pieces_.size();
+    pieces = parts.size() * static_cast<std::size_t>(more);
   }
   if (!outcome.ok()) return failed(outcome.solve, step.start, outcome.failure);
   if (const std::string broken = left_out_ ? broken_left_out_row(sequence_->end().q) : std::string();
@@ -198,10 +194,8 @@ std::span<const KinkPassed> Integrator::kinks_passed() const { return division_-
 const std::string& Integrator::stuck_at_kink() const { return division_->stuck(); }
 double Integrator::unresolved_between_kinks() const { return division_->unresolved(); }
 
-void Integrator::record_stages(bool wanted) {
-  solved_stages_->clear();
-  sequence_->record_into(wanted ? solved_stages_.get() : nullptr);
-}
+void Integrator::record_stages(bool wanted) { sequence_->record_stages(wanted); }
+const std::vector<SolvedStage>& Integrator::solved_stages() const { return sequence_->solved_stages(); }
 
 SolveReport Integrator::sample(const KinkPassed& at, Momentum momentum, Sample& sample) {
   return reader_->read(at.time, at.at, momentum, sample);

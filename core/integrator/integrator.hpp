@@ -93,7 +93,7 @@ class Integrator {
   /// The motion has the same bits with and without.
   void record_stages(bool wanted);
   /// Of the last step; empty before the first, and where they are not kept.
-  const std::vector<SolvedStage>& solved_stages() const { return *solved_stages_; }
+  const std::vector<SolvedStage>& solved_stages() const;
 
   /// All that the next steps depend on.  After `restore`, an integrator of the same scene, method and step
   /// goes on with the same bits as the one saved.  restore() throws Misuse for a snapshot that does not fit,
@@ -127,13 +127,10 @@ class Integrator {
   std::vector<PlanLine> preparation_;
   IntegratorOptions options_;
   Method method_;
-  MatrixForm matrices_;
   std::unique_ptr<PointReader> reader_;  // the sequence refers to it, also after a move
   std::unique_ptr<StepSequence> sequence_;
   std::unique_ptr<StepDivision> division_;
-  std::unique_ptr<std::vector<SolvedStage>> solved_stages_;  // the sequence refers to it, also after a move
-  std::unique_ptr<LeftOutRows> left_out_;                    ///< null where no rows are left out
-  std::vector<Interval> pieces_;                             ///< of the step
+  std::unique_ptr<LeftOutRows> left_out_;  ///< null where no rows are left out
 
   Clock clock_;
   State state_;

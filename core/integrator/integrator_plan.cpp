@@ -39,9 +39,10 @@ std::vector<PlanLine> Integrator::plan() const {
     lines.push_back({"nonlinear solver", "left out", "the step is explicit and there are no rows"});
   if (solver != nullptr) {
     const int nonzeros = problem.pattern().nonzeros();
-    lines.push_back({"Jacobian", matrices_.full ? "full" : "sparse",
+    const MatrixForm matrices = matrix_form(*scene_, options_.dense_limit);
+    lines.push_back({"Jacobian", matrices.full ? "full" : "sparse",
                      std::to_string(problem.size()) + " unknowns, " + std::to_string(nonzeros) +
-                         " entries: " + matrices_.reason});
+                         " entries: " + matrices.reason});
   }
   if (m == 0) {
     lines.push_back({"multipliers", "left out", "the scene has no rows"});

@@ -19,6 +19,8 @@ class PointReader {
  public:
   /// Full matrices, or sparse ones.
   PointReader(std::shared_ptr<const Scene> scene, SolverFactory solvers, bool full);
+  /// Whether its systems, and those of the steps, are solved by full matrices.
+  bool full_matrices() const { return full_; }
   ~PointReader();
 
   /// v ∈ Δ_Q(q) of the class of p, from a guess in v.  For a phase-space Lagrangian, whose p is a function of

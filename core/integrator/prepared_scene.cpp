@@ -32,7 +32,7 @@ void require_start(const Scene& scene, const FirstOrderMotions& motions = {}) {
     if (motions.levels.empty()) require_consistent(scene, scene.start);  // else velocities are not given
   } catch (const InconsistentStart& off) {
     throw InconsistentStart(
-        std::string(off.what()) +
+        scene.name, off.reason(), off.of(),
         "; to move it there name what may move, guess = [\"…\"] in [start] of a scene file, or "
         "set IntegratorOptions::project_start");
   }
@@ -41,7 +41,7 @@ void require_start(const Scene& scene, const FirstOrderMotions& motions = {}) {
 /// So close to depending on each other, rows have forces that no double can tell from each other's.
 constexpr double nearly_dependent = 3e-8;
 
-/// The rows that can be left out, where they may be; throws Misuse for others that depend on each other.
+/// The rows that can be left out, where they may be; throws Misuse for other redundant ones.
 std::vector<std::string> dependent_rows(const Scene& scene, bool may_be_left_out) {
   if (scene.rows() == 0 || !scene.start.q.allFinite()) return {};
   const std::vector<std::string> nearly = redundant_rows(scene, scene.start, nearly_dependent);
@@ -53,7 +53,7 @@ std::vector<std::string> dependent_rows(const Scene& scene, bool may_be_left_out
     if (row_dependence(scene, scene.start, nearly, nearly_dependent) == RowDependence::at_start_only)
       return {};
     throw Misuse(
-        of_scene + "rows that nearly depend on others, to within 3e-8 of their size: " + joined(nearly) +
+        of_scene + "nearly redundant constraints, to within 3e-8 of their size: " + joined(nearly) +
         " beside " + joined(combined_rows(scene, scene.start, nearly.front(), nearly)) +
         "; their forces cannot be told apart: write rows that differ by more, such as the difference of "
         "two divided by what is small in it");
@@ -119,7 +119,7 @@ PreparedScene prepared(std::shared_ptr<const Scene> given, const IntegratorOptio
                                 " are no data of a motion: positions and rows determine them"});
   }
   if (options.project_start) {
-    const ConsistentStart moved = project_start(*scene, scene->start, solvers);
+    const ProjectedStart moved = project_start(*scene, scene->start, solvers);
     auto copy = std::make_shared<Scene>(*scene);
     copy->start = moved.start;
     scene = copy;

@@ -61,6 +61,13 @@ StepSequence::Outcome StepDivision::solve(Interval step, const State& start, Gue
   return outcome.ok() ? sequence_->solve(parts_, start, Guess::plain, work) : outcome;
 }
 
+StepSequence::Outcome StepDivision::solve_finer(int more, const State& start, Work& work) {
+  pieces_.clear();
+  for (const Interval& part : parts_)
+    for (int k = 0; k < more; ++k) pieces_.push_back({part.start + k * (part.size / more), part.size / more});
+  return sequence_->solve(pieces_, start, Guess::plain, work);
+}
+
 bool StepDivision::solve_part(Interval part, const State& from, Guess guess, Work& work) {
   last_ = sequence_->solve({&part, 1}, from, guess, work).solve;
   if (last_.ok()) read(part.start + part.size, sequence_->end(), true, after_);

@@ -43,6 +43,9 @@ class StepDivision {
   /// Afterwards sequence.end() is where the step ends; no trace of it is left before it is accepted.
   StepSequence::Outcome solve(Interval step, const State& start, Guess guess, Work& work);
 
+  /// A step that solve() could not take, each of its parts in `more` pieces.
+  StepSequence::Outcome solve_finer(int more, const State& start, Work& work);
+
   /// Of the step solved last.
   const std::vector<Interval>& parts() const { return parts_; }
   bool divided() const { return divided_; }
@@ -90,7 +93,7 @@ class StepDivision {
   const Kinks* kinks_;  ///< null where no motion crosses any
   bool node_at_end_, end_at_kinks_ = false;
   TimeKinks times_;
-  std::vector<Interval> parts_, undivided_;
+  std::vector<Interval> parts_, undivided_, pieces_;
   std::vector<KinkPassed> passed_;
   std::string stuck_;
   bool divided_ = false;

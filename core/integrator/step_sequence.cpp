@@ -34,9 +34,8 @@ StepSequence::Outcome StepSequence::solve(std::span<const Interval> pieces, cons
                                           Work& work) {
   SolveReport total;
   const State* at = &start;
-  if (record_ != nullptr)
-    record_->erase(record_->begin() + static_cast<std::ptrdiff_t>(std::min(kept_, record_->size())),
-                   record_->end());
+  record_.erase(record_.begin() + static_cast<std::ptrdiff_t>(std::min(kept_, record_.size())),
+                record_.end());
   for (const Interval& piece : pieces) {
     double t = piece.start;
     for (Stage& stage : stages_) {
@@ -45,7 +44,7 @@ StepSequence::Outcome StepSequence::solve(std::span<const Interval> pieces, cons
       const SolveReport report = part.solve(task(stage, {t, h}, *at, guess), stage.x, work);
       if (!report.ok()) return failed(report, stage, piece.size);
       total.add(report);
-      if (record_ != nullptr) record_->push_back({stage.part, {t, h}, *at, stage.x});
+      if (recording_) record_.push_back({stage.part, {t, h}, *at, stage.x});
       end_.swap(part.end().at);
       at = &end_;
       t += h;

@@ -50,11 +50,15 @@ class StepSequence {
 
   std::size_t stages() const { return stages_.size(); }
 
-  /// Where it writes what it solves: after solve() the stages of all its pieces, in their order, behind what
-  /// was kept.  Null, as at first: nowhere.
-  void record_into(std::vector<SolvedStage>* record) { record_ = record; }
+  /// Whether what it solves is kept from now on: after solve() the stages of all its pieces, in their order,
+  /// behind those of keep_record().
+  void record_stages(bool wanted) {
+    recording_ = wanted;
+    record_.clear();
+  }
+  const std::vector<SolvedStage>& solved_stages() const { return record_; }
   void begin_record() { kept_ = 0; }
-  void keep_record() { kept_ = record_ != nullptr ? record_->size() : 0; }
+  void keep_record() { kept_ = record_.size(); }
 
   const StepSolver& part() const { return parts_.front(); }
 
@@ -82,7 +86,8 @@ class StepSequence {
   std::optional<StepSolver> ahead_;  ///< the copy for impulse_ahead(), made when it is needed first
   Origin origin_ = Origin::start;
   State end_;
-  std::vector<SolvedStage>* record_ = nullptr;
+  bool recording_ = false;
+  std::vector<SolvedStage> record_;
   std::size_t kept_ = 0;
 };
 

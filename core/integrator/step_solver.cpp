@@ -16,8 +16,6 @@ constexpr int old_jacobian_iterations = 3;
 constexpr double far_from_guess = 0.1;
 /// Solutions so far apart are different ones.
 constexpr double another_solution = 1e-6;
-/// A velocity that changes by more than this part of itself within a step turns sharply.
-constexpr double sharp_turn = 0.5;
 
 }  // namespace
 

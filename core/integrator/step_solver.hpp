@@ -17,6 +17,9 @@ namespace diracstep {
 /// the solver keeps between solves (factors, pivots) changes round-off alone.
 class StepSolver {
  public:
+  /// A velocity that changes by more than this part of itself within a step turns sharply.
+  static constexpr double sharp_turn = 0.5;
+
   /// The reader gives velocities to the continuation, and outlives the solver.
   StepSolver(std::unique_ptr<StepProblem> problem, const SolverFactory& solvers, PointReader& reader);
 

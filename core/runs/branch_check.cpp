@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
+#include <diracstep/core/integrator/step_solver.hpp>
 #include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/core/runs/branch_check.hpp>
 #include <diracstep/core/spaces/space.hpp>
@@ -12,7 +13,6 @@ namespace diracstep {
 
 namespace {
 
-constexpr double sharp_turn = 0.5;
 /// Full matrices of up to so many rows are looked at so many times in a run.
 constexpr int max_rows = 200, max_examinations = 100;
 
@@ -31,7 +31,7 @@ void BranchCheck::look(const Integrator& integrator) {
     largest_speed_ = std::max(largest_speed_, std::abs(now[i]));
   }
   velocity_ = now;
-  if (!(turn > sharp_turn * largest_speed_) || !rows_depend_on_the_way(integrator)) return;
+  if (!(turn > StepSolver::sharp_turn * largest_speed_) || !rows_depend_on_the_way(integrator)) return;
   watched_ = false;
   std::ostringstream text;
   text << "within a step before t = " << integrator.time() << " the velocity turned by "

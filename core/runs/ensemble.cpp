@@ -56,17 +56,6 @@ std::shared_ptr<const Scene> started(const std::shared_ptr<const Scene>& scene, 
   return copy;
 }
 
-EnsembleMember member_through_events(EventSteps<Integrator>& motion, long steps) {
-  EnsembleMember member;
-  member.last = step_while(
-      motion, [&](long k) { return k < steps && !motion.stopped(); }, [](long) { return true; });
-  if (motion.stopped())
-    member.end = motion.end_of_stopped();
-  else
-    note_reading(motion.sample(member.end), member);
-  return member;
-}
-
 /// The first exception that any of the threads met.
 class FirstException {
  public:
@@ -98,9 +87,7 @@ std::vector<EnsembleMember> run_ensemble(const std::shared_ptr<const Scene>& sce
                                          int threads, const std::function<bool()>& goes_on,
                                          const EnsembleEvents& events) {
   std::vector<EnsembleMember> members(starts.size());
-  const auto make = [&](const std::shared_ptr<const Scene>& of) {
-    return std::make_unique<Integrator>(of, registry, solvers, options);
-  };
+  const auto make = integrators(registry, solvers, options);
   std::vector<Worker> workers;
   for (std::size_t k = 0; k < thread_count(threads, starts.size()); ++k)
     if (events.events.empty())
@@ -110,7 +97,9 @@ std::vector<EnsembleMember> run_ensemble(const std::shared_ptr<const Scene>& sce
         EventSteps<Integrator> motion(started(scene, starts[number]),
                                       started(events.all_rows, starts[number]), events.events, solvers,
                                       momentum, make);
-        return member_through_events(motion, steps);
+        EnsembleMember member;
+        member.last = motion.run(steps, member.end);
+        return member;
       });
   std::atomic<std::size_t> next = 0;
   FirstException exception;

@@ -6,7 +6,6 @@
 #include <diracstep/core/system/contradictory_rows.hpp>
 #include <diracstep/core/system/row_subset.hpp>
 #include <diracstep/core/system/saddle_point.hpp>
-#include <regex>
 
 namespace diracstep {
 
@@ -179,8 +178,7 @@ EventActions::Outcome EventActions::act(const Event& event, const Sample& at, co
   if (outcome.failure.empty()) try {
       require_consistent(*scene, {at.time, outcome.q, outcome.v});
     } catch (const InconsistentStart& off) {
-      outcome.failure = "the motion is not on the rows that are on behind it: " +
-                        std::regex_replace(off.what(), std::regex("^scene '[^']*': the start "), "it ");
+      outcome.failure = "the motion is not on the rows that are on behind it: it " + off.reason();
     } catch (const Misuse& misuse) {
       outcome.failure = misuse.what();
     }

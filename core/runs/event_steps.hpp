@@ -5,6 +5,8 @@
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/runs/event_actions.hpp>
 #include <diracstep/core/runs/event_search.hpp>
+#include <diracstep/core/runs/step_loop.hpp>
+#include <diracstep/core/runs/stepping.hpp>
 #include <diracstep/core/runs/zeno_watch.hpp>
 #include <functional>
 #include <map>
@@ -14,38 +16,6 @@
 #include <vector>
 
 namespace diracstep {
-
-namespace detail {
-
-/// Where a step starts.
-struct Node {
-  double time;
-  Vector q, p, v;
-};
-
-/// What EventSteps needs of a stepper.
-template <class Stepper>
-struct Stepping;
-
-template <>
-struct Stepping<Integrator> {
-  static constexpr bool on_a_grid = true;
-  static const Integrator& integrator(const Integrator& stepper) { return stepper; }
-  static double size(const Integrator& stepper) { return stepper.options().step; }
-  static StepReport step_to(Integrator& stepper, double t) { return stepper.step(t - stepper.time()); }
-  static StepReport step(Integrator& stepper, double size) { return stepper.step(size); }
-  /// The motion at a time behind a node, by a step of another integrator of the same scene.
-  static StepReport read(Integrator& beside, const Node& from, double t, Momentum momentum, Sample& sample) {
-    beside.restart(from.time, from.q, from.p, from.v);
-    StepReport report;
-    if (t != from.time) report = beside.step(t - from.time);
-    if (report.ok()) report.solve = beside.sample(momentum, sample);
-    sample.time = t;
-    return report;
-  }
-};
-
-}  // namespace detail
 
 /// The steps of an Integrator or an AdaptiveIntegrator through the events of a scene.
 ///
@@ -88,6 +58,10 @@ class EventSteps {
   /// The motion at a time that the next step would pass, where no event acts before it; else the run goes to
   /// the first that does, and `reached` is false.
   StepReport read_up_to(double t, Sample& sample, bool& reached);
+
+  /// Up to so many steps, fewer where an event stops the motion, and in `end` the point where it ends or has
+  /// failed.  `before` is called before each step, with the number of steps taken here.
+  StepReport run(long steps, Sample& end, const std::function<void(long)>& before = {});
 
   /// With the forces of all rows, those that are off 0, redundant ones as forces_of_whole().
   SolveReport sample(Sample& sample) {
@@ -178,6 +152,15 @@ class EventSteps {
   Sample after_;  ///< the last event that acted
 };
 
+/// For EventSteps of one size: integrators of a method and a step.  The registry must outlive it.
+inline EventSteps<Integrator>::Make integrators(const Registry& registry, SolverFactory solvers,
+                                                IntegratorOptions options) {
+  return [&registry, solvers = std::move(solvers),
+          options = std::move(options)](const std::shared_ptr<const Scene>& scene) {
+    return std::make_unique<Integrator>(scene, registry, solvers, options);
+  };
+}
+
 template <class Stepper>
 StepReport EventSteps<Stepper>::step(double size) {
   acted_ = false;
@@ -209,6 +192,24 @@ StepReport EventSteps<Stepper>::step(double size) {
       return report;
     }
   }
+}
+
+template <class Stepper>
+StepReport EventSteps<Stepper>::run(long steps, Sample& end, const std::function<void(long)>& before) {
+  const auto goes_on = [&](long taken) {
+    const bool next = taken < steps && !stopped_;
+    if (next && before) before(taken);
+    return next;
+  };
+  StepReport report = step_while(*this, goes_on, [](long) { return true; });
+  if (!report.ok() && report.failure.empty()) report.failure = describe(report.solve.status);
+  if (stopped_) {
+    end = end_of_stopped();
+  } else if (const SolveReport reading = sample(end); report.ok() && !reading.ok()) {
+    report.solve = reading;
+    report.failure = std::string("reading the end: ") + describe(reading.status);
+  }
+  return report;
 }
 
 template <class Stepper>

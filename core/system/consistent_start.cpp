@@ -49,7 +49,7 @@ void require_met(const Scene& scene, const Start& start, const Guesses& guesses)
     require_consistent(scene, start);
   } catch (const InconsistentStart& start_off) {
     const std::string off = start_off.what();
-    const bool of_velocity = off.find("A v + b") != std::string::npos;
+    const bool of_velocity = start_off.of() == InconsistentStart::Of::velocity;
     const std::string kind = of_velocity ? "velocity" : "position";
     if (any(of_velocity ? guesses.v : guesses.q))
       throw Misuse(off + "; the guesses cannot meet it while each " + kind + " that is given stays");
@@ -163,8 +163,8 @@ Vector nearest_velocity(const Scene& scene, const Start& start, const std::vecto
 }
 
 /// Of a scene whose Lagrangian hides equations: onto these and the rows, all together.
-ConsistentStart project_kernel_start(const Scene& scene, const FirstOrderMotions& motions,
-                                     const Guesses& guesses) {
+ProjectedStart project_kernel_start(const Scene& scene, const FirstOrderMotions& motions,
+                                    const Guesses& guesses) {
   std::vector<bool> may_move;
   for (const auto* part : {&guesses.q, &guesses.v})
     for (int i = 0; i < scene.dimension(); ++i)
@@ -201,8 +201,8 @@ Vector velocity_by_force(const Scene& scene, const FirstOrderMotions& motions, d
 
 }  // namespace
 
-ConsistentStart project_start(const Scene& given, const Start& given_start, const SolverFactory& solvers,
-                              const Guesses& guesses) {
+ProjectedStart project_start(const Scene& given, const Start& given_start, const SolverFactory& solvers,
+                             const Guesses& guesses) {
   auto copy = std::make_shared<Scene>(given);
   copy->start = given_start;
   const auto complete = completed(std::move(copy)), extended = with_hidden_rows(complete);
@@ -213,7 +213,7 @@ ConsistentStart project_start(const Scene& given, const Start& given_start, cons
   require_few_unknowns(scene);
   if (const FirstOrderMotions motions = first_order_motions(scene); motions.hide_equations())
     return project_kernel_start(scene, motions, guesses);
-  ConsistentStart result{start, 0.0, 0.0};
+  ProjectedStart result{start, 0.0, 0.0};
   const Eigen::Index n = scene.dimension();
   result.start.q = nearest_position(scene, start, guesses, solvers);
   result.position_moved = (result.start.q - start.q).norm();

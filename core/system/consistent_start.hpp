@@ -14,7 +14,7 @@ struct Guesses {
 };
 
 /// A start moved onto the constraints, and how far it had to move (Euclidean norms).
-struct ConsistentStart {
+struct ProjectedStart {
   Start start;
   double position_moved = 0.0;
   double velocity_moved = 0.0;
@@ -29,8 +29,8 @@ struct ConsistentStart {
 /// (hidden_rows.hpp), and the velocities that carry no momentum are set by them, given or not.  A start with
 /// a momentum in place of v is given its velocity first. Throws Misuse where no such point is found, with the
 /// row that is not met.
-ConsistentStart project_start(const Scene& scene, const Start& start, const SolverFactory& solvers,
-                              const Guesses& guesses = {});
+ProjectedStart project_start(const Scene& scene, const Start& start, const SolverFactory& solvers,
+                             const Guesses& guesses = {});
 
 /// "b from 0.1745 to 0.1148, v_c from 0 to 0.2": what differs, the largest changes first, at most eight.
 std::string describe_moves(const Scene& scene, const Start& from, const Start& to);

@@ -233,11 +233,11 @@ void require_on_hidden(const Scene& scene, const FirstOrderMotions& motions) {
     if (!motions.hidden[static_cast<std::size_t>(k)] ||
         std::abs(point.along()[k]) <= 1e-10 * scale_of(point.terms()))
       continue;
-    std::ostringstream message;
-    message << "scene '" << scene.name << "': the start violates the equation of motion along '"
-            << motion_along(scene, point.kernel().col(k)) << "', which holds no acceleration, by "
-            << point.along()[k] << " of terms as large as " << point.terms();
-    throw InconsistentStart(message.str());
+    std::ostringstream reason;
+    reason << "violates the equation of motion along '" << motion_along(scene, point.kernel().col(k))
+           << "', which holds no acceleration, by " << point.along()[k] << " of terms as large as "
+           << point.terms();
+    throw InconsistentStart(scene.name, reason.str(), InconsistentStart::Of::position);
   }
 }
 

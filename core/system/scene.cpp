@@ -26,12 +26,14 @@ void require_finite(const Scene& scene, const char* what, const Vector& column) 
     }
 }
 
-[[noreturn]] void throw_off_row(const Scene& scene, int row, const char* what, double residual,
+[[noreturn]] void throw_off_row(const Scene& scene, int row, InconsistentStart::Of of, double residual,
                                 double terms) {
-  std::ostringstream message;
-  message << "scene '" << scene.name << "': the start violates " << row_label(scene.constraints, row) << ": "
-          << what << " = " << residual << ", allowed " << start_tolerance * terms;
-  throw InconsistentStart(message.str());
+  const bool of_position = of == InconsistentStart::Of::position;
+  std::ostringstream reason;
+  reason << "violates " << row_label(scene.constraints, row) << ": "
+         << (of_position ? "φ(q)" : "the velocity is off the distribution, A v + b") << " = " << residual
+         << ", allowed " << start_tolerance * terms;
+  throw InconsistentStart(scene.name, reason.str(), of);
 }
 
 /// A start on the space, to within what a text with a few digits less than a double has.
@@ -235,7 +237,7 @@ void require_consistent(const Scene& scene, const Start& given) {
       block->pattern().multiply_add(a.cwiseAbs().eval().data(), sizes.data(), terms.data());
       for (int r = 0; r < m; ++r)
         if (!(std::abs(phi[r]) <= start_tolerance * terms[r]))
-          throw_off_row(scene, first + r, "φ(q)", phi[r], terms[r]);
+          throw_off_row(scene, first + r, InconsistentStart::Of::position, phi[r], terms[r]);
     }
     residual = b;
     block->pattern().multiply_add(a.data(), start.v.data(), residual.data());
@@ -243,8 +245,7 @@ void require_consistent(const Scene& scene, const Start& given) {
     block->pattern().multiply_add(a.cwiseAbs().eval().data(), start.v.cwiseAbs().eval().data(), terms.data());
     for (int r = 0; r < m; ++r)
       if (!(std::abs(residual[r]) <= start_tolerance * terms[r]))
-        throw_off_row(scene, first + r, "the velocity is off the distribution, A v + b", residual[r],
-                      terms[r]);
+        throw_off_row(scene, first + r, InconsistentStart::Of::velocity, residual[r], terms[r]);
     first += m;
   }
 }

@@ -116,9 +116,24 @@ std::shared_ptr<const Scene> with_lagrangian(const Scene& scene);
 /// The scene's Hamiltonian, or the one derived from its Lagrangian.  Throws Misuse where that is degenerate.
 std::shared_ptr<const Hamiltonian> hamiltonian_of(const Scene& scene);
 
-/// A start that violates a row.
+/// A start that violates a row or an equation of motion that the rows hide.
 class InconsistentStart : public Misuse {
-  using Misuse::Misuse;
+ public:
+  enum class Of { position, velocity };
+
+  /// `reason` goes on behind "the start", `advice` behind that.
+  InconsistentStart(const std::string& scene, const std::string& reason, Of of,
+                    const std::string& advice = {})
+      : Misuse("scene '" + scene + "': the start " + reason + advice), reason_(reason), of_(of) {}
+
+  /// "violates row 'rod': φ(q) = 0.1, allowed 1e-10": what() without the scene and without advice.
+  const std::string& reason() const { return reason_; }
+  /// What it is that is off.
+  Of of() const { return of_; }
+
+ private:
+  std::string reason_;
+  Of of_;
 };
 
 /// Throws Misuse where the start, completed, is of the wrong size or not finite, InconsistentStart where it

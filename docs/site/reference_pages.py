@@ -11,6 +11,7 @@ FOLDERS = {
     "core": "The mathematics of one step. Sees Eigen only.",
     "constraints": "Rows from formulas, circuits, and systems joined by rows.",
     "solvers": "SUNDIALS KINSOL behind the interface of a nonlinear solver.",
+    "eigenvalues": "A few eigenvalues of large matrices.",
     "sensitivities": "Derivatives of a motion by its start and by parameters, and fits.",
     "boundary_values": "Motions between two ends, and periodic orbits.",
     "plugins": "The interface of plugins in C and C++, and what loads them.",

@@ -69,7 +69,7 @@ void Mechanics::torque(int number, const Vec& torque_in_body, int source) {
     push(rotation.coordinate(i), forces[static_cast<std::size_t>(i)], source);
 }
 
-std::array<Vec, 2> Mechanics::ends(const std::string& name, int first, int second, const Places& point,
+std::array<Vec, 2> Mechanics::ends(const std::string& name, int first, int second, const SharedVector& point,
                                    const std::optional<std::array<Vec, 2>>& in_space, int source) {
   if (point.in_bodies) return *point.in_bodies;
   const Vec a = in_space ? (*in_space)[0] : *point.in_space, b = in_space ? (*in_space)[1] : *point.in_space;

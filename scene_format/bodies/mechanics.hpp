@@ -79,7 +79,7 @@ class Mechanics {
   bool plane(int number) const { return number != ground && body(number).plane; }
   Frame& frame(int number) { return number == ground ? ground_ : frames_[static_cast<std::size_t>(number)]; }
   /// The two points, each in its own body.
-  std::array<Vec, 2> ends(const std::string& name, int first, int second, const Places& point,
+  std::array<Vec, 2> ends(const std::string& name, int first, int second, const SharedVector& point,
                           const std::optional<std::array<Vec, 2>>& in_space, int source);
   /// The formula under a name of its own where it is long.
   Formula define(const std::string& name, const Formula& formula, int source);

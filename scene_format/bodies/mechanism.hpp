@@ -33,8 +33,8 @@ struct Body {
   int source = 0;     ///< its number among the tables of the file
 };
 
-/// A place of two bodies, as it is at the start or as each has it in its own axes.
-struct Places {
+/// A point or a direction that two bodies share, as it is at the start or as each has it in its own axes.
+struct SharedVector {
   std::optional<Vec> in_space = {};
   std::optional<std::array<Vec, 2>> in_bodies = {};
 };
@@ -47,9 +47,9 @@ struct Joint {
   std::string name;
   Kind kind = Kind::spherical;
   int first = ground, second = ground;  ///< numbers of bodies
-  Places point;                         ///< of a distance the two ends, by in_space_ends or in_bodies
+  SharedVector point;                   ///< of a distance the two ends, by in_space_ends or in_bodies
   std::optional<std::array<Vec, 2>> in_space_ends = {};
-  Places axis;                          ///< of unit length; universal: that of the first, and
+  SharedVector axis;                    ///< of unit length; universal: that of the first, and
   std::optional<Vec> second_axis = {};  ///< that of the second body, in space at the start
   std::optional<Formula> length = {};   ///< of a distance; else as at the start
   std::string drive = {};  ///< formula of a torque, or a force, along the axis on the second body
@@ -60,7 +60,7 @@ struct Joint {
 struct Spring {
   std::string name;
   int first = ground, second = ground;
-  Places point;  ///< as of a distance
+  SharedVector point;  ///< as of a distance
   std::optional<std::array<Vec, 2>> in_space_ends = {};
   Formula stiffness = 0.0, damping = 0.0;
   std::optional<Formula> length = {};  ///< at rest; else as at the start

@@ -102,7 +102,7 @@ class BodyReader {
   void read_plane_wheel(const toml::table& table, int body, const std::string& name, int number);
   /// Numbers of two bodies, of one kind; whether that is the plane.
   bool read_between(const toml::table& table, const std::string& what, int& first, int& second);
-  void read_ends(const toml::table& table, const std::string& what, bool plane, bodies::Places& point,
+  void read_ends(const toml::table& table, const std::string& what, bool plane, bodies::SharedVector& point,
                  std::optional<std::array<Vec, 2>>& in_space);
   int body_number(const toml::node& node, const std::string& what, bool or_ground) const;
   bool is_plane(int body) const;

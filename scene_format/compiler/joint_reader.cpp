@@ -96,7 +96,7 @@ bool BodyReader::read_between(const toml::table& table, const std::string& what,
 }
 
 /// Where the two ends are: `ends` in space at the start, or `points` in the bodies.
-void BodyReader::read_ends(const toml::table& table, const std::string& what, bool plane, Places& point,
+void BodyReader::read_ends(const toml::table& table, const std::string& what, bool plane, SharedVector& point,
                            std::optional<std::array<Vec, 2>>& in_space) {
   if (table.contains("ends") == table.contains("points"))
     tables_.fail(place_of(table.source()),

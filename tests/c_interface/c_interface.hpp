@@ -16,15 +16,15 @@ namespace diracstep::testing {
 /// The C interface, from a source to points.
 class CInterface : public ::testing::Test {
  protected:
-  ~CInterface() override { forget(); }
-  void forget() {
+  ~CInterface() override { clear(); }
+  void clear() {
     diracstep_destroy(made_);
     diracstep_close(model_);
     made_ = nullptr;
     model_ = nullptr;
   }
   int open(const diracstep_source& source, unsigned version = DIRACSTEP_VERSION_OF_C_INTERFACE) {
-    forget();
+    clear();
     return diracstep_open(version, &source, &model_);
   }
   int open(const char* name) {

@@ -147,7 +147,7 @@ TEST_F(Refusals, FormulasWithoutAValueAreNoZero) {
 TEST_F(Refusals, RowsThatAreNearlyParallelAreNamed) {
   for (const char* part : {"1e-9", "1e-8"})
     expect_told(run("run " + two_rows("parallel", "x = y", std::string("x = y + ") + part + "*z")),
-                {"nearly depend", "'one'", "'other'"});
+                {"nearly redundant constraints", "'one'", "'other'"});
   EXPECT_EQ(run("run " + two_rows("apart", "x = y", "x = y + 1e-5*z")).status, 0);
 }
 

@@ -2,7 +2,6 @@
 
 #include <gtest/gtest.h>
 #include <sys/wait.h>
-#include <unistd.h>
 
 #include <cstdio>
 #include <filesystem>
@@ -10,6 +9,8 @@
 #include <sstream>
 #include <string>
 #include <vector>
+
+#include "temporary_folder.hpp"
 
 /// Runs the built command as a user's shell would.
 namespace diracstep::testing {
@@ -19,11 +20,6 @@ struct Outcome {
   std::string out;
   std::string err;
 };
-
-inline std::string contents(const std::filesystem::path& path) {
-  std::ifstream file(path);
-  return (std::ostringstream() << file.rdbuf()).str();
-}
 
 inline std::vector<std::string> lines(const std::string& text) {
   std::istringstream stream(text);
@@ -73,21 +69,11 @@ step = 0.0005
 /// A directory of its own for each test, removed afterwards.
 class Command : public ::testing::Test {
  protected:
-  Command()
-      : directory_(std::filesystem::temp_directory_path() /
-                   ("diracstep_" +
-                    std::string(::testing::UnitTest::GetInstance()->current_test_info()->name()) + "_" +
-                    std::to_string(getpid()))) {
-    std::filesystem::create_directories(directory_);
-  }
-  ~Command() override { std::filesystem::remove_all(directory_); }
-
-  std::string path(const std::string& name) const { return (directory_ / name).string(); }
+  std::string path(const std::string& name) const { return folder_.path(name); }
 
   /// A scene file of this text, and its path.
   std::string scene(const std::string& name, const std::string& text) const {
-    std::ofstream(path(name + ".toml")) << "name = \"" << name << "\"\n" << text;
-    return path(name + ".toml");
+    return folder_.write(name + ".toml", "name = \"" + name + "\"\n" + text);
   }
 
   /// `arguments` as typed in a shell; `before` precedes the command, "VAR=x" or "timeout 1".
@@ -115,7 +101,7 @@ class Command : public ::testing::Test {
   }
 
  private:
-  std::filesystem::path directory_;
+  TemporaryFolder folder_;
 };
 
 }  // namespace diracstep::testing

@@ -3,26 +3,16 @@
 #include <cmath>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/files/csv_table.hpp>
-#include <filesystem>
-#include <fstream>
+
+#include "temporary_folder.hpp"
 
 namespace diracstep {
 namespace {
 
 /// A file with this text, and what is read of it.
 CsvTable csv_of(const std::string& text, EmptyFields empty) {
-  const auto path = std::filesystem::temp_directory_path() /
-                    ("diracstep_csv_" + std::to_string(::testing::UnitTest::GetInstance()->random_seed()) +
-                     "_" + ::testing::UnitTest::GetInstance()->current_test_info()->name());
-  std::ofstream(path) << text;
-  try {
-    CsvTable table = read_csv(path.string(), "the data", 10'000, 2, empty);
-    std::filesystem::remove(path);
-    return table;
-  } catch (...) {
-    std::filesystem::remove(path);
-    throw;
-  }
+  const testing::TemporaryFolder folder;
+  return read_csv(folder.write("data.csv", text), "the data", 10'000, 2, empty);
 }
 
 TEST(CsvTable, FieldsMayStandInQuotes) {

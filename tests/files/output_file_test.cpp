@@ -4,20 +4,17 @@
 #include <diracstep/files/output_file.hpp>
 #include <filesystem>
 #include <fstream>
-#include <sstream>
 #include <stdexcept>
 #include <string>
+
+#include "temporary_folder.hpp"
 
 namespace diracstep::testing {
 namespace {
 
-std::string contents(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return (std::ostringstream() << file.rdbuf()).str();
-}
-
 TEST(OutputFile, ReplacesAFileAtOnceAndKeepsTheOldOneWhereItCannot) {
-  const auto folder = std::filesystem::path(::testing::TempDir()) / "diracstep_replace";
+  const TemporaryFolder temporary;
+  const std::filesystem::path& folder = temporary.path();
   std::filesystem::create_directories(folder / "c.new");  // in the way of the file that is written first
   std::ofstream(folder / "c") << "old";
   EXPECT_ANY_THROW(replace_file(folder / "c", "new"));
@@ -26,7 +23,6 @@ TEST(OutputFile, ReplacesAFileAtOnceAndKeepsTheOldOneWhereItCannot) {
   replace_file(folder / "c", "new");
   EXPECT_EQ(contents(folder / "c"), "new");
   EXPECT_FALSE(std::filesystem::exists(folder / "c.new"));
-  std::filesystem::remove_all(folder);
 }
 
 TEST(OutputFile, AFullDeviceIsAnError) {

@@ -12,7 +12,6 @@
 #include <diracstep/files/shown_text.hpp>
 #include <filesystem>
 #include <fstream>
-#include <sstream>
 #include <string>
 
 /// Files and texts of unknown origin, and outputs that must not meet anything else.
@@ -23,17 +22,9 @@ namespace fs = std::filesystem;
 
 class Files : public ::testing::Test {
  protected:
-  Files() : folder_(fs::temp_directory_path() / ("diracstep_files_" + std::to_string(getpid()))) {
-    fs::create_directories(folder_);
-  }
-  ~Files() override { fs::remove_all(folder_); }
-
-  std::string path(const std::string& name) const { return (folder_ / name).string(); }
-  void write(const std::string& name, const std::string& text) const { std::ofstream(path(name)) << text; }
-  std::string contents(const std::string& name) const {
-    std::ifstream file(path(name), std::ios::binary);
-    return (std::ostringstream() << file.rdbuf()).str();
-  }
+  std::string path(const std::string& name) const { return folder_.path(name); }
+  void write(const std::string& name, const std::string& text) const { (void)folder_.write(name, text); }
+  std::string contents(const std::string& name) const { return testing::contents(path(name)); }
 
   static std::string refusal(const auto& call) {
     try {
@@ -45,7 +36,7 @@ class Files : public ::testing::Test {
   }
 
  private:
-  fs::path folder_;
+  TemporaryFolder folder_;
 };
 
 /// The examples of FIPS 180-4 (NIST, "SHA-256 examples"), and a million times the letter a.

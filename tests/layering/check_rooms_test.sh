@@ -6,7 +6,8 @@ set -eu
 tests="$(cd "$(dirname "$0")" && pwd)"
 table="$tests/rooms.txt" work="$1"
 rooms="$(sed -n 's/^\([a-z_/]*\):.*/\1/p' "$table")"
-headers="Eigen/Core=Eigen sundials/sundials_context.h=SUNDIALS ida/ida.h=SUNDIALS klu.h=KLU fmt/format.h=fmt
+headers="Eigen/Core=Eigen sundials/sundials_context.h=SUNDIALS ida/ida.h=SUNDIALS klu.h=KLU Spectra/GenEigsSolver.h=Spectra
+  fmt/format.h=fmt
   toml++/toml.h=toml++ CLI/App.hpp=CLI11 nlohmann/json.hpp=nlohmann gtest/gtest.h=GoogleTest"
 failures=0
 fail() { echo "$*"; failures=1; }

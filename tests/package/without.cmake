@@ -12,6 +12,6 @@ execute_process(COMMAND ${CMAKE_COMMAND} -S ${PROJECT} -B ${BUILD} -G ${GENERATO
 execute_process(COMMAND ${CMAKE_COMMAND} --build ${BUILD} COMMAND_ERROR_IS_FATAL ANY)
 if(NOT DIRACSTEP_BUILD_TESTS IN_LIST OFF)
   execute_process(COMMAND ${CMAKE_CTEST_COMMAND} --test-dir ${BUILD} --output-on-failure --no-tests=error
-    -LE slow -R "^(core|constraints|solvers|layering|package)[.]" COMMAND_ERROR_IS_FATAL ANY)
+    -LE slow -R "^(core|constraints|solvers|eigenvalues|layering|package)[.]" COMMAND_ERROR_IS_FATAL ANY)
 endif()
 file(REMOVE_RECURSE ${BUILD})

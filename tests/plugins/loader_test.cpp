@@ -1,16 +1,13 @@
-#include <unistd.h>
-
 #include <diracstep/core/integrator/integrator.hpp>
 #include <diracstep/plugins/callback_error.hpp>
 #include <diracstep/plugins/callback_scene.hpp>
 #include <diracstep/plugins/loaded_plugin.hpp>
 #include <diracstep/plugins/plugin.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
-#include <fstream>
 #include <law_scenes.hpp>
-#include <sstream>
 
 #include "misuse.hpp"
+#include "temporary_folder.hpp"
 
 namespace diracstep::testing {
 namespace {
@@ -59,24 +56,21 @@ TEST(Loader, TheObjectStaysLoadedAsLongAsItIsUsed) {
 
 TEST(Loader, RefusesWhatIsNoPlugin) {
   expect_misuse([] { load_plugin("no/such/file.so"); }, {"no/such/file.so", "no such file"});
-  const fs::path text = fs::temp_directory_path() / "diracstep_no_object.so";
-  std::ofstream(text) << "this is text\n";
-  expect_misuse([&] { load_plugin(text); }, {text.string(), "cannot be loaded"});
-  fs::remove(text);
+  const TemporaryFolder folder;
+  const std::string text = folder.write("no_object.so", "this is text\n");
+  expect_misuse([&] { load_plugin(text); }, {text, "cannot be loaded"});
   expect_misuse([] { load_plugin(built("faulty_0")); },
                 {"faulty_0", "does not export diracstep_plugin_entry"});
 }
 
 TEST(Loader, RefusesAnObjectThatWasCutOff) {
-  std::ifstream file(built("harmonic"), std::ios::binary);
-  const std::string whole = (std::ostringstream() << file.rdbuf()).str();
+  const std::string whole = contents(built("harmonic"));
   ASSERT_GT(whole.size(), 8000u);
-  const fs::path cut = fs::temp_directory_path() / ("diracstep_cut_" + std::to_string(getpid()) + ".so");
+  const TemporaryFolder folder;
   for (const std::size_t size : {0, 10, 64, 500, 3000, 6000}) {  // behind it is what a debugger reads
-    std::ofstream(cut, std::ios::binary) << whole.substr(0, size);
-    expect_misuse([&] { load_plugin(cut); }, {cut.string(), "cannot be loaded"});
+    const std::string cut = folder.write("cut.so", whole.substr(0, size));
+    expect_misuse([&] { load_plugin(cut); }, {cut, "cannot be loaded"});
   }
-  fs::remove(cut);
 }
 
 TEST(Loader, RefusesNamesThatAreMissing) {

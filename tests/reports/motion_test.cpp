@@ -7,8 +7,8 @@ namespace diracstep {
 namespace {
 
 TEST(Motion, FindsTheBarOfAPendulumAndItsPin) {
-  const Motion motion = motion_of(make_scene("pendulum_cartesian"));
-  EXPECT_EQ(motion.form, Motion::Form::plane);
+  const DrawnMotion motion = motion_of(make_scene("pendulum_cartesian"));
+  EXPECT_EQ(motion.form, DrawnMotion::Form::plane);
   ASSERT_EQ(motion.bodies.size(), 1u);
   ASSERT_EQ(motion.pins.size(), 1u);
   EXPECT_NEAR(motion.pins[0][0], 0.0, 1e-12);
@@ -20,11 +20,11 @@ TEST(Motion, FindsTheBarOfAPendulumAndItsPin) {
 }
 
 TEST(Motion, FindsEveryLinkOfAChainAndTheBarsBetweenMovingJoints) {
-  const Motion chain = motion_of(make_scene("hanging_chain", {{"N", 7.0}}));
+  const DrawnMotion chain = motion_of(make_scene("hanging_chain", {{"N", 7.0}}));
   EXPECT_EQ(chain.bodies.size(), 7u);
   EXPECT_EQ(chain.bars.size(), 7u);
   EXPECT_EQ(chain.pins.size(), 1u);
-  const Motion windows = motion_of(make_scene("n_four_bar", {{"N", 3.0}}));
+  const DrawnMotion windows = motion_of(make_scene("n_four_bar", {{"N", 3.0}}));
   EXPECT_EQ(windows.bodies.size(), 4u);
   ASSERT_EQ(windows.pins.size(), 4u);
   for (std::size_t j = 0; j < 4; ++j) EXPECT_NEAR(windows.pins[j][0], static_cast<double>(j), 1e-12);
@@ -37,7 +37,7 @@ TEST(Motion, TakesNoRowForABarThatIsNone) {
 }
 
 TEST(Motion, PointsTheWayOfAHeading) {
-  const Motion skate = motion_of(make_scene("knife_edge"));
+  const DrawnMotion skate = motion_of(make_scene("knife_edge"));
   ASSERT_EQ(skate.bodies.size(), 1u);
   ASSERT_GE(skate.bodies[0].heading, 0);
   EXPECT_EQ(skate.coordinates[static_cast<std::size_t>(skate.bodies[0].heading)].name, "ph");
@@ -45,8 +45,8 @@ TEST(Motion, PointsTheWayOfAHeading) {
 }
 
 TEST(Motion, DrawsBodiesInSpace) {
-  const Motion satellite = motion_of(make_scene("satellite"));
-  EXPECT_EQ(satellite.form, Motion::Form::space);
+  const DrawnMotion satellite = motion_of(make_scene("satellite"));
+  EXPECT_EQ(satellite.form, DrawnMotion::Form::space);
   ASSERT_EQ(satellite.solids.size(), 2u);
   EXPECT_EQ(satellite.solids[0].shape, "ellipsoid");  // of its inertia
   EXPECT_NEAR(satellite.solids[0].size[0], std::sqrt(2.5 * (10.0 + 12.0 - 8.0) / 50.0), 1e-12);
@@ -58,18 +58,18 @@ TEST(Motion, DrawsBodiesInSpace) {
 }
 
 TEST(Motion, DrawsALongFamilyAsAProfileAndBoundsIt) {
-  const Motion lattice = motion_of(make_scene("toda_200"));
-  EXPECT_EQ(lattice.form, Motion::Form::profile);
+  const DrawnMotion lattice = motion_of(make_scene("toda_200"));
+  EXPECT_EQ(lattice.form, DrawnMotion::Form::profile);
   EXPECT_EQ(lattice.coordinates.size(), 200u);
-  const Motion large = motion_of(make_scene("toda_200", {{"N", 5000.0}}));
+  const DrawnMotion large = motion_of(make_scene("toda_200", {{"N", 5000.0}}));
   EXPECT_LE(large.coordinates.size(), 256u);
   EXPECT_GT(large.coordinates.back().index, 4900);
 }
 
 TEST(Motion, ElseDrawsTwoCoordinatesInAPlaneAndMoreOverTime) {
-  EXPECT_EQ(motion_of(make_scene("lotka_volterra_2d")).form, Motion::Form::plane);
-  const Motion curves = motion_of(make_scene("rigid_body_quat"));
-  EXPECT_EQ(curves.form, Motion::Form::curves);
+  EXPECT_EQ(motion_of(make_scene("lotka_volterra_2d")).form, DrawnMotion::Form::plane);
+  const DrawnMotion curves = motion_of(make_scene("rigid_body_quat"));
+  EXPECT_EQ(curves.form, DrawnMotion::Form::curves);
   EXPECT_EQ(curves.coordinates.size(), 4u);
 }
 

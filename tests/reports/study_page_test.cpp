@@ -7,12 +7,10 @@
 #include <diracstep/reports/study_page.hpp>
 #include <diracstep/reports/study_plot.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
-#include <filesystem>
-#include <fstream>
-#include <sstream>
 #include <string>
 
 #include "misuse.hpp"
+#include "temporary_folder.hpp"
 
 namespace diracstep {
 namespace {
@@ -103,19 +101,16 @@ TEST(StudyPage, DataCannotEndTheElementTheyStandIn) {
 }
 
 TEST(StudyPage, ShowsTheStandInOfEachPictureWhereThereIsOne) {
-  const auto directory = std::filesystem::path(::testing::TempDir()) / "diracstep_study_page";
-  std::filesystem::create_directories(directory);
-  std::ofstream(directory / "knife_edge.svg") << "<svg id=\"100%\"/>";
+  const testing::TemporaryFolder folder;
+  (void)folder.write("knife_edge.svg", "<svg id=\"100%\"/>");
   const CatalogueScene scene = make_scene("knife_edge");
   const PageEntry entry{small_study(scene), {}, scene.kind, scene.description, scene.source};
-  const std::string page = study_page({entry}, {}, directory);
+  const std::string page = study_page({entry}, {}, folder.path());
   EXPECT_NE(page.find("data:image/svg+xml;charset=utf-8,%3Csvg id=%22100%25%22/%3E"), std::string::npos);
-  std::filesystem::remove_all(directory);
 }
 
 TEST(StudyPlot, CoordinatesAreDrawnOverTheTimesOfTheirOwnPoints) {
-  const auto directory = std::filesystem::path(::testing::TempDir()) / "diracstep_study_plot";
-  std::filesystem::create_directories(directory);
+  const testing::TemporaryFolder folder;
   History history;
   history.method = "m";
   history.time = {0.0, 1000.0};  // of the run whose energy is shown
@@ -123,14 +118,12 @@ TEST(StudyPlot, CoordinatesAreDrawnOverTheTimesOfTheirOwnPoints) {
   history.motion.coordinates = {{0, "angle", "rad"}};
   history.track_time = {0.0, 1.0, 2.0};  // of the motion
   history.positions = {Vector::Constant(1, 0.0), Vector::Constant(1, 1.0), Vector::Constant(1, 4.0)};
-  const std::string failure = draw_history(history, "s", "s", {}, directory);
+  const std::string failure = draw_history(history, "s", "s", {}, folder.path());
   if (failure.find("gnuplot was not found") != std::string::npos) GTEST_SKIP() << failure;
   EXPECT_EQ(failure, "");
-  std::ifstream file(directory / "s-motion.svg");
-  const std::string picture = (std::ostringstream() << file.rdbuf()).str();
+  const std::string picture = testing::contents(folder.path("s-motion.svg"));
   EXPECT_NE(picture.find("angle"), std::string::npos);
   EXPECT_EQ(picture.find("1000"), std::string::npos) << "the time axis is that of the motion";
-  std::filesystem::remove_all(directory);
 }
 
 TEST(SeriesStyle, GivesAMethodOneColourOnAllScenesAndEachCurveAMarkerOfItsOwn) {

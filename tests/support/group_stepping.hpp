@@ -9,12 +9,12 @@
 namespace diracstep::group_scenes {
 
 /// The error of a run of so many steps of GL(s) or another method up to T, in what is compared.
-inline double error_at(const GroupScene& of, const Vector& truth, double T, int steps,
+inline double error_at(const GroupScene& of, const Vector& reference, double T, int steps,
                        const std::string& method) {
   const Sample end = testing::samples_of(of.scene, {.method = method, .step = T / steps}, steps,
                                          Momentum::projected, Registry::with_built_ins(), steps)
                          .back();
-  return (of.observe(end.q, end.v) - truth).lpNorm<Eigen::Infinity>();
+  return (of.observe(end.q, end.v) - reference).lpNorm<Eigen::Infinity>();
 }
 
 inline std::shared_ptr<const Scene> free_body(const Eigen::Matrix3d& inertia, Vector omega,

@@ -9,15 +9,10 @@
 #include <string>
 #include <vector>
 
+#include "degenerate_cases.hpp"
 #include "extrapolation.hpp"
 
 namespace diracstep::testing {
-
-/// A scene and where its motion is at t = 1 by the reference: positions, and forces of the rows.
-struct KernelCase {
-  std::shared_ptr<const Scene> scene;
-  Vector q, lambda = {};
-};
 
 inline Scene scene_of(const std::string& name, const std::vector<std::string>& coordinates) {
   Scene scene;
@@ -54,7 +49,7 @@ inline LongReal root(LongReal w, LongReal c) {
 }
 
 /// L = (1 + s²) v_x²/2 − x²/2 − 2s² − s x/2.
-inline KernelCase inner_coordinate() {
+inline DegenerateCase inner_coordinate() {
   Scene scene = scene_of("inner coordinate", {"x", "s"});
   scene.lagrangian = lagrangian<2>([](const auto& q, const auto& v) {
     return 0.5 * (1.0 + q[1] * q[1]) * v[0] * v[0] - 0.5 * q[0] * q[0] - 2.0 * q[1] * q[1] -
@@ -75,7 +70,7 @@ inline KernelCase inner_coordinate() {
 
 /// The same with two positions, a row v_y = a v_x + b, a = 0.3 x + 0.2 sin t, b = 0.1, damping, and a force
 /// along s.
-inline KernelCase inner_coordinate_with_row() {
+inline DegenerateCase inner_coordinate_with_row() {
   Scene scene = scene_of("inner coordinate, nonholonomic, forced", {"x", "y", "s"});
   scene.lagrangian = lagrangian<3>([](const auto& q, const auto& v) {
     return 0.5 * (1.0 + q[2] * q[2]) * (v[0] * v[0] + v[1] * v[1]) - 0.5 * (q[0] * q[0] + q[1] * q[1]) -
@@ -130,7 +125,7 @@ inline KernelCase inner_coordinate_with_row() {
 }
 
 /// On the unit circle, with x = cos θ, y = sin θ:  L = (1 + s²) θ'²/2 − y − 2s² − s x/2.
-inline KernelCase inner_coordinate_on_circle() {
+inline DegenerateCase inner_coordinate_on_circle() {
   Scene scene = scene_of("inner coordinate, holonomic", {"x", "y", "s"});
   scene.lagrangian = lagrangian<3>([](const auto& q, const auto& v) {
     return 0.5 * (1.0 + q[2] * q[2]) * (v[0] * v[0] + v[1] * v[1]) - q[1] - 2.0 * q[2] * q[2] -
@@ -153,7 +148,7 @@ inline KernelCase inner_coordinate_on_circle() {
 }
 
 /// With a pair of first order beside it:  L = (1 + s²) v_x²/2 + z v_y − V.
-inline KernelCase mixed_with_inner_coordinate() {
+inline DegenerateCase mixed_with_inner_coordinate() {
   Scene scene = scene_of("inner coordinate beside motions of first order", {"x", "y", "z", "s"});
   scene.lagrangian = lagrangian<4>([](const auto& q, const auto& v) {
     return 0.5 * (1.0 + q[3] * q[3]) * v[0] * v[0] + q[2] * v[1] -
@@ -198,7 +193,7 @@ void solve_for_third(Hidden hidden, LongVector& y) {
 }
 
 /// L = (v_0 + q_1 v_2)²/2 + v_1²/2 − V.
-inline KernelCase moving_kernel() {
+inline DegenerateCase moving_kernel() {
   Scene scene = scene_of("moving kernel", {"a", "b", "c"});
   scene.lagrangian = lagrangian<3>([](const auto& q, const auto& v) {
     const auto w = v[0] + q[1] * v[2];
@@ -222,7 +217,7 @@ inline KernelCase moving_kernel() {
 
 /// L = m (v_0 + g v_2)²/2 + v_1²/2 − V + q_0 sin(t)/5, g = sin q_1, m = 1 + q_1²/5, with friction against
 /// v_0 + g v_2 and v_1, and `along` v_2 too, which makes the hidden equation one for v_2.
-inline KernelCase moving_kernel_forced(double along) {
+inline DegenerateCase moving_kernel_forced(double along) {
   Scene scene =
       scene_of(along > 0.0 ? "moving kernel, friction along it" : "moving kernel, forced", {"a", "b", "c"});
   scene.lagrangian =
@@ -260,7 +255,7 @@ inline KernelCase moving_kernel_forced(double along) {
 }
 
 /// L of moving_kernel() with v_3²/2, a potential q_3²/2 and a row v_3 = a v_1 + 0.3, a = 0.4 q_0.
-inline KernelCase moving_kernel_with_row() {
+inline DegenerateCase moving_kernel_with_row() {
   Scene scene = scene_of("moving kernel, nonholonomic", {"a", "b", "c", "d"});
   scene.lagrangian = lagrangian<4>([](const auto& q, const auto& v) {
     const auto w = v[0] + q[1] * v[2];
@@ -296,7 +291,7 @@ inline KernelCase moving_kernel_with_row() {
 }
 
 /// The same without the row and with q_1 = sin θ, q_3 = 1 − cos θ: a circle.
-inline KernelCase moving_kernel_on_circle() {
+inline DegenerateCase moving_kernel_on_circle() {
   Scene scene = scene_of("moving kernel, holonomic", {"a", "b", "c", "d"});
   scene.lagrangian = lagrangian<4>([](const auto& q, const auto& v) {
     const auto w = v[0] + q[1] * v[2];
@@ -330,16 +325,16 @@ inline KernelCase moving_kernel_on_circle() {
   return {std::make_shared<const Scene>(scene), whole(end).cast<double>()};
 }
 
-inline const std::vector<KernelCase>& kernel_cases() {
-  static const std::vector<KernelCase> cases{inner_coordinate(),
-                                             inner_coordinate_with_row(),
-                                             inner_coordinate_on_circle(),
-                                             mixed_with_inner_coordinate(),
-                                             moving_kernel(),
-                                             moving_kernel_forced(0.0),
-                                             moving_kernel_forced(0.3),
-                                             moving_kernel_with_row(),
-                                             moving_kernel_on_circle()};
+inline const std::vector<DegenerateCase>& kernel_cases() {
+  static const std::vector<DegenerateCase> cases{inner_coordinate(),
+                                                 inner_coordinate_with_row(),
+                                                 inner_coordinate_on_circle(),
+                                                 mixed_with_inner_coordinate(),
+                                                 moving_kernel(),
+                                                 moving_kernel_forced(0.0),
+                                                 moving_kernel_forced(0.3),
+                                                 moving_kernel_with_row(),
+                                                 moving_kernel_on_circle()};
   return cases;
 }
 

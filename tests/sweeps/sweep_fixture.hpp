@@ -1,7 +1,6 @@
 #pragma once
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <diracstep/solvers/kinsol_solver.hpp>
 #include <diracstep/sweeps/sweep_folder.hpp>
@@ -9,31 +8,31 @@
 #include <fstream>
 #include <sstream>
 #include <string>
+#include <vector>
+
+#include "temporary_folder.hpp"
 
 namespace diracstep::testing {
 
 /// A folder of its own for each test, removed afterwards.
 class SweepTest : public ::testing::Test {
  protected:
-  SweepTest()
-      : folder_(std::filesystem::temp_directory_path() /
-                ("diracstep_sweep_" +
-                 std::string(::testing::UnitTest::GetInstance()->current_test_info()->name()) + "_" +
-                 std::to_string(getpid()))) {
-    std::filesystem::create_directories(folder_);
-  }
-  ~SweepTest() override { std::filesystem::remove_all(folder_); }
-
-  std::string path(const std::string& name) const { return (folder_ / name).string(); }
-
+  std::string path(const std::string& name) const { return folder_.path(name); }
   std::string write(const std::string& name, const std::string& text) const {
-    std::ofstream(path(name)) << text;
-    return path(name);
+    return folder_.write(name, text);
   }
 
-  static std::string contents(const std::string& file) {
-    std::ifstream stream(file, std::ios::binary);
-    return (std::ostringstream() << stream.rdbuf()).str();
+  static std::vector<std::string> fields(const std::string& line) {
+    std::vector<std::string> all;
+    std::istringstream stream(line);
+    for (std::string field; std::getline(stream, field, ',');) all.push_back(field);
+    return all;
+  }
+  std::vector<std::string> rows(const std::string& folder) const {
+    std::istringstream stream(contents(path(folder + "/results.csv")));
+    std::vector<std::string> all;
+    for (std::string line; std::getline(stream, line);) all.push_back(line);
+    return all;
   }
 
   static SweepReport run(const Sweep& sweep, const SweepOptions& options) {
@@ -44,7 +43,7 @@ class SweepTest : public ::testing::Test {
   }
 
  private:
-  std::filesystem::path folder_;
+  TemporaryFolder folder_;
 };
 
 }  // namespace diracstep::testing

@@ -202,11 +202,7 @@ void examine_events(const CatalogueScene& entry, const Registry& registry, const
   try {
     EventSteps<Integrator> motion(
         entry.scene, entry.all_rows, entry.events, solvers, Momentum::projected,
-        [&](const std::shared_ptr<const Scene>& scene) {
-          return std::make_unique<Integrator>(
-              scene, registry, solvers,
-              IntegratorOptions{.method = method.method, .order = method.order, .step = grid.step});
-        });
+        integrators(registry, solvers, {.method = method.method, .order = method.order, .step = grid.step}));
     StepReport report;
     for (long k = 0; k < std::min(grid.steps, most_steps) && report.ok() && !motion.stopped(); ++k)
       report = motion.step();

@@ -20,17 +20,8 @@ std::string run_to_end(const CatalogueScene& entry, const Registry& registry, co
       .method = entry.recommended.method, .order = entry.recommended.order, .step = step};
   try {
     EventSteps<Integrator> motion(entry.scene, entry.all_rows, entry.events, solvers, Momentum::projected,
-                                  [&](const std::shared_ptr<const Scene>& scene) {
-                                    return std::make_unique<Integrator>(scene, registry, solvers, options);
-                                  });
-    for (long k = 0; k < steps && !motion.stopped(); ++k)
-      if (const StepReport report = motion.step(); !report.ok()) return report.failure;
-    if (motion.stopped()) {
-      end = motion.end_of_stopped();
-      return {};
-    }
-    const SolveReport reading = motion.sample(end);
-    return reading.ok() ? "" : describe(reading.status);
+                                  integrators(registry, solvers, options));
+    return motion.run(steps, end).failure;
   } catch (const Misuse& misuse) {
     return misuse.what();
   }

@@ -96,12 +96,11 @@ class Refinement {
     if (!scene_.events.empty()) {
       EventSteps<Integrator> motion(
           scene_.scene, scene_.all_rows, scene_.events, solvers_, Momentum::projected,
-          [&](const std::shared_ptr<const Scene>& scene) {
-            return std::make_unique<Integrator>(
-                scene, registry_, solvers_,
-                IntegratorOptions{.method = by.method, .order = by.order, .step = grid.step});
-          });
-      return step_through_events(motion, grid.steps, look_, end);
+          integrators(registry_, solvers_, {.method = by.method, .order = by.order, .step = grid.step}));
+      const auto look = [&](long taken) {
+        if (look_ && taken % steps_per_look == 0) look_();
+      };
+      return motion.run(grid.steps, end, look).failure;
     }
     Integrator integrator = made(by, grid.step);
     const StepReport last = step_while(

@@ -25,10 +25,8 @@ constexpr std::size_t longest_ladder = 40;
 constexpr double fewest_steps = 2.0;
 constexpr double natural_eps = 1.0;  // radians of the coarsest variable step
 constexpr double coarsest_local_error = 1e-2, finer_local_error = 10.0, its_cost = 1.5;
-constexpr double more_steps = 1.3;        // else the period of a force sets the steps, not their local error
-constexpr double smallest_error = 1e-17;  // an error of zero has no logarithm
+constexpr double more_steps = 1.3;  // else the period of a force sets the steps, not their local error
 constexpr long most_steps_in_limited_time = 200'000;  // of a baseline: some tenths of a second
-constexpr double near_the_reference = 3.0;    // times its own error: what is smaller shows the reference's
 constexpr double of_a_share = 0.03;           // of a ladder's time, for a run that compares formulations
 constexpr double ladders_of_baselines = 3.0;  // times the length of one of ours
 
@@ -345,26 +343,6 @@ class StudyInProgress {
   Study study_;
 };
 
-/// The runs of a method at an order; an error below the reference's own counts as that.
-std::vector<WorkPoint> points(const Study& study, const std::string& method, int order) {
-  const double smallest =
-      std::isfinite(study.reference_error) ? std::max(study.reference_error, smallest_error) : smallest_error;
-  std::vector<WorkPoint> found;
-  for (const StudyRow& row : study.rows)
-    if (row.ok() && row.method == method && row.order == order)
-      found.push_back({row.step, std::max(row.error(), smallest), row.cpu_seconds.median});
-  return found;
-}
-
-/// Those that show an order: well above the error of the reference.
-std::vector<WorkPoint> telling_points(const Study& study, const std::string& method, int order) {
-  std::vector<WorkPoint> found = points(study, method, order);
-  if (std::isfinite(study.reference_error))
-    std::erase_if(found,
-                  [&](const WorkPoint& p) { return p.error < near_the_reference * study.reference_error; });
-  return found;
-}
-
 }  // namespace
 
 std::vector<int> possible_orders(const MethodInfo& method) {
@@ -414,44 +392,6 @@ double expected_seconds(const CatalogueScene& scene, const Registry& registry, c
   const auto ladders =
       static_cast<double>(options.series.empty() ? options.methods.size() : options.series.size());
   return std::min(options.time_limit, (ladders + baselines) * (1.0 + options.repeats) * ladder);
-}
-
-void conclude(Study& study) {
-  for (MeasuredOrder& measured : study.measured_orders) {
-    const auto fit = measure_order(telling_points(study, measured.method, measured.order));
-    measured.slope = fit ? std::optional(fit->slope) : std::nullopt;
-    measured.points = fit ? fit->points : 0;
-  }
-  study.at_error.clear();
-  const std::vector<WorkPoint> ida = points(study, ida_method, 0), erk = points(study, erk_method, 0);
-  for (const double error : compared_errors) {
-    const std::size_t first = study.at_error.size();
-    const auto ida_seconds = cpu_seconds_within(ida, error), erk_seconds = cpu_seconds_within(erk, error);
-    std::optional<std::size_t> best;
-    for (const MeasuredOrder& ours : study.measured_orders) {
-      AtError at{.error = error,
-                 .method = ours.method,
-                 .order = ours.order,
-                 .ida_cpu_seconds = ida_seconds,
-                 .erk_cpu_seconds = erk_seconds};
-      at.cpu_seconds = cpu_seconds_within(points(study, ours.method, ours.order), error);
-      if (at.cpu_seconds && ida_seconds) at.ratio = *ida_seconds / *at.cpu_seconds;
-      if (at.cpu_seconds && erk_seconds) at.erk_ratio = *erk_seconds / *at.cpu_seconds;
-      study.at_error.push_back(at);
-      if (at.cpu_seconds && (!best || *at.cpu_seconds < *study.at_error[*best].cpu_seconds))
-        best = study.at_error.size() - 1;
-    }
-    if (best) {
-      study.at_error[*best].best = true;
-      std::rotate(study.at_error.begin() + static_cast<std::ptrdiff_t>(first),
-                  study.at_error.begin() + static_cast<std::ptrdiff_t>(*best),
-                  study.at_error.begin() + static_cast<std::ptrdiff_t>(*best) + 1);
-    }
-  }
-}
-
-bool confirms_order(const MeasuredOrder& measured, double tolerance) {
-  return measured.slope && std::abs(*measured.slope - measured.order) <= tolerance;
 }
 
 }  // namespace diracstep

@@ -112,8 +112,11 @@ Study convergence_study(const CatalogueScene& scene, const Registry& registry, c
 double expected_seconds(const CatalogueScene& scene, const Registry& registry, const SolverFactory& solvers,
                         const StudyOptions& options);
 
+/// Times the reference's own error: what is smaller shows the error of the reference.
+inline constexpr double near_the_reference = 3.0;
+
 /// measured_orders and at_error, from the rows.  Errors below that of the reference count as that: runs are
-/// compared at larger ones only, and orders are read off those above three times of it.
+/// compared at larger ones only, and orders are read off those above `near_the_reference` times it.
 void conclude(Study& study);
 
 /// Whether a measured order is the stated one, give or take `tolerance`; false where none could be measured.

@@ -25,7 +25,7 @@ CatalogueScene changed(CatalogueScene entry, Change change) {
 
 double start_energy(const Scene& scene) { return scene.energy(scene.start); }
 
-Watch energy_watch(const std::shared_ptr<const Scene>& scene, double scale) {
+WatchedQuantity energy_watch(const std::shared_ptr<const Scene>& scene, double scale) {
   return {.name = "energy",
           .at = [scene](double t, ConstVectorRef q, ConstVectorRef v) { return scene->energy(t, q, v); },
           .scale = scale};
@@ -41,7 +41,7 @@ double energy_size(const Scene& scene) {
   return size > 0.0 ? size : 1.0;
 }
 
-Watch invariant_watch(const Invariant& invariant, const Start& start) {
+WatchedQuantity invariant_watch(const Invariant& invariant, const Start& start) {
   constexpr double zero = 1e-12;  // an invariant of about zero has no size of its own
   const double size = std::abs(invariant.at(start.time, start.q, start.v));
   return {.name = invariant.name, .at = invariant.at, .scale = size > zero ? size : 1.0};
@@ -171,7 +171,7 @@ void add_kepler(Cases& cases, bool full) {
 
 /// Largest distance of n_four_bar from the shape in which all uprights are parallel; its coordinates are
 /// x_0, y_0, x_1, y_1, …
-Watch parallel_watch() {
+WatchedQuantity parallel_watch() {
   return {.name = "uprights not parallel",
           .at =
               [](double, ConstVectorRef q, ConstVectorRef) {

@@ -59,7 +59,7 @@ void fit_drift(const std::vector<Point>& points, WatchResult& result) {
 /// Follows one watch along a run.
 class Watching {
  public:
-  Watching(const Watch& watch, const Start& start)
+  Watching(const WatchedQuantity& watch, const Start& start)
       : watch_(watch), start_value_(watch.at(start.time, start.q, start.v)) {
     result_.name = watch.name;
   }
@@ -86,7 +86,7 @@ class Watching {
   }
 
  private:
-  const Watch& watch_;
+  const WatchedQuantity& watch_;
   double start_value_;
   std::vector<Point> points_;
   bool within_ = true;
@@ -112,7 +112,7 @@ class CaseRun {
   CaseRun(const StabilityCase& that, Integrator& integrator, StabilityRow& row,
           const std::function<bool()>& going_on)
       : case_(that), integrator_(integrator), row_(row), going_on_(going_on), reference_(reference_of(that)) {
-    for (const Watch& watch : that.watches) watching_.emplace_back(watch, integrator.scene().start);
+    for (const WatchedQuantity& watch : that.watches) watching_.emplace_back(watch, integrator.scene().start);
   }
 
   void run(long steps) {
@@ -186,7 +186,7 @@ IdaBeside run_ida_beside(const StabilityCase& that, const ReferenceEnd& referenc
     beside.constraint = end.constraint;
     if (reference.missing.empty()) beside.error = end.error();
     beside.deviation = 0.0;
-    for (const Watch& watch : that.watches)
+    for (const WatchedQuantity& watch : that.watches)
       beside.deviation =
           std::max(beside.deviation, std::abs(Watching(watch, scene.start).deviation(run.end)));
   } catch (const Misuse& misuse) {

@@ -13,7 +13,7 @@ namespace diracstep {
 
 /// Something that a run is watched for: a function of the point that keeps its start value on the true
 /// motion, or nearly so.
-struct Watch {
+struct WatchedQuantity {
   std::string name;  ///< "energy"
   std::function<double(double t, ConstVectorRef q, ConstVectorRef v)> at;
   double scale = 1.0;    ///< deviations are divided by this
@@ -29,7 +29,7 @@ struct StabilityCase {
   CatalogueScene scene;  ///< its reference judges the end, where it has one there
   double step = 0.0;
   double t_end = 0.0;
-  std::vector<Watch> watches = {};
+  std::vector<WatchedQuantity> watches = {};
   double accuracy = 1e-3;  ///< a smaller relative error at the end is called accurate
 };
 

@@ -209,19 +209,6 @@ StudyRow run_ours(Integrator& integrator, long steps, Momentum momentum, int rep
   return row;
 }
 
-std::string step_through_events(EventSteps<Integrator>& motion, long steps, const Look& look, Sample& end) {
-  for (long k = 0; k < steps && !motion.stopped(); ++k) {
-    if (look && k % steps_between_looks == 0) look();
-    if (const StepReport report = motion.step(); !report.ok()) return report.failure;
-  }
-  if (motion.stopped()) {
-    end = motion.end_of_stopped();
-    return {};
-  }
-  const SolveReport reading = motion.sample(end);
-  return reading.ok() ? std::string() : fmt::format("reading the end: {}", describe(reading.status));
-}
-
 StudyRow run_with_events(const CatalogueScene& scene, const Registry& registry, const SolverFactory& solvers,
                          const IntegratorOptions& options, long steps, Momentum momentum, int repeats,
                          const ReferenceEnd& reference, const Look& look) {
@@ -231,17 +218,16 @@ StudyRow run_with_events(const CatalogueScene& scene, const Registry& registry, 
   std::shared_ptr<const Scene> last;
   const auto once = [&] {
     EventSteps<Integrator> motion(scene.scene, scene.all_rows, scene.events, solvers, momentum,
-                                  [&](const std::shared_ptr<const Scene>& of) {
-                                    return std::make_unique<Integrator>(of, registry, solvers, options);
-                                  });
+                                  integrators(registry, solvers, options));
     double looking = 0.0;
     const double before = thread_seconds();
-    const auto look_around = [&] {
+    const auto look_around = [&](long taken) {
+      if (!look || taken % steps_between_looks != 0) return;
       const double pause = thread_seconds();
-      if (look) look();
+      look();
       looking += thread_seconds() - pause;
     };
-    failure = step_through_events(motion, steps, look_around, end);
+    failure = motion.run(steps, end, look_around).failure;
     const double seconds = thread_seconds() - before - looking;
     work = motion.work();
     last = std::make_shared<const Scene>(motion.scene());

@@ -96,9 +96,6 @@ StudyRow run_with_events(const CatalogueScene& scene, const Registry& registry, 
                          const IntegratorOptions& options, long steps, Momentum momentum, int repeats,
                          const ReferenceEnd& reference, const Look& look = {});
 
-/// Takes the steps of a scene with its events and reads the end.  Empty, or what failed; `look` as there.
-std::string step_through_events(EventSteps<Integrator>& motion, long steps, const Look& look, Sample& end);
-
 /// The same with variable steps to t_end; the survey of the rate belongs to the construction.  The row's
 /// method ends in `variable_steps` and its step is eps.
 StudyRow run_variable(AdaptiveIntegrator& integrator, double t_end, Momentum momentum, int repeats,

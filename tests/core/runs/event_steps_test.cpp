@@ -60,11 +60,7 @@ void expect_half_of_the_speed(const Make& make, double tolerance) {
 
 TEST(EventSteps, AnImpactKeepsTheOtherRows) {
   const Registry registry = Registry::with_built_ins();
-  expect_half_of_the_speed<Integrator>(
-      [&](const std::shared_ptr<const Scene>& scene) {
-        return std::make_unique<Integrator>(scene, registry, kinsol(), small_steps);
-      },
-      1e-9);
+  expect_half_of_the_speed<Integrator>(integrators(registry, kinsol(), small_steps), 1e-9);
   expect_half_of_the_speed<AdaptiveIntegrator>(
       [&](const std::shared_ptr<const Scene>& scene) {
         return std::make_unique<AdaptiveIntegrator>(scene, registry, kinsol(), small_steps,
@@ -73,14 +69,49 @@ TEST(EventSteps, AnImpactKeepsTheOtherRows) {
       1e-8);
 }
 
+TEST(EventSteps, RunsToItsEndOrToTheEventThatStopsIt) {
+  const Registry registry = Registry::with_built_ins();
+  Event stop = wall();
+  stop.stop = true;
+  EventSteps<Integrator> motion(rod(), nullptr, {stop}, kinsol(), Momentum::projected,
+                                integrators(registry, kinsol(), small_steps));
+  Sample end;
+  std::vector<long> taken;
+  const auto before = [&](long k) { taken.push_back(k); };
+  ASSERT_TRUE(motion.run(3, end, before).ok());
+  EXPECT_EQ(taken, (std::vector<long>{0, 1, 2}));
+  EXPECT_FALSE(motion.stopped());
+  EXPECT_NEAR(end.time, 0.06, 1e-15);
+  ASSERT_TRUE(motion.run(1000, end).ok());
+  EXPECT_TRUE(motion.stopped());
+  EXPECT_NEAR(end.q[0], 0.0, 1e-12);
+  EXPECT_NEAR(end.v[0], 0.5 * std::sqrt(2.0 * 9.81), 1e-9) << "behind the impact";
+}
+
+/// The name of the scene must not be taken for its end.
+TEST(EventSteps, AMotionSetOffItsRowsFailsWithTheRow) {
+  const Registry registry = Registry::with_built_ins();
+  auto scene = std::make_shared<Scene>(*rod());
+  scene->name = "Ann's rod";
+  Event event = wall();
+  event.contact = nullptr;
+  event.restitution = nullptr;
+  event.set = {{.index = 0, .second = false, .value = [](const MotionPoint&) { return 0.5; }}};
+  EventSteps<Integrator> motion(scene, nullptr, {event}, kinsol(), Momentum::projected,
+                                integrators(registry, kinsol(), small_steps));
+  Sample end;
+  const StepReport report = motion.run(1000, end);
+  EXPECT_FALSE(report.ok());
+  EXPECT_TRUE(report.failure.starts_with("event 'wall' at t = ")) << report.failure;
+  EXPECT_NE(report.failure.find("behind it: it violates row 'rod': φ(q) = 0.25"), std::string::npos)
+      << report.failure;
+}
+
 TEST(EventSteps, BadEventsAreMisuse) {
   const Registry registry = Registry::with_built_ins();
   const auto with = [&](Event event) {
     EventSteps<Integrator> motion(rod(), nullptr, {std::move(event)}, kinsol(), Momentum::projected,
-                                  [&](const std::shared_ptr<const Scene>& scene) {
-                                    return std::make_unique<Integrator>(scene, registry, kinsol(),
-                                                                        small_steps);
-                                  });
+                                  integrators(registry, kinsol(), small_steps));
   };
   Event event = wall();
   event.off = {"rope"};

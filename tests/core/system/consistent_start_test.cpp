@@ -5,6 +5,7 @@
 #include <diracstep/core/system/contradictory_rows.hpp>
 #include <diracstep/core/system/redundant_rows.hpp>
 
+#include "misuse.hpp"
 #include "scenes.hpp"
 #include "stepping.hpp"
 
@@ -19,9 +20,9 @@ std::shared_ptr<Scene> inconsistent() {
   return scene;
 }
 
-TEST(ConsistentStart, ProjectionLandsOnTheNearestPointAndVelocity) {
+TEST(ProjectedStart, ProjectionLandsOnTheNearestPointAndVelocity) {
   const auto scene = inconsistent();
-  const ConsistentStart projected = project_start(*scene, scene->start, kinsol());
+  const ProjectedStart projected = project_start(*scene, scene->start, kinsol());
   EXPECT_NO_THROW(require_consistent(*scene, projected.start));
   EXPECT_GT(projected.position_moved, 0.01);
   EXPECT_LT(projected.position_moved, 0.1);  // the nearest point is nearer than the one it came from
@@ -33,14 +34,22 @@ TEST(ConsistentStart, ProjectionLandsOnTheNearestPointAndVelocity) {
   EXPECT_NEAR(std::abs(way.dot(gradient)), way.norm() * gradient.norm(), 1e-12);
 }
 
-TEST(ConsistentStart, AConsistentStartStays) {
+TEST(ProjectedStart, AConsistentStartStays) {
   for (const auto& scene : testing::every_constraint_class()) {
-    const ConsistentStart projected = project_start(*scene, scene->start, kinsol());
+    const ProjectedStart projected = project_start(*scene, scene->start, kinsol());
     EXPECT_LT(projected.position_moved + projected.velocity_moved, 1e-14) << scene->name;
   }
 }
 
-TEST(ConsistentStart, TheIntegratorRefusesOrProjectsAsAsked) {
+TEST(ProjectedStart, APositionThatMayNotMoveIsToldAsOneWhateverTheSceneIsCalled) {
+  const auto scene = inconsistent();
+  scene->name = "A v + b";
+  const Guesses none_of_q{std::vector<bool>(static_cast<std::size_t>(scene->dimension()), false), {}};
+  testing::expect_misuse([&] { (void)project_start(*scene, scene->start, kinsol(), none_of_q); },
+                         {"φ(q) = ", "no position is named as a guess"});
+}
+
+TEST(ProjectedStart, TheIntegratorRefusesOrProjectsAsAsked) {
   EXPECT_THROW(Integrator(inconsistent(), Registry::with_built_ins(), kinsol(), {.step = 0.1}), Misuse);
   Integrator integrator(inconsistent(), Registry::with_built_ins(), kinsol(),
                         {.step = 0.1, .project_start = true});
@@ -48,7 +57,7 @@ TEST(ConsistentStart, TheIntegratorRefusesOrProjectsAsAsked) {
   EXPECT_EQ(integrator.plan().front().item, "start");
 }
 
-TEST(ConsistentStart, AMomentumOffTheDistributionIsProjectedAndTheDistanceTold) {
+TEST(ProjectedStart, AMomentumOffTheDistributionIsProjectedAndTheDistanceTold) {
   // With unit masses the velocity is p; the nearest one on v_x + y v_z = 0 is its Euclidean projection.
   Scene scene = *testing::nonholonomic();
   scene.lagrangian = lagrangian<3>([](const auto& q, const auto& v) {
@@ -57,25 +66,25 @@ TEST(ConsistentStart, AMomentumOffTheDistributionIsProjectedAndTheDistanceTold) 
   const double y = scene.start.q[1];
   const Vector p{{1.0, 2.0, 3.0}}, row{{1.0, 0.0, y}};
   const Start start{0.0, scene.start.q, Vector(), p};
-  const ConsistentStart projected = project_start(scene, start, kinsol());
+  const ProjectedStart projected = project_start(scene, start, kinsol());
   const double off = row.dot(p) / row.squaredNorm();
   EXPECT_LT((projected.start.v - (p - off * row)).norm(), 1e-14);
   EXPECT_NEAR(projected.velocity_moved, std::abs(off) * row.norm(), 1e-14);
   EXPECT_EQ(projected.position_moved, 0.0);
 }
 
-TEST(ConsistentStart, HiddenRowsCountAsRows) {
+TEST(ProjectedStart, HiddenRowsCountAsRows) {
   const auto scene = laws::degenerate_circuit();
   Start start = scene->start;
   start.q[2] += 0.2;
-  const ConsistentStart projected = project_start(*scene, start, kinsol());
+  const ProjectedStart projected = project_start(*scene, start, kinsol());
   const Vector& q = projected.start.q;
   EXPECT_NEAR(q[1] + 0.4 * std::pow(q[1], 3), q[2] + 0.2 * q[2] * q[2], 1e-13);
   EXPECT_GT(projected.position_moved, 0.1);
   EXPECT_LT(projected.position_moved, 0.2);
 }
 
-TEST(ConsistentStart, UnreachableConstraintsAreRefusedWithTheReason) {
+TEST(ProjectedStart, UnreachableConstraintsAreRefusedWithTheReason) {
   Scene scene = testing::particle("impossible");
   scene.constraints = {holonomic<3, 1>(
       []<class T>(const std::array<T, 3>& q) { return std::array<T, 1>{q[0] * q[0] + 1.0 + 0.0 * q[1]}; })};

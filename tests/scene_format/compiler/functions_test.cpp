@@ -10,6 +10,7 @@
 #include <fstream>
 
 #include "differences.hpp"
+#include "temporary_folder.hpp"
 
 /// Scene files against hand-written C++, interpreted kernels against compiled ones, repetition, circuits.
 namespace diracstep {
@@ -34,22 +35,14 @@ class Setting {
 /// An empty directory for kernels, removed afterwards.
 class EmptyCache {
  public:
-  EmptyCache()
-      : path_(std::filesystem::temp_directory_path() / ("diracstep_cache_" + std::to_string(getpid()))),
-        setting_("DIRACSTEP_CACHE", path_.string()) {
-    std::filesystem::remove_all(path_);
-  }
-  ~EmptyCache() { std::filesystem::remove_all(path_); }
-  EmptyCache(const EmptyCache&) = delete;
-  EmptyCache& operator=(const EmptyCache&) = delete;
-  const std::filesystem::path& path() const { return path_; }
+  std::filesystem::path path() const { return folder_.path("cache"); }
   long files() const {
-    return std::distance(std::filesystem::directory_iterator(path_), std::filesystem::directory_iterator());
+    return std::distance(std::filesystem::directory_iterator(path()), std::filesystem::directory_iterator());
   }
 
  private:
-  std::filesystem::path path_;
-  Setting setting_;
+  testing::TemporaryFolder folder_;
+  Setting setting_{"DIRACSTEP_CACHE", folder_.path("cache")};
 };
 
 const std::string driven = R"toml(

@@ -1,5 +1,4 @@
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <cstdlib>
 #include <cstring>
@@ -8,12 +7,11 @@
 #include <diracstep/scene_format/scene_file.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
 #include <filesystem>
-#include <fstream>
 #include <optional>
 #include <random>
-#include <sstream>
 
 #include "../../fuzz/scene_run/generated_scene.hpp"
+#include "temporary_folder.hpp"
 
 extern "C" int fuzz_scene_run(const std::uint8_t* data, std::size_t size);
 
@@ -61,9 +59,8 @@ void step(int scenes, unsigned seed) {
 
 /// Compiled kernels and interpreted ones give the same bits of every step.
 void compare(int wanted, unsigned seed) {
-  const auto cache =
-      std::filesystem::temp_directory_path() / ("diracstep_generated_" + std::to_string(getpid()));
-  setenv("DIRACSTEP_CACHE", cache.c_str(), 1);
+  const TemporaryFolder cache;
+  setenv("DIRACSTEP_CACHE", cache.path().c_str(), 1);
   std::mt19937 random(seed);
   int compared = 0, moved = 0;
   for (int k = 0; compared < wanted && k < 40 * wanted; ++k) {
@@ -80,7 +77,6 @@ void compare(int wanted, unsigned seed) {
   }
   unsetenv("DIRACSTEP_CC");
   unsetenv("DIRACSTEP_CACHE");
-  std::filesystem::remove_all(cache);
   std::printf("%d scenes compared, %d of them moved\n", compared, moved);
   EXPECT_EQ(compared, wanted);
   EXPECT_GT(moved, wanted / 2);
@@ -89,8 +85,7 @@ void compare(int wanted, unsigned seed) {
 TEST(GeneratedScenes, OfTheCorpusAreSteppedOrRefused) {
   int inputs = 0;
   for (const auto& entry : std::filesystem::directory_iterator(DIRACSTEP_CORPUS "/../../scene_run/corpus")) {
-    std::ifstream file(entry.path(), std::ios::binary);
-    const std::string choices = (std::ostringstream() << file.rdbuf()).str();
+    const std::string choices = contents(entry.path());
     EXPECT_EQ(fuzz_scene_run(reinterpret_cast<const std::uint8_t*>(choices.data()), choices.size()), 0);
     ++inputs;
   }

@@ -16,8 +16,9 @@
 #include <fstream>
 #include <map>
 #include <optional>
-#include <sstream>
 #include <thread>
+
+#include "temporary_folder.hpp"
 
 /// What is loaded from the cache runs in this process: only what this user has compiled, whole, may be.
 namespace diracstep::testing {
@@ -28,16 +29,10 @@ using namespace std::chrono_literals;
 
 class Cache : public ::testing::Test {
  protected:
-  Cache() : folder_(fs::temp_directory_path() / ("diracstep_kernels_" + std::to_string(getpid()))) {
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
-    fs::permissions(folder_, fs::perms::owner_all);
-    set("DIRACSTEP_CACHE", cache().string());
-  }
+  Cache() { set("DIRACSTEP_CACHE", cache().string()); }
   ~Cache() override {
     for (const auto& [name, value] : before_)
       value ? setenv(name.c_str(), value->c_str(), 1) : unsetenv(name.c_str());
-    fs::remove_all(folder_);
   }
 
   void set(const std::string& name, const std::string& value) {
@@ -46,8 +41,8 @@ class Cache : public ::testing::Test {
     setenv(name.c_str(), value.c_str(), 1);
   }
 
-  fs::path folder() const { return folder_; }
-  fs::path cache() const { return folder_ / "cache"; }
+  fs::path folder() const { return folder_.path(); }
+  fs::path cache() const { return folder() / "cache"; }
 
   /// How the kernels of an oscillator were made; another `number` is another source.
   static std::string origin(int number = 1) { return oscillator(number).code; }
@@ -70,18 +65,13 @@ class Cache : public ::testing::Test {
     return all;
   }
 
-  static std::string contents(const fs::path& path) {
-    std::ifstream file(path, std::ios::binary);
-    return (std::ostringstream() << file.rdbuf()).str();
-  }
-
   void write_script(const fs::path& path, const std::string& text) const {
     std::ofstream(path) << "#!/bin/sh\n" << text;
     fs::permissions(path, fs::perms::owner_all);
   }
 
  private:
-  fs::path folder_;
+  TemporaryFolder folder_;
   std::map<std::string, std::optional<std::string>> before_;
 };
 

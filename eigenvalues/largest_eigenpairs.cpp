@@ -1,5 +1,5 @@
 #include <diracstep/core/numerics/errors.hpp>
-#include <diracstep/solvers/largest_eigenpairs.hpp>
+#include <diracstep/eigenvalues/largest_eigenpairs.hpp>
 #ifdef DIRACSTEP_WITH_SPECTRA
 #if defined(__GNUC__) && !defined(__clang__) && __GNUC__ >= 12  // sees a column freed twice that is not
 #pragma GCC diagnostic push

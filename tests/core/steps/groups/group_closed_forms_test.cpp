@@ -137,7 +137,7 @@ TEST(GroupStepClosedForms, AgreesWithTheQuaternionAndItsRowToTheErrorsOfBoth) {
   const std::array<double, 4> v = spaces::SO3::product(q, w);
   flat->start = {0.0, start.q, 0.5 * Vector::Map(v.data(), 4)};
   const double T = 2.0;
-  const Vector truth = group_scenes::reference(top, T);
+  const Vector reference = group_scenes::reference(top, T);
   const auto end_of_flat = [&](int steps) {
     const Sample end = testing::samples_of(flat, {.method = gl(3), .step = T / steps}, steps,
                                            Momentum::projected, Registry::with_built_ins(), steps)
@@ -148,8 +148,8 @@ TEST(GroupStepClosedForms, AgreesWithTheQuaternionAndItsRowToTheErrorsOfBoth) {
     return top.observe(end.q, 2.0 * Vector::Map(half.data() + 1, 3));
   };
   for (const int steps : {16, 32, 128}) {
-    const double of_group = error_at(top, truth, T, steps, gl(3)),
-                 of_flat = (end_of_flat(steps) - truth).lpNorm<Eigen::Infinity>();
+    const double of_group = error_at(top, reference, T, steps, gl(3)),
+                 of_flat = (end_of_flat(steps) - reference).lpNorm<Eigen::Infinity>();
     EXPECT_LT(of_group, of_flat) << steps;
     if (steps == 128) {
       EXPECT_LT(of_flat, 1e-9);

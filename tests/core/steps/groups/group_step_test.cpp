@@ -68,17 +68,17 @@ TEST_P(GroupStep, HasTheOrderOfItsStages) {
   constexpr std::array<int, 4> steps{40, 20, 16, 10};
   // Errors of Cayley's retraction have terms of the next orders of their size at these steps.
   const double tolerance = GetParam().name.ends_with("Cayley") ? 0.3 : 0.2;
-  const Vector truth = group_scenes::reference(GetParam(), T);
-  ASSERT_LT((truth - group_scenes::reference(GetParam(), T, 120)).lpNorm<Eigen::Infinity>(), 1e-14);
+  const Vector reference = group_scenes::reference(GetParam(), T);
+  ASSERT_LT((reference - group_scenes::reference(GetParam(), T, 120)).lpNorm<Eigen::Infinity>(), 1e-14);
   for (int s = 1; s <= 4; ++s) {
     const int n = steps[static_cast<std::size_t>(s - 1)];
-    const double coarse = error_at(GetParam(), truth, T, n, gl(s)),
-                 fine = error_at(GetParam(), truth, T, 2 * n, gl(s));
+    const double coarse = error_at(GetParam(), reference, T, n, gl(s)),
+                 fine = error_at(GetParam(), reference, T, 2 * n, gl(s));
     EXPECT_NEAR(std::log2(coarse / fine), 2.0 * s, tolerance)
         << "s = " << s << ": " << coarse << " to " << fine;
   }
-  const double coarse = error_at(GetParam(), truth, T, 80, "type1/trapezoidal"),
-               fine = error_at(GetParam(), truth, T, 160, "type1/trapezoidal");
+  const double coarse = error_at(GetParam(), reference, T, 80, "type1/trapezoidal"),
+               fine = error_at(GetParam(), reference, T, 160, "type1/trapezoidal");
   EXPECT_NEAR(std::log2(coarse / fine), 2.0, 0.2) << "trapezoidal: " << coarse << " to " << fine;
 }
 
@@ -223,13 +223,13 @@ TEST(GroupStepOfR, IsTheStepInRnToRoundOff) {
 TEST(GroupStepInARun, ComposesRestartsProjectsAndPassesTheChecks) {
   const GroupScene top = group_scenes::top_with_rows();
   const double T = 1.0;
-  const Vector truth = group_scenes::reference(top, T);
+  const Vector reference = group_scenes::reference(top, T);
   const auto composed = [&](int steps) {
     const Sample end =
         testing::samples_of(top.scene, {.method = "type1/midpoint", .order = 4, .step = T / steps}, steps,
                             Momentum::projected, Registry::with_built_ins(), steps)
             .back();
-    return (top.observe(end.q, end.v) - truth).lpNorm<Eigen::Infinity>();
+    return (top.observe(end.q, end.v) - reference).lpNorm<Eigen::Infinity>();
   };
   EXPECT_NEAR(std::log2(composed(20) / composed(40)), 4.0, 0.3);
   Integrator integrator = integrator_of(top.scene, gl(3), 0.05);
@@ -248,7 +248,7 @@ TEST(GroupStepInARun, ComposesRestartsProjectsAndPassesTheChecks) {
   Start off = top.scene->start;
   off.q[4] += 1e-3;
   off.v[3] -= 1e-2;
-  const ConsistentStart moved = project_start(*top.scene, off, kinsol());
+  const ProjectedStart moved = project_start(*top.scene, off, kinsol());
   EXPECT_GT(moved.position_moved, 1e-4);
   EXPECT_LT(moved.position_moved, 2e-3);
   EXPECT_NO_THROW(require_consistent(*top.scene, moved.start));

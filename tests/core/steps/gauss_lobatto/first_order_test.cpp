@@ -4,7 +4,7 @@
 #include <diracstep/constraints/holonomic.hpp>
 #include <diracstep/constraints/pfaffian.hpp>
 
-#include "differences.hpp"
+#include "degenerate_cases.hpp"
 #include "extrapolation.hpp"
 #include "methods.hpp"
 #include "misuse.hpp"
@@ -13,6 +13,7 @@
 namespace diracstep {
 namespace {
 
+using testing::DegenerateCase;
 using testing::distance;
 using testing::gl;
 using testing::LongMatrix;
@@ -22,12 +23,6 @@ using testing::samples_of;
 
 template <class T>
 using Three = std::array<T, 3>;
-
-/// A scene and where its motion is at t = 1 by the reference: positions, and forces of the rows.
-struct Case {
-  std::shared_ptr<const Scene> scene;
-  Vector q, lambda;
-};
 
 /// Parts of L = θ(t,q)·v − H(q), whose two-form has rank 2 in three coordinates, and a force.
 struct OneForm {
@@ -147,7 +142,7 @@ LongVector reduced(LongReal t, const LongVector& q) {
 }
 
 template <class Rows, class Push>
-Case phase_space_case(const std::string& name) {
+DegenerateCase phase_space_case(const std::string& name) {
   Scene scene;
   scene.name = name;
   scene.coordinates = {"x", "y", "z"};
@@ -182,7 +177,7 @@ T mixed_potential(const T& x, const T& y, const T& z) {
   return 0.5 * x * x + 0.4 * y * y + 0.5 * z * z + 0.3 * x * y + 0.2 * x * x * z;
 }
 
-Case mixed_order() {
+DegenerateCase mixed_order() {
   Scene scene;
   scene.name = "mixed order";
   scene.coordinates = {"x", "y", "z"};
@@ -201,7 +196,7 @@ Case mixed_order() {
 
 /// L = (1 + y²/5) v_x²/2 + (z + 3x²/10 + sin t/5) v_y − V with damping and a clock w, v_w = 1 + x/2, that
 /// pushes x.
-Case mixed_order_with_row() {
+DegenerateCase mixed_order_with_row() {
   Scene scene;
   scene.name = "mixed order with a row";
   scene.coordinates = {"x", "y", "z", "w"};
@@ -238,87 +233,51 @@ Case mixed_order_with_row() {
   return {std::make_shared<const Scene>(scene), end.head(4).cast<double>(), Vector{{-0.1 * x * std::cos(w)}}};
 }
 
-const std::vector<Case>& every_case() {
-  static const std::vector<Case> cases{phase_space_case<Moving, Damping>("nonholonomic, forced"),
-                                       phase_space_case<Still, NoForce>("nonholonomic"),
-                                       phase_space_case<Surface, Damping>("holonomic, forced"),
-                                       phase_space_case<Bowl, NoForce>("holonomic"),
-                                       mixed_order(),
-                                       mixed_order_with_row()};
+const std::vector<DegenerateCase>& every_case() {
+  static const std::vector<DegenerateCase> cases{phase_space_case<Moving, Damping>("nonholonomic, forced"),
+                                                 phase_space_case<Still, NoForce>("nonholonomic"),
+                                                 phase_space_case<Surface, Damping>("holonomic, forced"),
+                                                 phase_space_case<Bowl, NoForce>("holonomic"),
+                                                 mixed_order(),
+                                                 mixed_order_with_row()};
   return cases;
 }
 
-Sample end_of_case(const Case& that, const std::string& method, long steps) {
-  return samples_of(that.scene, {.method = method, .step = 1.0 / static_cast<double>(steps)}, steps,
-                    Momentum::projected, Registry::with_built_ins(), steps)
-      .back();
-}
-
-double error_of(const Case& that, const std::string& method, long steps) {
-  const Sample end = end_of_case(that, method, steps);
-  const double error = distance(end.q, that.q);
-  return that.lambda.size() == 0 ? error : std::max(error, distance(end.lambda, that.lambda));
-}
-
 TEST(FirstOrderStep, OrderIsTwiceTheStagesInPositionsAndForcesOfRows) {
-  for (const Case& that : every_case())
-    for (const auto& [s, steps] : {std::pair{1, 40L}, {2, 10L}, {3, 6L}}) {
-      const double first = error_of(that, gl(s), steps), second = error_of(that, gl(s), 2 * steps);
-      EXPECT_GT(second, 1e-13) << that.scene->name << ": at round-off, nothing is measured";
-      EXPECT_NEAR(std::log2(first / second), 2.0 * s, 0.4)
-          << that.scene->name << " s = " << s << " errors " << first << " " << second;
-    }
+  for (const DegenerateCase& that : every_case())
+    for (const auto& [s, steps] : {std::pair{1, 40L}, {2, 10L}, {3, 6L}})
+      testing::expect_order_of_stages(that, s, steps, 1e-13);
 }
 
 TEST(FirstOrderStep, RadauHasItsOrder) {
-  for (const Case& that : every_case()) {
-    const double first = error_of(that, "damped/radau:2", 20), second = error_of(that, "damped/radau:2", 40);
+  for (const DegenerateCase& that : every_case()) {
+    const double first = testing::error_at_end(that, "damped/radau:2", 20),
+                 second = testing::error_at_end(that, "damped/radau:2", 40);
     EXPECT_NEAR(std::log2(first / second), 3.0, 0.5)
         << that.scene->name << " errors " << first << " " << second;
   }
 }
 
 TEST(FirstOrderStep, JacobianAgreesWithDifferences) {
-  for (const Case& that : every_case())
-    for (const int s : {1, 2}) {
-      const auto scene = completed(that.scene);
-      const Eigen::Index n = scene->dimension();
-      const auto problem = Registry::with_built_ins().method(gl(s)).make_step(*scene, {true});
-      Vector p(n), lq(n), x(problem->size());
-      scene->lagrangian->gradient(0.0, scene->start.q, scene->start.v, lq, p);
-      problem->begin({0.0, 0.2}, {scene->start.q, p, scene->start.v}, {});
-      problem->guess(scene->start.v, x);
-      x += 0.1 * Vector::LinSpaced(x.size(), -1.0, 1.3);
-      EXPECT_LT(testing::jacobian_error(*problem, x), 1e-7) << scene->name << " s = " << s;
-    }
+  for (const DegenerateCase& that : every_case())
+    for (const int s : {1, 2}) testing::expect_exact_jacobian(that, s);
 }
 
 TEST(FirstOrderStep, KeepsRowsAndPrimaryConstraint) {
-  for (const Case& that : every_case()) {
+  for (const DegenerateCase& that : every_case()) {
     const auto samples = samples_of(that.scene, {.method = gl(2), .step = 0.05}, 200);
     Vector lq(that.scene->dimension()), p(lq.size());
     for (const Sample& at : samples) {
       that.scene->lagrangian->gradient(at.time, at.q, at.v, lq, p);
       EXPECT_LT(distance(at.p, p), 1e-12) << that.scene->name;
-      for (const auto& rows : that.scene->constraints) {
-        if (!rows->holonomic()) continue;
-        Vector phi(1);
-        rows->position(at.time, at.q, phi);
-        EXPECT_LT(std::abs(phi[0]), 1e-13) << that.scene->name;
-      }
+      testing::expect_on_holonomic_rows(*that.scene, at);
     }
   }
 }
 
 TEST(FirstOrderStep, IsSelfAdjoint) {
-  for (const Case& that : every_case())
-    for (const int s : {1, 2, 3}) {
-      const Sample there = samples_of(that.scene, {.method = gl(s), .step = 0.1}, 1).back();
-      auto back = std::make_shared<Scene>(*that.scene);
-      back->start = {there.time, there.q, there.v};
-      const Sample again = samples_of(back, {.method = gl(s), .step = -0.1}, 1).back();
-      EXPECT_LT(distance(again.q, that.scene->start.q), 1e-13) << that.scene->name << " s = " << s;
-    }
+  for (const DegenerateCase& that : every_case())
+    for (const int s : {1, 2, 3}) testing::expect_self_adjoint(that, s, 1e-13);
 }
 
 TEST(FirstOrderStep, WhatIsNotDeterminedIsRefusedWithItsDirection) {
