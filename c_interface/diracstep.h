@@ -24,7 +24,7 @@ extern "C" {
 
 /* Raised when a struct here or in diracstep_scene.h, or what a function does, changes; not for new functions.
  */
-#define DIRACSTEP_VERSION_OF_C_INTERFACE 5u
+#define DIRACSTEP_VERSION_OF_C_INTERFACE 6u
 
 #if defined(_WIN32)
 #define DIRACSTEP_API __declspec(dllexport)
@@ -322,6 +322,8 @@ typedef struct diracstep_derivatives {
   /* Writes the derivatives of the function by q, v and p at the end, zeros at first; 0, or else it fails. */
   int (*cotangent)(void *data, const diracstep_state *end, double *q, double *v, double *p);
   void *data;
+  const int *stop; /* or NULL, looked at before each step, there and back: where it is not 0 nothing is
+                    * written, and the integrator stands where it has come to */
 } diracstep_derivatives;
 
 /* Takes the steps and differentiates them.  Of steps of fixed size, without a pushed force, and of an
@@ -380,7 +382,7 @@ typedef struct diracstep_boundary {
   const char *no_action;    /* "", or why there is no action; then `action` is NaN and the next are NULL */
   double action;            /* S(q0, qN), the sum of the discrete Lagrangians */
   const double *gradient;   /* 2n numbers, by q0 and by qN: -p0 and pN */
-  const double *hessian;    /* 2n × 2n, symmetric; NULL with rows too */
+  const double *hessian;    /* 2n × 2n, row by row, symmetric to round-off; NULL with rows too */
   int free_directions;      /* that periodic conditions leave … */
   int multipliers;          /* … and Floquet's multipliers … */
   const double *multiplier; /* … real and imaginary part of each */

@@ -1,6 +1,7 @@
 #include <diracstep/boundary_values/detail/control_program.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <exception>
+#include <mutex>
 
 #ifdef DIRACSTEP_WITH_IPOPT
 
@@ -174,6 +175,8 @@ std::string words(Ipopt::ApplicationReturnStatus status) {
 
 InteriorPointReport solve(ControlProgram& program, int max_iterations, double tolerance,
                           const std::function<bool()>& go_on, Vector& u) {
+  static std::mutex one_at_a_time;  // MUMPS, which solves Ipopt's linear systems, keeps state of its own
+  const std::lock_guard<std::mutex> turn(one_at_a_time);
   Ipopt::SmartPtr<Program> of = new Program(program, go_on, u);
   Ipopt::SmartPtr<Ipopt::IpoptApplication> application = new Ipopt::IpoptApplication(false);
   application->Options()->SetStringValue("sb", "yes");

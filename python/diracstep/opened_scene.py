@@ -16,7 +16,7 @@ from .errors import Failure, raised
 from .opening import checked, source_of
 
 if TYPE_CHECKING:
-    from .run import Run
+    from .run import Points
 
 
 class OpenedScene:
@@ -82,7 +82,7 @@ class OpenedScene:
         if code != c.OK:
             self._raise(code, c.lib.message().decode())
 
-    def _raise(self, code: int, message: str, run: Run | None = None) -> NoReturn:
+    def _raise(self, code: int, message: str, run: Points | None = None) -> NoReturn:
         """The exception for a code, with what a callback raised as its cause."""
         exception = raised(code, message)
         if isinstance(exception, Failure):

@@ -10,6 +10,7 @@ import numpy as np
 from .arrays import column, flag, real, reals, text, whole
 from .callbacks import CallbackScene, GeneratingFunction, say_cost
 from .command import Equilibrium, Fit, SolvedStart, Varied, Verbs, fit, sweep
+from .ends import BoundaryMotion, ControlledMotion, boundary_of, control_of
 from .errors import Misuse
 from .integrator import Integrator
 from .motions import ensemble_of, run_of, search_of, times_every
@@ -193,6 +194,35 @@ class Scene(OpenedScene):
         until: where the motion will end: a fixed step is then fitted to it.  pushed: ``push`` will be used.
         """
         return Integrator(self, until, pushed, options)
+
+    def boundary(self, to: Any = None, *, start: Any = None, periodic: bool = False, until: float | None = None, guess: Any = None,
+                 max_iterations: int = 60, **options: Any) -> BoundaryMotion:
+        """The motion from one end to another, all steps solved at once.
+
+        to, start: what is asked of the end and of the start, a place or {"x": 1.0, "v_x": 0.5, "p_y": 0.0}; without ``start`` its
+        place is that of the scene.  periodic: q and v at the end as at the start, instead.
+        until: time of the end.  guess: a run, another such motion or {"t": …, "q": …, "v": …} that the search begins with; without
+        it a straight line between two places, else the motion from the scene's start.  options: method, order, step and others of
+        ``run`` for steps of one size.
+
+        Raises Misuse where the conditions are too many or too few; Failure, whose ``run`` is the last iterate, where the search
+        does not converge.  Warns with Doubt where the steps are too large.  Ctrl-C ends it with KeyboardInterrupt.
+        """
+        return boundary_of(self, to, start, periodic, until, guess, max_iterations, options)
+
+    def control(self, to: Any = None, *, start: Any = None, at_least: Mapping[str, float] | None = None,
+                at_most: Mapping[str, float] | None = None, degree: int = 0, until: float | None = None, guess: Any = None,
+                tolerance: float = 1e-9, max_iterations: int = 500, **options: Any) -> ControlledMotion:
+        """The controls of least cost, for a scene whose file has a table [control]; needs a library with Ipopt.
+
+        to, start: as for ``boundary``, but any number; without ``start`` place and velocity are those of the scene's start.
+        at_least, at_most: bounds by name of coordinates at the ends of steps, and of controls.  degree: of the polynomials in t
+        that controls are in each step.  until, guess, options: as for ``boundary``.  tolerance: of the optimality conditions.
+
+        Raises Misuse without Ipopt or [control]; Failure, whose ``run`` is the last iterate, where the search does not converge.
+        Warns with Doubt where a run with these controls ends elsewhere.  Ctrl-C ends it with KeyboardInterrupt.
+        """
+        return control_of(self, to, start, at_least, at_most, degree, until, guess, tolerance, max_iterations, options)
 
     @property
     def plan(self) -> TextTable:
