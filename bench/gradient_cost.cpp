@@ -1,6 +1,6 @@
 /// What a gradient by the adjoint takes in units of the motion's own processor time: the gradient of a
 /// function of the end by the whole start, on scenes from two coordinates to hundreds; and what the forward
-/// derivatives by the whole start take.
+/// derivatives by the whole start take.  SCENE METHOD as arguments: those alone.
 #include <cstdio>
 #include <diracstep/scene_format/scene_catalogue.hpp>
 #include <diracstep/sensitivities/sensitivities.hpp>
@@ -46,9 +46,10 @@ void measure(const std::string& name, const std::string& method) {
 
 }  // namespace
 
-int main() {
+int main(int count, char** arguments) {
   std::printf("%-20s %-30s %4s %8s %8s %8s %8s\n", "scene", "method", "n", "us/step", "gradient", "by 20",
               "forward");
+  if (count > 2) return measure(arguments[1], arguments[2]), 0;
   for (const char* scene :
        {"kepler_e06", "chaplygin_sleigh", "pendulum_cartesian", "double_pendulum", "pleiades", "lc_circuit",
         "ida_slider_crank", "fput", "toda_200", "hanging_chain"})

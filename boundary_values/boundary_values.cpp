@@ -184,6 +184,12 @@ void add_points(const Solved& of, BoundaryReport& report) {
 
 }  // namespace
 
+void require_steps(long steps, long most) {
+  if (steps < 1 || steps > most)
+    throw Misuse(std::to_string(steps) + " steps; 1 or more are needed, and " + std::to_string(most) +
+                 " are the most");
+}
+
 BoundaryConditions between(ConstVectorRef q0, ConstVectorRef qN) {
   const Eigen::Index n = q0.size();
   require_size("places: numbers at the end", qN.size(), n);
@@ -209,8 +215,7 @@ GuessedMotion straight_line(double t0, ConstVectorRef q0, double tN, ConstVector
 }
 
 BoundaryReport solve_boundary_values(const BoundaryProblem& problem) {
-  if (problem.steps < 1)
-    throw Misuse("boundary values: " + std::to_string(problem.steps) + " steps; 1 or more are needed");
+  require_steps(problem.steps, most_boundary_steps);
   if (!problem.guess) throw Misuse("boundary values: no guess");
   Integrator integrator(problem.scene, problem.registry, problem.solvers, problem.options);
   const Scene& scene = integrator.scene();
@@ -234,11 +239,13 @@ BoundaryReport solve_boundary_values(const BoundaryProblem& problem) {
     return std::make_unique<boundary::FamilyOfEnds>(equations, at, sizes, power);
   };
   const Vector at_guess = u;
-  boundary::NewtonReport search = boundary::newton(equations, u, problem.max_iterations, factor);
-  if (conditions.families && !search.converged) {  // less damping, for conditions that are all but degenerate
+  boundary::NewtonReport search =
+      boundary::newton(equations, u, problem.max_iterations, factor, problem.go_on);
+  if (conditions.families && !search.converged &&
+      !search.interrupted) {  // less damping, for conditions that are all but degenerate
     power = 2.0;
     u = at_guess;
-    search = boundary::newton(equations, u, problem.max_iterations, factor);
+    search = boundary::newton(equations, u, problem.max_iterations, factor, problem.go_on);
   }
   BoundaryReport report;
   report.iterations = search.iterations;
@@ -246,7 +253,10 @@ BoundaryReport solve_boundary_values(const BoundaryProblem& problem) {
   report.residual = equations.residual(u).ends.lpNorm<Eigen::Infinity>();
   const double size = std::max(1.0, boundary::sizes_by_kind(equations, u).head(3).maxCoeff());
   report.converged = search.converged && report.residual <= 1e-8 * size;
-  if (report.converged)
+  report.interrupted = search.interrupted;
+  if (search.interrupted)
+    report.ending = search.failure;
+  else if (report.converged)
     report.ending = "the corrections are round-off";
   else if (search.converged)
     report.ending =

@@ -56,7 +56,12 @@ struct BoundaryProblem {
   BoundaryConditions conditions;
   GuessedMotion guess;
   int max_iterations = 60;
+  std::function<bool()> go_on = {};  ///< asked before each iteration; false ends the search
 };
+
+/// Throws Misuse for fewer steps than one or more than these.
+void require_steps(long steps, long most);
+constexpr long most_boundary_steps = 10'000'000;
 
 /// Jacobi's solution of the discrete Hamilton-Jacobi equation (Ohsawa, Bloch, Leok, SIAM J. Control Optim.
 /// 49, 2011, arXiv 0911.2258): the action S^N(q0, qN) = Σ L_d along the motion between the two.
@@ -70,10 +75,11 @@ struct DiscreteAction {
 
 struct [[nodiscard]] BoundaryReport {
   bool converged = false;
-  std::string ending;       ///< how the search ended, and where it did not converge, what may help
-  int iterations = 0;       ///< Newton's, each with one factorisation
-  double correction = 0.0;  ///< the last one, in parts of the largest number of its kind
-  double residual = 0.0;    ///< of the conditions, largest entry
+  bool interrupted = false;  ///< by go_on
+  std::string ending;        ///< how the search ended, and where it did not converge, what may help
+  int iterations = 0;        ///< Newton's, each with one factorisation
+  double correction = 0.0;   ///< the last one, in parts of the largest number of its kind
+  double residual = 0.0;     ///< of the conditions, largest entry
   /// Empty, or why the motion is not to be believed though it solves the equations: its energy changes
   /// (EnergyCheck), or a run takes another step from one of its points, as where steps are too large.
   std::string doubt;

@@ -1,6 +1,7 @@
 #include <cmath>
 #include <diracstep/boundary_values/detail/control_program.hpp>
 #include <diracstep/boundary_values/optimal_control.hpp>
+#include <diracstep/core/numerics/errors.hpp>
 
 namespace diracstep {
 
@@ -13,10 +14,11 @@ bool optimal_control_available() {
 }
 
 OptimalControlReport solve_optimal_control(const ControlProblem& problem) {
+  require_steps(problem.steps, most_control_steps);
   boundary::ControlProgram program(problem);
   Vector u = program.start();
   const boundary::InteriorPointReport search =
-      boundary::solve(program, problem.max_iterations, problem.tolerance, u);
+      boundary::solve(program, problem.max_iterations, problem.tolerance, problem.go_on, u);
   OptimalControlReport report;
   report.iterations = search.iterations;
   program.describe(u, report);
@@ -26,6 +28,12 @@ OptimalControlReport solve_optimal_control(const ControlProblem& problem) {
                       ? "a condition that was taken to follow from the rows and other conditions does not: " +
                             std::to_string(report.residual)
                       : search.ending;
+  report.interrupted = search.interrupted;
+  constexpr double far_off = 1e-4;
+  if (report.converged && !(report.end_of_run <= far_off))
+    report.doubt = "a run with these controls ends off by " + to_text(report.end_of_run, 2) +
+                   ", as where the motion is not stable, steps are too large, or it crosses a jump of the "
+                   "formulas within a step, where a run divides its step and this search does not";
   return report;
 }
 

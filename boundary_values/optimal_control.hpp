@@ -41,11 +41,15 @@ struct ControlProblem {
   int degree = 0;
   Vector lower_q = {}, upper_q = {};  ///< bounds of q at the ends of the steps; empty: none
   int max_iterations = 500;
-  double tolerance = 1e-9;  ///< of the optimality conditions, scaled as Ipopt scales them
+  double tolerance = 1e-9;           ///< of the optimality conditions, scaled as Ipopt scales them
+  std::function<bool()> go_on = {};  ///< asked after each iteration; false ends the search
 };
+
+constexpr long most_control_steps = 100'000;
 
 struct [[nodiscard]] OptimalControlReport {
   bool converged = false;
+  bool interrupted = false;  ///< by go_on
   std::string ending;
   int iterations = 0;
   double cost = 0.0;
@@ -53,6 +57,9 @@ struct [[nodiscard]] OptimalControlReport {
   /// How far from the end, in q and p, the steps end that the integrator takes from the start with these
   /// controls: NaN where they fail.
   double end_of_run = 0.0;
+  /// Empty, or why the controls are not to be believed though the search has converged: a run with them ends
+  /// elsewhere.
+  std::string doubt;
 
   /// At the ends of all steps, 0 … N: a column for each; v and p on the rows.
   Vector times;

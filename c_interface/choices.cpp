@@ -18,6 +18,14 @@ bool recommended(const diracstep_model& model, const diracstep_options& options)
 
 }  // namespace
 
+Parameters named_values(int count, const diracstep_parameter* list, const char* what) {
+  Parameters values;
+  if (count > 0) (void)given(list, what);
+  for (int k = 0; k < count; ++k)
+    values[&given(list[k].name, (std::string("the name of a ") + what).c_str())] = list[k].value;
+  return values;
+}
+
 Momentum momentum_from(int momentum) {
   switch (momentum) {
     case DIRACSTEP_PROJECTED:

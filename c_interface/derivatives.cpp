@@ -56,15 +56,20 @@ int diracstep_differentiate(const diracstep_model* model, diracstep_integrator* 
     const diracstep_derivatives& wanted = given(derivatives, "what is wanted");
     Integrator& stepper = stepper_of(of, given(integrator, "the integrator"), wanted.steps);
     Sensitivities sensitivities(stepper, of.registry, parametric(of, wanted));
+    sensitivities.ask_before_each_step([stop = wanted.stop] { return !stopped(stop); });
     const int n = sensitivities.coordinates();
+    const auto require_end = [&](const StepReport& report) {
+      if (report.ok()) return;
+      if (stopped(wanted.stop)) throw Interruption(report.failure);
+      throw Failure(report.failure);
+    };
     const auto note_doubt = [&] {  // an earlier one stays
       if (!sensitivities.doubt().empty()) integrator->doubt = sensitivities.doubt();
     };
     if (wanted.cotangent == nullptr) {
       Directions z(2 * n + wanted.parameters, 2 * n + wanted.parameters);
       z << sensitivities.by_position(), sensitivities.by_velocity(), sensitivities.by_parameters();
-      const StepReport report = sensitivities.jvp(wanted.steps, z);
-      if (!report.ok()) throw Failure(report.failure);
+      require_end(sensitivities.jvp(wanted.steps, z));
       note_doubt();
       const ReadDirections read = sensitivities.read(z);
       write(read.q, wanted.q, "q");
@@ -77,7 +82,7 @@ int diracstep_differentiate(const diracstep_model* model, diracstep_integrator* 
       if (linear && read.v.isZero(0.0)) read.v.resize(0, 0);
       return read;
     });
-    if (!gradient.report.ok()) throw Failure(gradient.report.failure);
+    require_end(gradient.report);
     note_doubt();
     write(gradient.by_start.q0, wanted.q, "q");
     write(gradient.by_start.v0, wanted.v, "v");

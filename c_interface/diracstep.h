@@ -1,5 +1,6 @@
 /* DiracStep from C and from every language that can call C: scenes from files, from text or made of
- * callbacks, plans, runs into the caller's arrays, single steps, ensembles.  Link libdiracstep.
+ * callbacks, plans, runs into the caller's arrays, single steps, ensembles, motions between two ends, optimal
+ * control.  Link libdiracstep.
  *
  * Every function that can fail returns DIRACSTEP_OK or one of the codes below it; diracstep_message says what
  * happened.  Structs that are all zero are the defaults.  Columns of a point hold n numbers (coordinates), m
@@ -23,7 +24,7 @@ extern "C" {
 
 /* Raised when a struct here or in diracstep_scene.h, or what a function does, changes; not for new functions.
  */
-#define DIRACSTEP_VERSION_OF_C_INTERFACE 5u
+#define DIRACSTEP_VERSION_OF_C_INTERFACE 6u
 
 #if defined(_WIN32)
 #define DIRACSTEP_API __declspec(dllexport)
@@ -321,6 +322,8 @@ typedef struct diracstep_derivatives {
   /* Writes the derivatives of the function by q, v and p at the end, zeros at first; 0, or else it fails. */
   int (*cotangent)(void *data, const diracstep_state *end, double *q, double *v, double *p);
   void *data;
+  const int *stop; /* or NULL, looked at before each step, there and back: where it is not 0 nothing is
+                    * written, and the integrator stands where it has come to */
 } diracstep_derivatives;
 
 /* Takes the steps and differentiates them.  Of steps of fixed size, without a pushed force, and of an
@@ -348,6 +351,86 @@ typedef struct diracstep_ensemble {
 DIRACSTEP_API int diracstep_run_ensemble(const diracstep_model *model, const diracstep_options *options,
                                          const diracstep_ensemble *ensemble, diracstep_points *ends,
                                          diracstep_table *told);
+
+/* ---- Motions between two ends (docs/boundary_values.md) ---- */
+
+/* What is asked of the ends of a motion by equal steps from the scene's start time to `end` of the options.
+ * Names are those of coordinates, or "v_" or "p_" before one for its velocity or momentum. */
+typedef struct diracstep_ends {
+  int of_start; /* how many numbers are asked of the start; 0: its coordinates, and where controls are
+                 * searched its velocities, are those of the scene's start … */
+  const diracstep_parameter *at_start; /* … and which */
+  int of_end;                          /* the same of the end */
+  const diracstep_parameter *at_end;
+  int periodic; /* 1, and nothing asked: q and v at the end as at the start; not for controls */
+  int guesses;  /* points of a motion that the search begins with; 0: a straight line between two places,
+                 * else the motion from the scene's start … */
+  const double *guess_time;        /* … at these times … */
+  const double *guess_q, *guess_v; /* … guesses × n */
+  int max_iterations;              /* 0: 60, for controls 500 */
+  const int *stop;                 /* or NULL, looked at in each iteration */
+} diracstep_ends;
+
+/* What was found, beside the points.  Texts and numbers are valid until the next call of this thread. */
+typedef struct diracstep_boundary {
+  int iterations;
+  double correction; /* the last one, in parts of the largest number of its kind */
+  double residual;   /* of the conditions */
+  const char *method;
+  const char *doubt;        /* "", or why the motion is not to be believed */
+  const char *other;        /* "", or that another motion fulfils the conditions */
+  const char *no_action;    /* "", or why there is no action; then `action` is NaN and the next are NULL */
+  double action;            /* S(q0, qN), the sum of the discrete Lagrangians */
+  const double *gradient;   /* 2n numbers, by q0 and by qN: -p0 and pN */
+  const double *hessian;    /* 2n × 2n, row by row, symmetric to round-off; NULL with rows too */
+  int free_directions;      /* that periodic conditions leave … */
+  int multipliers;          /* … and Floquet's multipliers … */
+  const double *multiplier; /* … real and imaginary part of each */
+} diracstep_boundary;
+
+/* Finds a motion and writes the ends of its steps: t, q, v, p projected, energy, invariants and outputs;
+ * forces of rows are not known there, so that `lambda` and outputs that read it become NaN.  DIRACSTEP_FAILED
+ * where the search does not converge: the points are then its last iterate.  DIRACSTEP_MISUSE for conditions
+ * that are too many or too few, and with events. */
+DIRACSTEP_API int diracstep_solve_boundary(const diracstep_model *model, const diracstep_options *options,
+                                           const diracstep_ends *ends, diracstep_points *points,
+                                           diracstep_boundary *found);
+
+/* How controls, the parameters that `[control]` of a scene file names, are searched
+ * (docs/optimal_control.md).
+ */
+typedef struct diracstep_control {
+  int of_least; /* how many bounds there are of coordinates at the ends of steps and of controls … */
+  const diracstep_parameter *least; /* … and they */
+  int of_greatest;                  /* the same from above */
+  const diracstep_parameter *greatest;
+  int degree;       /* of the polynomials in t that controls are in each step */
+  double tolerance; /* of the optimality conditions; 0: 1e-9 */
+} diracstep_control;
+
+/* What was found, beside the points.  Texts and numbers are valid until the next call of this thread. */
+typedef struct diracstep_controlled {
+  int iterations;
+  double cost;
+  double residual;   /* of the steps, the rows and the conditions */
+  double end_of_run; /* how far from the end a run with these controls ends; NaN where it fails */
+  const char *method;
+  const char *doubt;           /* "", or why the controls are not to be believed */
+  int controls;                /* P … */
+  const char *const *name;     /* … and their names */
+  long control_points;         /* K */
+  const double *control_time;  /* K numbers: the middles of the steps, or where polynomials have values */
+  const double *control_value; /* K × P */
+} diracstep_controlled;
+
+/* Finds the controls of least cost, and writes points as diracstep_solve_boundary() does; errors as there.
+ * DIRACSTEP_MISUSE where the library was built without Ipopt: see diracstep_can_control(). */
+DIRACSTEP_API int diracstep_solve_control(const diracstep_model *model, const diracstep_options *options,
+                                          const diracstep_ends *ends, const diracstep_control *control,
+                                          diracstep_points *points, diracstep_controlled *found);
+
+/* 1 where the library was built with Ipopt, else 0. */
+DIRACSTEP_API int diracstep_can_control(void);
 
 #ifdef __cplusplus
 }

@@ -114,6 +114,9 @@ diracstep_table keep(int columns, std::vector<std::string> cells);
 /// What C reads that is neither.
 void keep(std::shared_ptr<const void> owner);
 
+/// So many numbers by name; throws Misuse where one has none, `what` it is.
+Parameters named_values(int count, const diracstep_parameter* list, const char* what);
+
 Momentum momentum_from(int momentum);
 SolverFactory solvers_from(const diracstep_options& options);
 /// All but the step.

@@ -34,14 +34,6 @@ void add_plugins(diracstep_model& model, const diracstep_source& source) {
     add_plugin(model, Plugin(&entry_at(source.linked_plugin, k, "linked plugin")));
 }
 
-Parameters named_values(int count, const diracstep_parameter* list, const char* what) {
-  Parameters values;
-  if (count > 0) (void)given(list, what);
-  for (int k = 0; k < count; ++k)
-    values[&given(list[k].name, (std::string("the name of a ") + what).c_str())] = list[k].value;
-  return values;
-}
-
 /// What is known of a scene that no file describes.
 CatalogueScene described(std::shared_ptr<const Scene> scene, std::string description, std::string source,
                          double end, double step) {

@@ -1,10 +1,8 @@
 #pragma once
 
-#include <diracstep/boundary_values/boundary_values.hpp>
 #include <diracstep/command/session.hpp>
 #include <diracstep/core/runs/run.hpp>
 #include <functional>
-#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -24,22 +22,9 @@ struct MotionSearchArguments {
 void add_search_options(CLI::App& verb, Session& session, MotionSearchArguments& arguments);
 
 /// The scene, and the steps to its end; a method that the scene recommends is taken into the arguments.
-/// Throws Misuse for events, for curved spaces and for more than `most_steps` steps; `verb` names it there.
+/// Throws Misuse for events and for curved spaces; `verb` names it there.
 CatalogueScene searched_scene(MotionSearchArguments& arguments, Session& session, const std::string& verb);
-StepGrid searched_steps(const MotionSearchArguments& arguments, const CatalogueScene& entry, long most_steps);
-
-/// That of --guess; else a straight line between two places, where all of both is held; else the motion from
-/// the start of the scene.  Throws Error where that fails.
-GuessedMotion guess_of(const MotionSearchArguments& arguments, const std::shared_ptr<const Scene>& scene,
-                       const Session& session, const IntegratorOptions& options, long steps,
-                       const BoundaryConditions& conditions);
-
-/// Between points, straight.
-GuessedMotion through_points(const Vector& times, const Columns& q, const Columns& v);
-
-/// The motion from the start of the scene.  Throws Error where it fails.
-GuessedMotion guess_from_start(const std::shared_ptr<const Scene>& scene, const Session& session,
-                               const IntegratorOptions& options, long steps);
+StepGrid searched_steps(const MotionSearchArguments& arguments, const CatalogueScene& entry);
 
 /// A motion that was found: one column a point.
 struct FoundMotion {

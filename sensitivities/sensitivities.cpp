@@ -68,6 +68,16 @@ struct Sensitivities::Parts {
               ", whose time moves with the start and the parameters: the derivatives leave that out";
   }
 
+  /// False, with a report that says so, where the caller wants no more.
+  bool go_on(StepReport& report) const {
+    if (!asked || asked()) return true;
+    report.solve.status = SolveStatus::refused;
+    report.time = integrator.time();
+    report.failure = "interrupted at t = " + to_text(integrator.time(), 17);
+    return false;
+  }
+
+  std::function<bool()> asked;
   Integrator& integrator;
   ParametricScene scene;
   std::unique_ptr<sensitivity::LinearisedMotion> motion;
@@ -145,9 +155,11 @@ ReadDirections Sensitivities::read(const Directions& z) {
   return parts_->motion->push_reading(parts_->point(), z);
 }
 
+void Sensitivities::ask_before_each_step(std::function<bool()> go_on) { parts_->asked = std::move(go_on); }
+
 StepReport Sensitivities::jvp(long steps, Directions& z) {
   StepReport report;
-  for (long k = 0; k < steps && report.ok(); ++k) report = step(z);
+  for (long k = 0; k < steps && report.ok() && parts_->go_on(report); ++k) report = step(z);
   return report;
 }
 
@@ -187,6 +199,7 @@ Sensitivities::Gradient Sensitivities::gradient(long steps, const Cotangent& cot
       first = k;
     }
     if (k == 1 && interval < steps) segment.clear();  // all but the last are taken again
+    if (!parts.go_on(result.report)) return result;
     result.report = integrator.step();
     if (!result.report.ok()) return result;
     parts.note_kinks();
@@ -196,6 +209,7 @@ Sensitivities::Gradient Sensitivities::gradient(long steps, const Cotangent& cot
   Directions z;
   for (;;) {
     for (std::size_t k = segment.size(); k-- > 0;) {
+      if (!parts.go_on(result.report)) return result;
       const auto& step = segment[k];
       if (step.added.size() > 0) z = z.size() > 0 ? Directions(z + step.added) : step.added;
       parts.motion->pull(step.stages, z);
@@ -207,6 +221,7 @@ Sensitivities::Gradient Sensitivities::gradient(long steps, const Cotangent& cot
     integrator.restore(kept.empty() ? begin : kept.back());
     segment.clear();
     for (long k = first; k < last; ++k) {
+      if (!parts.go_on(result.report)) return result;
       if (!integrator.step().ok()) throw Error("a step taken again from a snapshot failed");
       keep_step(k);
     }

@@ -75,6 +75,10 @@ class Sensitivities {
   /// What directions at the current point are in the velocity and the projected momentum there.
   ReadDirections read(const Directions& z);
 
+  /// Asked before each step of jvp() and gradient(), there and back: false ends them, with a report that is
+  /// not ok.  The integrator then stands where it has come to.
+  void ask_before_each_step(std::function<bool()> go_on);
+
   /// jvp: `steps` steps of directions; the integrator is at the end.  vjp is its transpose.
   StepReport jvp(long steps, Directions& z);
 

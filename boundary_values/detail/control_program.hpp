@@ -61,11 +61,14 @@ class ControlProgram {
 
 struct InteriorPointReport {
   bool converged = false;
+  bool interrupted = false;
   std::string ending;
   int iterations = 0;
 };
 
-/// Ipopt from program.start() on; u is its last iterate.  Throws Misuse where the library has none.
-InteriorPointReport solve(ControlProgram& program, int max_iterations, double tolerance, Vector& u);
+/// Ipopt from program.start() on; u is its last iterate; `go_on`, where there is one, is asked after each
+/// iteration.  Throws Misuse where the library has none.
+InteriorPointReport solve(ControlProgram& program, int max_iterations, double tolerance,
+                          const std::function<bool()>& go_on, Vector& u);
 
 }  // namespace diracstep::boundary

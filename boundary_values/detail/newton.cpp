@@ -156,13 +156,19 @@ Columns FamilyOfEnds::transition() const {
   return basis.transpose() * end_by_start_ * basis;
 }
 
-NewtonReport newton(MotionEquations& equations, Vector& u, int max_iterations, const FactorEnds& factor) {
+NewtonReport newton(MotionEquations& equations, Vector& u, int max_iterations, const FactorEnds& factor,
+                    const std::function<bool()>& go_on) {
   NewtonReport report;
   double damping = 1.0;
   // Where all comes to rest at zero, corrections are measured by the guess.
   const Vector least = least_part_of_guess * sizes_by_kind(equations, u);
   MotionEquations::Residual r = equations.residual(u);
   while (report.iterations < max_iterations) {
+    if (go_on && !go_on()) {
+      report.interrupted = true;
+      report.failure = "interrupted after " + std::to_string(report.iterations) + " iterations";
+      return report;
+    }
     ++report.iterations;
     const Vector sizes = sizes_by_kind(equations, u).cwiseMax(least);
     std::unique_ptr<LinearisedEnds> linear;

@@ -70,14 +70,16 @@ using FactorEnds = std::function<std::unique_ptr<LinearisedEnds>(const Vector& u
 
 struct NewtonReport {
   bool converged = false;
+  bool interrupted = false;
   std::string failure;
   int iterations = 0;
   double correction = 0.0;
 };
 
 /// Newton's method from u on; `factor` makes the linear systems at an iterate, and throws Error where it
-/// cannot.
-NewtonReport newton(MotionEquations& equations, Vector& u, int max_iterations, const FactorEnds& factor);
+/// cannot; `go_on`, where there is one, is asked before each iteration.
+NewtonReport newton(MotionEquations& equations, Vector& u, int max_iterations, const FactorEnds& factor,
+                    const std::function<bool()>& go_on);
 
 /// The largest number of each Kind of unknown, 1 where all are zero.
 Vector sizes_by_kind(const MotionEquations& equations, const Vector& u);

@@ -3,8 +3,11 @@
 #include <CLI/App.hpp>
 #include <algorithm>
 #include <cmath>
-#include <diracstep/boundary_values/boundary_values.hpp>
-#include <diracstep/command/end_conditions.hpp>
+#include <diracstep/boundary_values/guesses.hpp>
+#include <diracstep/boundary_values/named_ends.hpp>
+#include <diracstep/boundary_values/other_solutions.hpp>
+#include <diracstep/command/arguments.hpp>
+#include <diracstep/command/guess_file.hpp>
 #include <diracstep/command/motion_search.hpp>
 #include <diracstep/command/verbs.hpp>
 #include <diracstep/core/numerics/errors.hpp>
@@ -21,7 +24,6 @@ struct BoundaryArguments : MotionSearchArguments {
 };
 
 constexpr int most_conditions_shown = 40;  // coordinates, multipliers
-constexpr long most_boundary_steps = 10'000'000;
 
 std::string multiplier_text(std::complex<double> value) {
   if (value.imag() == 0.0) return fmt::format("{:.10g}", value.real());
@@ -111,55 +113,12 @@ BoundaryConditions conditions_of(const BoundaryArguments& arguments, const Scene
   }
   if (arguments.to.empty())
     throw Misuse("--to NAME=VALUE says what is asked of the end, or --periodic that it is as the start");
-  return conditions_at_ends(scene, arguments.from, arguments.to);
-}
-
-double apart(const BoundaryReport& one, const BoundaryReport& other, double& size) {
-  const Eigen::Index stride = (other.times.size() - 1) / (one.times.size() - 1);
-  double off = 0.0;
-  size = one.q.lpNorm<Eigen::Infinity>();
-  for (Eigen::Index k = 0; k < one.times.size(); ++k)
-    off = std::max(off, (one.q.col(k) - other.q.col(k * stride)).lpNorm<Eigen::Infinity>());
-  return off;
-}
-
-/// Between two places: a solution of the discrete equations that is near no motion changes with the steps.
-std::string doubt_of_steps(BoundaryProblem problem, const BoundaryReport& found) {
-  constexpr double far = 0.02;  // of the largest coordinate
-  problem.steps *= 2;
-  problem.options.step *= 0.5;
-  problem.guess = through_points(found.times, found.q, found.v);
-  const BoundaryReport finer = solve_boundary_values(problem);
-  if (!finer.converged)
-    return "with steps of half the size no motion is found near it: it is that of the steps";
-  double size = 0.0;
-  const double off = apart(found, finer, size);
-  if (off <= far * size) return "";
-  return fmt::format(
-      "with steps of half the size the motion is another, up to {:.2g} off: steps are too large", off);
-}
-
-/// A second guess, and what it leads to.
-std::string other_motion(BoundaryProblem problem, const BoundaryReport& found, const Session& session) {
-  const BoundaryConditions& conditions = problem.conditions;
-  if (!conditions.start_held || !conditions.end_held) return "";
-  try {
-    problem.guess = guess_from_start(problem.scene, session, problem.options, problem.steps);
-  } catch (const Error&) {
-    return "";
-  }
-  const BoundaryReport other = solve_boundary_values(problem);
-  double size = 0.0;
-  constexpr double same = 1e-6;
-  if (!other.converged || apart(found, other, size) <= same * size) return "";
-  return fmt::format(
-      "another motion fulfils the conditions{}: the guess chooses; --guess FILE leads to others",
-      other.action ? fmt::format(", of the action {:.6g}", other.action->value) : "");
+  return conditions_at_ends(scene, parameters(arguments.from, "--from"), parameters(arguments.to, "--to"));
 }
 
 void run_boundary(BoundaryArguments arguments, Session& session) {
   const CatalogueScene entry = searched_scene(arguments, session, "boundary");
-  const StepGrid grid = searched_steps(arguments, entry, most_boundary_steps);
+  const StepGrid grid = searched_steps(arguments, entry);
   BoundaryProblem problem{entry.scene,
                           session.registry,
                           session.solvers,
@@ -169,7 +128,7 @@ void run_boundary(BoundaryArguments arguments, Session& session) {
                           {}};
   problem.options.step = grid.step;
   problem.guess =
-      guess_of(arguments, entry.scene, session, problem.options, problem.steps, problem.conditions);
+      arguments.guess.empty() ? usual_guess(problem) : guess_from_file(arguments.guess, *problem.scene);
   BoundaryReport report = solve_boundary_values(problem);
   const bool places = report.converged && problem.conditions.start_held && problem.conditions.end_held;
   if (places && report.doubt.empty()) report.doubt = doubt_of_steps(problem, report);
@@ -179,7 +138,7 @@ void run_boundary(BoundaryArguments arguments, Session& session) {
       Integrator(entry.scene, session.registry, session.solvers, problem.options).method().name;
   print(arguments.json ? boundary_json(report, problem, method) : boundary_text(report, problem, method));
   if (places && arguments.guess.empty())
-    if (const std::string other = other_motion(problem, report, session); !other.empty()) say(other);
+    if (const std::string other = other_motion(problem, report); !other.empty()) say(other);
   if (report.converged && !report.doubt.empty()) {
     say("doubted: " + report.doubt);
     session.exit_status = doubted;

@@ -3,17 +3,16 @@
 #include <CLI/App.hpp>
 #include <algorithm>
 #include <cmath>
-#include <diracstep/boundary_values/optimal_control.hpp>
+#include <diracstep/boundary_values/guesses.hpp>
+#include <diracstep/boundary_values/named_ends.hpp>
 #include <diracstep/command/arguments.hpp>
-#include <diracstep/command/end_conditions.hpp>
+#include <diracstep/command/guess_file.hpp>
 #include <diracstep/command/motion_search.hpp>
 #include <diracstep/command/verbs.hpp>
 #include <diracstep/core/numerics/errors.hpp>
-#include <diracstep/core/numerics/near_names.hpp>
 #include <diracstep/reports/json.hpp>
 #include <diracstep/reports/report.hpp>
 #include <diracstep/scene_format/parametric_scene_file.hpp>
-#include <limits>
 #include <memory>
 
 namespace diracstep::command {
@@ -27,27 +26,6 @@ struct ControlArguments : MotionSearchArguments {
 };
 
 constexpr int most_coordinates_of_control = 40;  // shown
-constexpr long most_control_steps = 100'000;
-
-/// Bounds NAME=VALUE of coordinates and controls.
-void take_bounds(const std::vector<std::string>& assignments, const std::string& option, bool lower,
-                 ControlProblem& problem) {
-  const Scene& scene = *problem.controlled.scene;
-  const std::vector<std::string>& controls = problem.controlled.controls;
-  std::vector<std::string> known = scene.coordinates;
-  known.insert(known.end(), controls.begin(), controls.end());
-  const auto n = static_cast<std::size_t>(scene.dimension());
-  for (const auto& [name, value] : parameters(assignments, option)) {
-    const auto found = std::ranges::find(known, name);
-    if (found == known.end())
-      throw Misuse(fmt::format("{}: '{}' is neither a coordinate nor a control of scene '{}'{}", option, name,
-                               scene.name, did_you_mean(name, known)));
-    const auto place = static_cast<std::size_t>(found - known.begin());
-    Vector& bounds = place < n ? (lower ? problem.lower_q : problem.upper_q)
-                               : (lower ? problem.controlled.lower : problem.controlled.upper);
-    bounds[static_cast<Eigen::Index>(place < n ? place : place - n)] = value;
-  }
-}
 
 /// 0 where it is round-off beside others of its kind.
 std::string shown_of(double value, double largest) {
@@ -131,32 +109,30 @@ void write_controlled(const std::string& path, const OptimalControlReport& repor
 ControlProblem control_problem(ControlArguments& arguments, Session& session) {
   const CatalogueScene entry = searched_scene(arguments, session, "control");
   SceneControl control = scene_control(arguments.scene, entry, parameters(arguments.set));
-  const StepGrid grid = searched_steps(arguments, entry, most_control_steps);
+  const StepGrid grid = searched_steps(arguments, entry);
   if (arguments.to.empty() && !control.end_cost)
     throw Misuse(
         "--to NAME=VALUE says what is asked of the end, or 'end_cost' of [control] what an end costs");
   const Scene& scene = *entry.scene;
+  const Parameters to = parameters(arguments.to, "--to");
   ControlProblem problem{{entry.scene, control.names, control.force, control.cost, control.end_cost,
                           control.lower, control.upper, control.kinks},
                          session.registry,
                          session.solvers,
                          integrator_options(session, arguments.method),
                          grid.steps,
-                         arguments.from.empty() ? conditions_from_start(*completed(entry.scene), arguments.to)
-                                                : conditions_at_ends(scene, arguments.from, arguments.to),
+                         arguments.from.empty()
+                             ? conditions_from_start(*completed(entry.scene), to)
+                             : conditions_at_ends(scene, parameters(arguments.from, "--from"), to),
                          {}};
   problem.options.step = grid.step;
   problem.guessed_controls = control.values;
   problem.degree = arguments.degree;
   problem.max_iterations = arguments.iterations;
   problem.tolerance = arguments.tolerance;
-  constexpr double infinite = std::numeric_limits<double>::infinity();
-  problem.lower_q = Vector::Constant(scene.dimension(), -infinite);
-  problem.upper_q = -problem.lower_q;
-  take_bounds(arguments.at_least, "--at-least", true, problem);
-  take_bounds(arguments.at_most, "--at-most", false, problem);
-  problem.guess =
-      guess_of(arguments, entry.scene, session, problem.options, problem.steps, problem.conditions);
+  set_bounds(problem, parameters(arguments.at_least, "--at-least"),
+             parameters(arguments.at_most, "--at-most"));
+  problem.guess = arguments.guess.empty() ? usual_guess(problem) : guess_from_file(arguments.guess, scene);
   return problem;
 }
 
@@ -167,13 +143,8 @@ void run_control(ControlArguments arguments, Session& session) {
   const std::string method =
       Integrator(problem.controlled.scene, session.registry, session.solvers, problem.options).method().name;
   print(arguments.json ? control_json(report, problem, method) : control_text(report, problem, method));
-  constexpr double far_off = 1e-4;
-  if (report.converged && !(report.end_of_run <= far_off)) {
-    say(fmt::format(
-        "doubted: a run with these controls ends off by {:.2g}, as where the motion is not "
-        "stable, steps are too large, or it crosses a jump of the formulas within a step, where a "
-        "run divides its step and this search does not",
-        report.end_of_run));
+  if (!report.doubt.empty()) {
+    say("doubted: " + report.doubt);
     session.exit_status = doubted;
   }
   if (report.converged) return;

@@ -17,6 +17,7 @@ from .catalogue import catalogue, load, methods, parse
 from .callbacks import GeneratingFunction
 from .command import Equilibrium, Fit, SolvedStart
 from .command import sweep_of_file as sweep
+from .ends import BoundaryMotion, ControlledMotion
 from .errors import CallbackCost, Doubt, Error, Failure, Interrupted, Misuse
 from .integrator import Gradient, Integrator, Jacobian, State
 from .run import Ensemble, Event, Points, Run, Search, Statistics
@@ -27,8 +28,8 @@ from .symbols import (acos, acosh, asin, asinh, atan, atan2, atanh, cos, cosh, e
 
 __version__ = version()
 
-__all__ = ["CallbackCost", "Doubt", "Ensemble", "Equilibrium", "Error", "Event", "Failure", "Fit", "GeneratingFunction",
-           "Gradient", "Integrator", "Interrupted", "Jacobian", "Misuse", "Points", "Run", "Scene", "Search", "SolvedStart",
-           "State", "Statistics", "Study", "acos", "acosh", "asin", "asinh", "atan", "atan2", "atanh", "catalogue", "cos",
-           "cosh", "exp", "load", "log", "maximum", "methods", "minimum", "parse", "pi", "sign", "sin", "sinh", "sqrt", "sweep",
-           "tan", "tanh", "version"]
+__all__ = ["BoundaryMotion", "CallbackCost", "ControlledMotion", "Doubt", "Ensemble", "Equilibrium", "Error", "Event",
+           "Failure", "Fit", "GeneratingFunction", "Gradient", "Integrator", "Interrupted", "Jacobian", "Misuse",
+           "Points", "Run", "Scene", "Search", "SolvedStart", "State", "Statistics", "Study", "acos", "acosh", "asin",
+           "asinh", "atan", "atan2", "atanh", "catalogue", "cos", "cosh", "exp", "load", "log", "maximum", "methods",
+           "minimum", "parse", "pi", "sign", "sin", "sinh", "sqrt", "sweep", "tan", "tanh", "version"]

@@ -13,7 +13,7 @@ from typing import Any, Callable
 
 from .errors import raised
 
-VERSION = 5  # DIRACSTEP_VERSION_OF_C_INTERFACE
+VERSION = 6  # DIRACSTEP_VERSION_OF_C_INTERFACE
 PLUGIN_VERSION = 1  # DIRACSTEP_PLUGIN_VERSION
 FILE = "libdiracstep.so.0.1"
 
@@ -177,7 +177,31 @@ COTANGENT = CFUNCTYPE(c_int, c_void_p, POINTER(State), Numbers, Numbers, Numbers
 
 class Derivatives(Structure):
     _fields_ = [("steps", c_long), ("parameters", c_int), ("parameter", POINTER(c_char_p)), ("q", c_void_p),
-                ("v", c_void_p), ("p", c_void_p), ("by_parameters", c_void_p), ("cotangent", COTANGENT), ("data", c_void_p)]
+                ("v", c_void_p), ("p", c_void_p), ("by_parameters", c_void_p), ("cotangent", COTANGENT), ("data", c_void_p),
+                ("stop", POINTER(c_int))]
+
+
+class Ends(Structure):
+    _fields_ = [("of_start", c_int), ("at_start", POINTER(Parameter)), ("of_end", c_int), ("at_end", POINTER(Parameter)),
+                ("periodic", c_int), ("guesses", c_int), ("guess_time", c_void_p), ("guess_q", c_void_p), ("guess_v", c_void_p),
+                ("max_iterations", c_int), ("stop", POINTER(c_int))]
+
+
+class Boundary(Structure):
+    _fields_ = [("iterations", c_int), ("correction", c_double), ("residual", c_double), ("method", c_char_p),
+                ("doubt", c_char_p), ("other", c_char_p), ("no_action", c_char_p), ("action", c_double), ("gradient", Numbers),
+                ("hessian", Numbers), ("free_directions", c_int), ("multipliers", c_int), ("multiplier", Numbers)]
+
+
+class Control(Structure):
+    _fields_ = [("of_least", c_int), ("least", POINTER(Parameter)), ("of_greatest", c_int), ("greatest", POINTER(Parameter)),
+                ("degree", c_int), ("tolerance", c_double)]
+
+
+class Controlled(Structure):
+    _fields_ = [("iterations", c_int), ("cost", c_double), ("residual", c_double), ("end_of_run", c_double),
+                ("method", c_char_p), ("doubt", c_char_p), ("controls", c_int), ("name", POINTER(c_char_p)),
+                ("control_points", c_long), ("control_time", Numbers), ("control_value", Numbers)]
 
 
 # Handles and columns go as plain addresses: a call then costs a fraction of a microsecond.
@@ -209,6 +233,10 @@ _PROTOTYPES: dict[str, tuple[Any, list[Any]]] = {
     "solve": (c_int, [c_void_p, POINTER(Options), POINTER(Course), POINTER(ErrorRequest), POINTER(Points),
                       POINTER(Found)]),
     "run_ensemble": (c_int, [c_void_p, POINTER(Options), POINTER(Ensemble), POINTER(Points), POINTER(Table)]),
+    "solve_boundary": (c_int, [c_void_p, POINTER(Options), POINTER(Ends), POINTER(Points), POINTER(Boundary)]),
+    "solve_control": (c_int, [c_void_p, POINTER(Options), POINTER(Ends), POINTER(Control), POINTER(Points),
+                              POINTER(Controlled)]),
+    "can_control": (c_int, []),
 }
 
 

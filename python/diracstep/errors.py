@@ -6,7 +6,7 @@ import re
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .run import Run
+    from .run import Points
 
 
 class Error(Exception):
@@ -23,7 +23,7 @@ class Failure(Error, RuntimeError):
     ``run`` holds what was computed before, or is None.
     """
 
-    run: Run | None = None
+    run: Points | None = None
 
 
 class Doubt(UserWarning):

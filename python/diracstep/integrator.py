@@ -14,7 +14,7 @@ import numpy as np
 from . import _library as c
 from .arrays import column, real, texts, whole
 from .errors import Doubt, Misuse, spelled
-from .options import momentum_from, options_from
+from .options import momentum_from, options_from, stop_flag
 from .plan import TextTable
 from .run import Event, Statistics, event_from
 
@@ -166,7 +166,8 @@ class Integrator:
     def jacobian(self, steps: int, parameters: Sequence[str] = ()) -> Jacobian:
         """Takes so many steps; the exact derivatives of their end by q, by v and by parameters of the scene where they began.
 
-        Parameters move the start as the scene's file says.
+        Parameters move the start as the scene's file says.  Ctrl-C ends it with KeyboardInterrupt, where the motion has come to by
+        then.
         """
         parameters = texts(parameters, "parameters")
         n, wanted = len(self.scene._coordinates), self._derivatives(steps, parameters)
@@ -221,8 +222,15 @@ class Integrator:
         return c.Derivatives(steps=whole(steps, "steps", 1), parameters=len(parameters), parameter=names)
 
     def _differentiate(self, wanted: Any) -> None:
+        flag = stop_flag()
+        wanted.stop = ctypes.pointer(flag)
         with self._lock:
-            self._check(c.lib.differentiate(self.scene._handle, self._handle, ctypes.byref(wanted)))
+            code, message = c.call_interruptibly(
+                lambda: c.lib.differentiate(self.scene._handle, self._handle, ctypes.byref(wanted)), flag)
+        if code == c.INTERRUPTED:
+            raise KeyboardInterrupt(message)
+        if code != c.OK:
+            self.scene._raise(code, message)
 
     def reset(self, q: Any = None, v: Any = None, t: float | None = None) -> None:
         """Starts anew: at the scene's start, or at a consistent point of one's own.  A column that is not given is the scene's;

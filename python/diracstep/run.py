@@ -155,6 +155,19 @@ class Points:
             return table
         return pandas.DataFrame(columns)
 
+    def plot(self, *names: str, x: str = "t", ax: Any = None, **style: Any) -> Any:
+        """Draws quantities (all coordinates without names) over the time or another quantity; the axes of matplotlib."""
+        if ax is None:
+            ax = _pyplot().subplots()[1]
+        for name in names or self.scene.coordinates:
+            ax.plot(self[x], self[name], **{"label": name, **style})
+        ax.set_xlabel(_labelled(x, self.scene))
+        if len(names) == 1:
+            ax.set_ylabel(_labelled(names[0], self.scene))
+        else:
+            ax.legend()
+        return ax
+
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Run(Points):
@@ -216,19 +229,6 @@ class Run(Points):
         if what == "jacobian":
             return integrator.jacobian(steps, *arguments)
         return integrator.gradient(steps, *arguments)
-
-    def plot(self, *names: str, x: str = "t", ax: Any = None, **style: Any) -> Any:
-        """Draws quantities (all coordinates without names) over the time or another quantity; the axes of matplotlib."""
-        if ax is None:
-            ax = _pyplot().subplots()[1]
-        for name in names or self.scene.coordinates:
-            ax.plot(self[x], self[name], **{"label": name, **style})
-        ax.set_xlabel(_labelled(x, self.scene))
-        if len(names) == 1:
-            ax.set_ylabel(_labelled(names[0], self.scene))
-        else:
-            ax.legend()
-        return ax
 
     def animate(self, x: str, y: str, *, frames: int = 200, interval: int = 40, ax: Any = None) -> Any:
         """A point that moves in the plane of two quantities, with its path: a matplotlib.animation.FuncAnimation.

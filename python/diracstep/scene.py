@@ -2,33 +2,28 @@
 
 from __future__ import annotations
 
-import ctypes
 import os
-import warnings
-from pathlib import Path
-from typing import Any, Callable, Mapping, NoReturn, Sequence
+from typing import Any, Callable, Mapping, Sequence
 
 import numpy as np
 
-from . import _library as c
-from .arrays import address, column, flag, real, reals, table, text, whole
+from .arrays import column, flag, real, reals, text, whole
 from .callbacks import CallbackScene, GeneratingFunction, say_cost
 from .command import Equilibrium, Fit, SolvedStart, Varied, Verbs, fit, sweep
-from .errors import Doubt, Failure, Interrupted, Misuse, raised, spelled
+from .ends import BoundaryMotion, ControlledMotion, boundary_of, control_of
+from .errors import Misuse
 from .integrator import Integrator
-from .opening import checked, names_of, parts_of, require_names, source_of
-from .options import course_of, momentum_from, options_from, stop_flag
+from .motions import ensemble_of, run_of, search_of, times_every
+from .opened_scene import OpenedScene
+from .opening import names_of, parts_of, require_names
+from .options import course_of
 from .plan import TextTable
-from .points import Points
-from .progress import Progress
-from .run import Ensemble, Event, Run, Search, Statistics, event_from, search_from
+from .run import Ensemble, Run
 from .scene_text import SceneText, start_values
 from .study import Study, run_study
 
-_ROOM = 1024  # points of a run whose number is not known
 
-
-class Scene:
+class Scene(OpenedScene):
     """A mechanical system with constraints: L(q, v, t), rows A(q, t) v + b(q, t) = 0 or φ(q, t) = 0, a force, and a start.
 
     The functions are called **once**, with symbols, and become a compiled scene; nothing of Python runs in a step::
@@ -95,61 +90,11 @@ class Scene:
         self._open(text=written, name=name, coordinates=coordinates, plugins=plugins, methods=methods,
                    drop_redundant=drop_redundant, tolerances=tolerances)
 
-    # ---- opening ----
     @classmethod
     def _made(cls, **given: Any) -> Scene:
         scene = cls.__new__(cls)
         scene._open(**given)
         return scene
-
-    def _open(self, *, name: str | None = None, text: str | None = None, callbacks: CallbackScene | None = None,
-              coordinates: Sequence[str] | None = None, parameters: Mapping[str, float] | None = None,
-              plugins: Sequence[str] = (), methods: Sequence[GeneratingFunction] = (), drop_redundant: bool = False,
-              tolerances: Mapping[str, float] | None = None) -> None:
-        self._handle = 0
-        self._callbacks = callbacks
-        self._tolerances = reals(tolerances, "tolerances")
-        self._changes = {key: real(value, f"the parameter {key}") for key, value in (parameters or {}).items()}
-        loaded = checked(plugins, methods, drop_redundant)
-        self._methods = loaded["methods"]
-        self._again: dict[str, Any] = {"name": name, "text": text, "coordinates": coordinates, "tolerances": self._tolerances,
-                                       **loaded}
-        source, kept = source_of(name, text, callbacks, self._changes, tolerances=self._tolerances, **loaded)
-        handle = ctypes.c_void_p()
-        self._check(c.lib.open(c.VERSION, ctypes.byref(source), ctypes.byref(handle)))
-        del kept
-        self._handle = handle.value or 0
-        self._close = c.lib.close  # there until the end of the interpreter
-        if name is not None and name.endswith((".toml", ".cir")) and text is None:
-            self._again["name"] = os.path.abspath(name)  # also where the process moves to another folder
-            text = Path(name).read_text(encoding="utf-8")
-        self.text = text  #: of the scene file; None for scenes of the catalogue, of plugins, and of callbacks
-        self._read_facts(coordinates)
-
-    def _read_facts(self, coordinates: Sequence[str] | None) -> None:
-        facts = c.Facts()
-        self._check(c.lib.read_facts(self._handle, ctypes.byref(facts)))
-        listed = self._lines(c.COORDINATES)
-        # The sizes of what the library writes: not to be changed from outside.
-        self._coordinates = tuple(coordinates or (name for name, _, _ in listed))
-        self._rows = tuple(name for name, in self._lines(c.ROWS))
-        self._invariants = tuple(name for name, _ in self._lines(c.INVARIANTS))
-        self._outputs = tuple(name for name, in self._lines(c.OUTPUTS))
-        n = facts.dimension
-        self._widths = {"q": n, "v": n, "p": n, "lambda_": facts.rows, "invariants": facts.invariants, "outputs": facts.outputs}
-        self.inputs: dict[str, tuple[float, float]] = {  #: tables of the time, and between which times they have values
-            name: (float(first), float(last)) for name, first, last in self._lines(c.INPUTS)}
-        self.events: dict[str, str] = {name: what for name, what in self._lines(c.EVENTS)}  #: by name: "record", "stop" or "act"
-        self.units: dict[str, str] = {name: unit for name, (_, unit, _) in zip(self._coordinates, listed)}
-        self.parameters: dict[str, float] = {name: float(value) for name, value, _, _ in self._lines(c.PARAMETERS)}
-        self.about: list[tuple[str, str]] = [(what, text) for what, text in self._lines(c.ABOUT)]  #: what the scene says of itself
-        self.name: str = self.about[0][1]
-        self.start_time: float = facts.start_time
-        self.start_q = np.ctypeslib.as_array(facts.start_q, (n,)).copy()
-        self.start_v = np.ctypeslib.as_array(facts.start_v, (n,)).copy()
-        self.start_q.flags.writeable = self.start_v.flags.writeable = False
-        self.until: float = facts.end_time  #: where a run ends that is given no other end
-        self.step: float = facts.step  #: a coarse but sensible step
 
     @property
     def coordinates(self) -> list[str]:
@@ -183,10 +128,6 @@ class Scene:
             raise Misuse("the tolerances of a scene of callbacks are stated where it is made")
         again: dict[str, Any] = {**self._again, "tolerances": {**self._tolerances, **reals(tolerances, "tolerances")}}
         return Scene._made(**again, parameters=self._changes)
-
-    def __del__(self) -> None:
-        if getattr(self, "_handle", 0):
-            self._close(self._handle)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """A scene is copied and pickled as what it was made from, and made anew from that."""
@@ -228,94 +169,12 @@ class Scene:
                 until=until, steps=steps, at=at, every_time=every_time, error=error, every=every, momentum=momentum,
                 progress=progress, max_solves=max_solves, max_time=max_time, **options)
         if every_time is not None:
-            at = self._times(real(every_time, "every_time"), self.until if until is None else real(until, "until"))
+            at = times_every(self, real(every_time, "every_time"), self.until if until is None else real(until, "until"))
         progress = None if progress is None else flag(progress, "progress")
-        course, kept = course_of(every, momentum, steps, at)
+        course, times = course_of(every, momentum, steps, at)
         if error is not None:
-            return self._search(course, error, until, options, max_solves, max_time, progress)
-        end = None if steps is not None else self._end(until, kept, options)
-        fixed = steps is not None or at is not None and bool(self.events)
-        integrator = Integrator(self, end, False, options, fixed)
-        room = c.lib.expect(integrator._handle, ctypes.byref(course))
-        if room > 2**40:
-            raise Misuse(f"{room} points would be kept; take a larger every")
-        points = self._points(room or _ROOM)
-        with Progress(progress, points, room, self.start_time, end) as bar:
-            code, message = c.call_interruptibly(
-                lambda: c.lib.run(integrator._handle, ctypes.byref(course), points.reference()), course.flag,
-                bar.show)
-        taken = integrator.statistics
-
-        return self._finished(points, code, message, statistics=taken, doubt=integrator.doubt,
-                              events=integrator.events, again=None if at is not None else (end, options, taken.steps))
-
-    def _end(self, until: float | None, times: np.ndarray, options: dict[str, Any]) -> float:
-        """Where steps are to lead: as far as the times to show, where that is farther than the end of the scene."""
-        if until is not None or not times.size:
-            return self.until if until is None else real(until, "until")
-        last, varies = float(times[-1]), bool(options.get("adaptive") or options.get("eps"))
-        inside = (last - self.start_time) * (self.until - last) >= 0.0
-        return self.until if inside and not varies else last
-
-    def _times(self, between: float, end: float) -> np.ndarray:
-        if between <= 0.0:
-            raise Misuse(f"every_time is {between}; a number above 0 is needed")
-        span = end - self.start_time
-        count = np.floor(abs(span) / between + 1e-9)
-        if count > 1e8:
-            raise Misuse(f"every_time = {between:g} asks for {count:g} points; 1e8 are the most")
-        return self.start_time + np.copysign(np.arange(count + 1.0) * between, span)
-
-    def _search(self, course: Any, error: float, until: float | None, options: dict[str, Any], max_solves: int, max_time: float,
-                progress: bool | None) -> Run:
-        for name in ("eps", "smallest_step", "max_steps"):
-            if options.get(name) is not None:
-                raise Misuse(f"{name} goes with no error: the search finds the steps; max_solves and max_time limit it")
-        kind = options.pop("adaptive", None)
-        kind = None if kind is None else flag(kind, "adaptive")
-        request = c.ErrorRequest(error=real(error, "error"), steps=0 if kind is None else 2 if kind else 1,
-                                 max_solves=whole(max_solves, "max_solves"), max_time=real(max_time, "max_time"))
-        chosen, found = options_from(options, until), c.Found()
-        points = self._points(_ROOM)
-        told: list[Search] = []
-        events: list[Event] = []
-
-        def call() -> int:
-            code = c.lib.solve(self._handle, ctypes.byref(chosen), ctypes.byref(course), ctypes.byref(request), points.reference(),
-                               ctypes.byref(found))
-            if found.runs.columns:  # texts belong to this thread, and to its last call
-                told.append(search_from(found))
-                events.extend(event_from(found.event[k], self._widths["q"]) for k in range(found.events))
-            return code
-
-        with Progress(progress, points, 0, self.start_time, None) as bar:
-            code, message = c.call_interruptibly(call, course.flag, bar.show)
-        search = told[0] if told else None
-        again = None
-        if search and not search.varies and not self.events:
-            found_steps = {**options, "method": search.method, "order": search.order, "step": search.step}
-            again = self.until if until is None else real(until, "until"), found_steps, None
-        return self._finished(points, code, message, search=search, doubt=search.warning if search else "", events=events,
-                              again=again)
-
-    def _points(self, room: int) -> Points:
-        return Points(self._widths, room)
-
-    def _finished(self, points: Points, code: int, message: str, *, statistics: Statistics | None = None,
-                  search: Search | None = None, doubt: str = "", events: list[Event] | None = None,
-                  again: Any = None) -> Run:
-        arrays: dict[str, Any] = points.finish()
-        run = Run(self, **arrays, statistics=statistics, search=search, doubt=doubt, interrupted=code == c.INTERRUPTED,
-                  events=events or [], _again=again if code == c.OK else None)
-        if points.failure is not None:
-            raise points.failure
-        if code == c.INTERRUPTED:
-            warnings.warn(spelled(message), Interrupted, stacklevel=3)
-        elif code != c.OK:
-            self._raise(code, message, run)
-        if doubt:
-            warnings.warn(f"{self.name}: {spelled(doubt)}", Doubt, stacklevel=3)
-        return run
+            return search_of(self, course, error, until, options, max_solves, max_time, progress)
+        return run_of(self, course, times, until, options, progress)
 
     def ensemble(self, q: Any, v: Any = None, *, t: Any = None, until: float | None = None, steps: int | None = None,
                  threads: int = 0, momentum: str = "projected", **options: Any) -> Ensemble:
@@ -326,42 +185,7 @@ class Scene:
         Warns with Doubt where the checks of a run, which go along with at most twenty members, find one not to be believed.
         Ctrl-C ends it with KeyboardInterrupt.
         """
-        starts_q = np.asarray(q)
-        if starts_q.ndim != 2:
-            raise Misuse(f"q has shape {starts_q.shape}; (members, {len(self._coordinates)}) is needed: a start in each row")
-        members = len(starts_q)
-        shape = (members, len(self._coordinates))
-        starts_q = table(starts_q, shape, "q")
-        starts_v = None if v is None else table(v, shape, "v")
-        times = None if t is None else table(t, (members,), "t")
-        flag, points = stop_flag(), Points(self._widths, members, grows=False)
-        request = c.Ensemble(members=members, q=starts_q.ctypes.data, v=address(starts_v), time=address(times),
-                             steps=0 if steps is None else whole(steps, "steps", 1), momentum=momentum_from(momentum),
-                             threads=whole(threads, "threads", most=2**31 - 1), stop=ctypes.pointer(flag))
-        request.kept = starts_q, starts_v, times  # the call may go on after a second Ctrl-C has left this function
-        chosen = options_from(options, None if steps is not None else self.until if until is None else until)
-        told: dict[str, dict[int, str]] = {"failed": {}, "doubted": {}}
-        table_of = c.Table()
-
-        def call() -> int:
-            code = c.lib.run_ensemble(self._handle, ctypes.byref(chosen), ctypes.byref(request), points.reference(),
-                                      ctypes.byref(table_of))
-            for member, what, why in table_of.lines():
-                told[what][int(member)] = why
-            return code
-
-        for array in points.arrays.values():
-            array[:] = np.nan  # what cannot be read stays so
-        if members:
-            code, message = c.call_interruptibly(call, flag)
-            if code == c.INTERRUPTED:
-                raise KeyboardInterrupt(message)
-            if code != c.OK:
-                self._raise(code, message)
-        if told["doubted"]:
-            member, why = next(iter(told["doubted"].items()))
-            warnings.warn(f"{self.name}: member {member}: {spelled(why)}", Doubt, stacklevel=2)
-        return Ensemble(self, **points.arrays, failures=told["failed"], doubts=told["doubted"])
+        return ensemble_of(self, q, v, t, until, steps, threads, momentum, options)
 
     def integrator(self, *, until: float | None = None, pushed: bool = False, **options: Any) -> Integrator:
         """An integrator at the scene's start, to be stepped by hand; options as for ``run``.  Steps are of one size unless
@@ -370,6 +194,35 @@ class Scene:
         until: where the motion will end: a fixed step is then fitted to it.  pushed: ``push`` will be used.
         """
         return Integrator(self, until, pushed, options)
+
+    def boundary(self, to: Any = None, *, start: Any = None, periodic: bool = False, until: float | None = None, guess: Any = None,
+                 max_iterations: int = 60, **options: Any) -> BoundaryMotion:
+        """The motion from one end to another, all steps solved at once.
+
+        to, start: what is asked of the end and of the start, a place or {"x": 1.0, "v_x": 0.5, "p_y": 0.0}; without ``start`` its
+        place is that of the scene.  periodic: q and v at the end as at the start, instead.
+        until: time of the end.  guess: a run, another such motion or {"t": …, "q": …, "v": …} that the search begins with; without
+        it a straight line between two places, else the motion from the scene's start.  options: method, order, step and others of
+        ``run`` for steps of one size.
+
+        Raises Misuse where the conditions are too many or too few; Failure, whose ``run`` is the last iterate, where the search
+        does not converge.  Warns with Doubt where the steps are too large.  Ctrl-C ends it with KeyboardInterrupt.
+        """
+        return boundary_of(self, to, start, periodic, until, guess, max_iterations, options)
+
+    def control(self, to: Any = None, *, start: Any = None, at_least: Mapping[str, float] | None = None,
+                at_most: Mapping[str, float] | None = None, degree: int = 0, until: float | None = None, guess: Any = None,
+                tolerance: float = 1e-9, max_iterations: int = 500, **options: Any) -> ControlledMotion:
+        """The controls of least cost, for a scene whose file has a table [control]; needs a library with Ipopt.
+
+        to, start: as for ``boundary``, but any number; without ``start`` place and velocity are those of the scene's start.
+        at_least, at_most: bounds by name of coordinates at the ends of steps, and of controls.  degree: of the polynomials in t
+        that controls are in each step.  until, guess, options: as for ``boundary``.  tolerance: of the optimality conditions.
+
+        Raises Misuse without Ipopt or [control]; Failure, whose ``run`` is the last iterate, where the search does not converge.
+        Warns with Doubt where a run with these controls ends elsewhere.  Ctrl-C ends it with KeyboardInterrupt.
+        """
+        return control_of(self, to, start, at_least, at_most, degree, until, guess, tolerance, max_iterations, options)
 
     @property
     def plan(self) -> TextTable:
@@ -441,24 +294,6 @@ class Scene:
         varied = Varied(grid or {}, table or {}, random or {}, sobol or {}, count, seed)
         recorded = {"values": record, "extrema": extrema, "events": events, "derivatives": derivatives}
         return sweep(self, varied, recorded, settings, out, whole(threads, "threads"))
-
-    # ---- inside ----
-    def _lines(self, what: int) -> list[tuple[str, ...]]:
-        return c.lines_of(self._handle, what)
-
-    def _check(self, code: int) -> None:
-        if code != c.OK:
-            self._raise(code, c.lib.message().decode())
-
-    def _raise(self, code: int, message: str, run: Run | None = None) -> NoReturn:
-        """The exception for a code, with what a callback raised as its cause."""
-        exception = raised(code, message)
-        if isinstance(exception, Failure):
-            exception.run = run
-        for owner in [self._callbacks, *self._methods]:
-            if owner is not None and owner.exceptions.kept is not None:
-                raise exception from owner.exceptions.take()
-        raise exception
 
     def __repr__(self) -> str:
         return f"<scene {self.name}: {', '.join(self.coordinates)}; {len(self.rows)} rows>"

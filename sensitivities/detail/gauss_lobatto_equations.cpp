@@ -1,4 +1,5 @@
 #include <diracstep/core/steps/gauss_lobatto/tableau.hpp>
+#include <diracstep/sensitivities/detail/gauss_lobatto_products.hpp>
 #include <diracstep/sensitivities/detail/stage_equations.hpp>
 #include <utility>
 #include <vector>
@@ -23,7 +24,8 @@ class GaussLobattoEquations final : public StageEquations<Matrix> {
         size_(scene_->size()),
         m_(scene_->rows()),
         table_(gauss_lobatto_tableau(s)),
-        nodes_(static_cast<std::size_t>(s)) {}
+        nodes_(static_cast<std::size_t>(s)),
+        products_(scene_, s) {}
 
   void take(const SolvedStage& at, StageJacobians<Matrix>& out) override {
     begin(this->problem(), at);
@@ -42,6 +44,15 @@ class GaussLobattoEquations final : public StageEquations<Matrix> {
     out.end_by_unknowns = end_x.result();
     out.end_by_start = end.result();
   }
+
+  const Matrix& take_transposed(const SolvedStage& at) override {
+    begin(this->problem(), at);
+    this->taken_.by_unknowns = jacobian_of<Matrix>(this->problem(), at.x);
+    products_.take(at);
+    return this->taken_.by_unknowns;
+  }
+  Columns pull_end(const Columns& end) override { return products_.end_by_unknowns(end); }
+  Columns pull_start(const Columns& end, const Columns& w) override { return products_.by_start(end, w); }
 
   /// h Σ b_i L(Q_i, V_i).
   std::optional<double> action(const SolvedStage& at) override {
@@ -115,6 +126,7 @@ class GaussLobattoEquations final : public StageEquations<Matrix> {
   int s_, n_, size_, m_;
   GaussLobattoTableau table_;
   std::vector<ExtendedScene::LagrangianAt<Matrix>> nodes_;
+  GaussLobattoProducts products_;
 };
 
 /// With P = Dθ(q0)ᵀν:

@@ -25,6 +25,7 @@ class GeneratingFunctionEquations final : public StageEquations<Matrix> {
         m_(scene_->rows()),
         inner_(s_->inner_columns()),
         unknowns_(n_ + m_ + n_ * inner_),
+        plain_(!has_force() && m_ == 0 && inner_ == 0),
         y_(Columns::Zero(size_, s_->columns())),
         hessian_(Columns::Zero(s_->pattern().nonzeros(), s_->pairs())) {}
 
@@ -73,7 +74,65 @@ class GeneratingFunctionEquations final : public StageEquations<Matrix> {
     out.end_by_start = stacked(end_position.by_start, end_momentum.by_start);
   }
 
+  /// Of a step of S alone by products with its second derivatives.
+  const Matrix& take_transposed(const SolvedStage& at) override {
+    if (!plain_) return StageEquations<Matrix>::take_transposed(at);
+    move_to(at);
+    s_->hessian(at.step, y_, hessian_);
+    h_ = at.step.size;
+    this->taken_.by_unknowns =
+        part_of<Matrix>(s_->pattern(), hessian_.col(s_->pair(0, 1)).data(), 0, n_, 0, n_);
+    this->taken_.by_unknowns *= -equation_factor() * end_factor();
+    return this->taken_.by_unknowns;
+  }
+  Columns pull_end(const Columns& end) override {
+    if (!plain_) return StageEquations<Matrix>::pull_end(end);
+    Columns result(n_, end.cols());
+    for (Eigen::Index k = 0; k < end.cols(); ++k)
+      result.col(k) = end_factor() * pulled(end.col(k), Vector::Zero(n_)).end.head(n_);
+    return result;
+  }
+  Columns pull_start(const Columns& end, const Columns& w) override {
+    if (!plain_) return StageEquations<Matrix>::pull_start(end, w);
+    Columns result = Columns::Zero(size_ + n_, end.cols());
+    for (Eigen::Index k = 0; k < end.cols(); ++k) {
+      const Pulled of = pulled(end.col(k), w.col(k));
+      auto z = result.col(k);
+      const bool position = graph_.starts_from_position;
+      if (is_position(0)) z.segment(n_, size_ - n_) += of.start.tail(size_ - n_);
+      if (is_position(1)) z.segment(n_, size_ - n_) += of.end.tail(size_ - n_);
+      z.segment(position ? 0 : size_, n_) += of.start.head(n_);
+      if (by_increment_) z.head(n_) += of.end.head(n_);
+      z.segment(position ? size_ : 0, n_) -= (position ? h_ : 1.0) * w.col(k);
+    }
+    return result;
+  }
+
  private:
+  /// Cotangents of the columns of S, N numbers each.
+  struct Pulled {
+    Vector start, end;
+  };
+  double equation_factor() const { return graph_.start_sign * (graph_.starts_from_position ? h_ : 1.0); }
+  double end_factor() const { return graph_.ends_at_position ? 1.0 : 1.0 / h_; }
+
+  /// Of z̄1·z1 − w·F, with z1 and F by the columns as take() has them.
+  Pulled pulled(ConstVectorRef end, ConstVectorRef w) const {
+    const auto q = end.head(n_), p = end.tail(n_);
+    Vector of_start = Vector::Zero(size_), of_end = of_start;
+    of_start.head(n_) = equation_factor() * w;
+    of_end.head(n_) = graph_.end_sign * (graph_.ends_at_position ? p : q);
+    Pulled sum{Vector::Zero(size_), Vector::Zero(size_)};
+    const auto values = [&](int i, int j) { return hessian_.col(s_->pair(i, j)).data(); };
+    const SparsityPattern& pattern = s_->pattern();
+    pattern.transposed_multiply_add(values(0, 0), of_start.data(), sum.start.data());
+    pattern.multiply_add(values(0, 1), of_end.data(), sum.start.data());
+    pattern.transposed_multiply_add(values(0, 1), of_start.data(), sum.end.data());
+    pattern.transposed_multiply_add(values(1, 1), of_end.data(), sum.end.data());
+    sum.end.head(n_) += graph_.ends_at_position ? q : p;
+    return sum;
+  }
+
   /// A column of n numbers: its derivatives by x and by z.
   struct Moved {
     Matrix by_unknowns, by_start;
@@ -279,7 +338,9 @@ class GeneratingFunctionEquations final : public StageEquations<Matrix> {
   GraphOf graph_;
   bool by_increment_;
   int n_, size_, m_, inner_, unknowns_;
+  bool plain_;  ///< no force, no rows, no inner columns: S alone
   Columns y_, hessian_;
+  double h_ = 0.0;
   Vector q1_, increment_, lambda_;
 };
 

@@ -1,5 +1,7 @@
+#include <algorithm>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/sensitivities/detail/linear_factor.hpp>
+#include <span>
 #include <vector>
 #ifdef DIRACSTEP_WITH_KLU
 #include <klu.h>
@@ -40,18 +42,34 @@ struct LinearFactor<Sparse>::Factors {
   }
   /// The ordering is that of the pattern, which is the same from step to step.
   void analyse(const Sparse& matrix, int* starts, int* rows) {
-    const std::vector<int> now_starts(starts, starts + matrix.outerSize() + 1),
-        now_rows(rows, rows + matrix.nonZeros());
-    klu_free_numeric(&numeric, &common);
-    if (symbolic != nullptr && now_starts == known_starts && now_rows == known_rows) return;
-    klu_free_symbolic(&symbolic, &common);
-    known_starts = now_starts;
-    known_rows = now_rows;
+    if (symbolic != nullptr && std::ranges::equal(known_starts, std::span(starts, matrix.outerSize() + 1)) &&
+        std::ranges::equal(known_rows, std::span(rows, matrix.nonZeros())))
+      return;
+    clear();
+    known_starts.assign(starts, starts + matrix.outerSize() + 1);
+    known_rows.assign(rows, rows + matrix.nonZeros());
     size = static_cast<int>(matrix.rows());
     symbolic = klu_analyze(size, starts, rows, &common);
     if (symbolic == nullptr) fail_singular();
   }
 
+  /// With the pivots of the matrix before, which mostly serve the next step as well; false where entries grow
+  /// by them far more than they did then.
+  bool factor_again(int* starts, int* rows, double* values) {
+    if (numeric == nullptr || klu_refactor(starts, rows, values, symbolic, numeric, &common) == 0 ||
+        common.status != KLU_OK || klu_rgrowth(starts, rows, values, symbolic, numeric, &common) == 0)
+      return false;
+    return common.rgrowth >= least_part * growth;
+  }
+  void factor(int* starts, int* rows, double* values) {
+    klu_free_numeric(&numeric, &common);
+    numeric = klu_factor(starts, rows, values, symbolic, &common);
+    if (numeric == nullptr || common.status != KLU_OK) fail_singular();
+    growth = klu_rgrowth(starts, rows, values, symbolic, numeric, &common) != 0 ? common.rgrowth : 1.0;
+  }
+
+  static constexpr double least_part = 0.1;
+  double growth = 1.0;  ///< the reciprocal pivot growth of the last full factorisation
   mutable klu_common common{};
   klu_symbolic* symbolic = nullptr;
   klu_numeric* numeric = nullptr;
@@ -65,8 +83,7 @@ void LinearFactor<Sparse>::compute(const Sparse& matrix) {
   auto* const rows = const_cast<int*>(matrix.innerIndexPtr());
   auto* const values = const_cast<double*>(matrix.valuePtr());
   f.analyse(matrix, starts, rows);
-  f.numeric = klu_factor(starts, rows, values, f.symbolic, &f.common);
-  if (f.numeric == nullptr || f.common.status != KLU_OK) fail_singular();
+  if (!f.factor_again(starts, rows, values)) f.factor(starts, rows, values);
 }
 void LinearFactor<Sparse>::solve(Columns& right) const {
   const Factors& f = *factors_;

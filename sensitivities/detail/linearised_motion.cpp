@@ -96,13 +96,14 @@ class LinearisedMotionIn final : public LinearisedMotion {
 
   void pull(std::span<const SolvedStage> step, Directions& z) override {
     for (auto stage = step.rbegin(); stage != step.rend(); ++stage) {
-      take(*stage);
+      StageEquations<Matrix>& equations = *parts_[stage->part];
+      factor_.compute(equations.take_transposed(*stage));
       Columns end(2 * n_, z.cols());
       end << z.topRows(n_), z.bottomRows(n_);
-      Columns w = jacobians_.end_by_unknowns.transpose() * end;
+      Columns w = equations.pull_end(end);
       factor_.solve_transposed(w);
       const Columns theta = z.middleRows(n_, size_ - n_);
-      z = jacobians_.end_by_start.transpose() * end - jacobians_.by_start.transpose() * w;
+      z = equations.pull_start(end, w);
       z.middleRows(n_, size_ - n_) += theta;
     }
   }

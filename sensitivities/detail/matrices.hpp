@@ -83,13 +83,17 @@ inline Columns part_of<Columns>(const SparsityPattern& pattern, const double* va
 template <>
 inline Sparse part_of<Sparse>(const SparsityPattern& pattern, const double* values, int row, int rows,
                               int column, int columns) {
-  std::vector<Eigen::Triplet<double>> entries;
-  pattern.for_each([&](Eigen::Index e, int r, int c) {
-    if (r >= row && r < row + rows && c >= column && c < column + columns)
-      entries.emplace_back(r - row, c - column, values[e]);
-  });
+  const auto starts = pattern.column_starts(), indices = pattern.row_indices();
   Sparse part(rows, columns);
-  part.setFromTriplets(entries.begin(), entries.end());
+  part.reserve(pattern.nonzeros());
+  for (int c = 0; c < columns; ++c) {  // in the order of the pattern
+    part.startVec(c);
+    for (int e = starts[static_cast<std::size_t>(column + c)];
+         e < starts[static_cast<std::size_t>(column + c) + 1]; ++e)
+      if (const int r = indices[static_cast<std::size_t>(e)]; r >= row && r < row + rows)
+        part.insertBack(r - row, c) = values[e];
+  }
+  part.finalize();
   return part;
 }
 

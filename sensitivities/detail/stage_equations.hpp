@@ -31,6 +31,17 @@ class StageEquations {
   /// At any unknowns x, solved or not.
   virtual void take(const SolvedStage& at, StageJacobians<Matrix>& out) = 0;
 
+  /// The way back: F_x of a step, and with it products with the transposes of the others, which a kind of
+  /// step may have without their matrices: G_xᵀ z̄1 and G_zᵀ z̄1 − F_zᵀ w.
+  virtual const Matrix& take_transposed(const SolvedStage& at) {
+    take(at, taken_);
+    return taken_.by_unknowns;
+  }
+  virtual Columns pull_end(const Columns& end) { return taken_.end_by_unknowns.transpose() * end; }
+  virtual Columns pull_start(const Columns& end, const Columns& w) {
+    return taken_.end_by_start.transpose() * end - taken_.by_start.transpose() * w;
+  }
+
   /// How many unknowns F_x has.  Where the step has fewer, its own are the last ones and its rows the last
   /// rows, and those before them are solved whatever x is.
   virtual int unknowns() const { return problem_->size(); }
@@ -39,6 +50,9 @@ class StageEquations {
   virtual std::optional<double> action(const SolvedStage& /*at*/) { return std::nullopt; }
 
   StepProblem& problem() { return *problem_; }
+
+ protected:
+  StageJacobians<Matrix> taken_;  ///< of the way back
 
  private:
   std::unique_ptr<StepProblem> problem_;

@@ -80,3 +80,50 @@ def test_runs_that_cannot_be_differentiated_say_so(spring):
         spring.run(steps=3).jvp(q={"y": 1.0})
     with pytest.raises(ds.Misuse, match="no parameter 'm'"):
         spring.run(steps=3).vjp(q=[1.0], parameters=["m"])
+
+
+@pytest.mark.parametrize("scene, parameters, method, options", [
+    ("pleiades", [], "type1/gl:4", {}),
+    ("toda_200", [], "type1/gl:3", {}),  # sparse
+    ("kepler_e06", [], "type1/gl:3", {}),
+    ("chaplygin_sleigh", ["m", "a"], "type1/gl:3", {}),
+    ("pendulum_cartesian", [], "type1/gl:4", {}),
+    ("lc_circuit", [], "type1/gl:2", {}),
+    ("ida_slider_crank", [], "type1/gl:3", {}),
+    ("stiff_spring_pendulum", [], "type1/gl:3", {}),
+    ("kepler_e06", [], "type1/trapezoidal", {"order": 4}),
+    ("kepler_e06", [], "type1/midpoint", {}),
+    ("kepler_e06", [], "type1/left", {}),
+    ("double_pendulum", ["g"], "type1/trapezoidal", {}),
+    ("double_pendulum", ["g"], "type2/euler", {}),
+    ("double_pendulum", ["g"], "type3/euler", {"order": 2}),
+    ("double_pendulum", [], "type4/legendre(type1/left)", {}),
+    ("chaplygin_sleigh", ["m", "a"], "type1/midpoint", {}),
+    ("kepler_e06", [], "damped/radau:3", {}),
+])
+def test_the_way_back_is_the_transpose_of_the_way_forward(scene, parameters, method, options):
+    check_the_way_back(ds.load(scene), parameters, method, options)
+
+
+@pytest.mark.parametrize("method", ["type1/gl:2", "type1/gl:4", "type1/trapezoidal", "damped/radau:2"])
+def test_the_way_back_with_a_force_and_velocities_beside_positions(method):
+    def lagrangian(q, v, k):
+        near = sum((q[i + 1] - q[i])**2 for i in range(11))
+        return v @ v / 2 - k * near / 2 - q[0]**4 + sum(q[i + 1] * q[i]**2 * v[i] for i in range(11)) / 5 + v[0]**2 * q[1]**2 / 9
+
+    chain = ds.Scene([f"x{i}" for i in range(12)], lagrangian, parameters={"k": 2.0, "d": 0.3},
+                     force=lambda q, v, d: [-d * v[i] * (1 + q[i]**2) for i in range(12)],
+                     q=[0.1 * i for i in range(12)], v=[0.3 - 0.1 * i for i in range(12)], step=0.25)
+    check_the_way_back(chain, ["k", "d"], method, {})
+
+
+def check_the_way_back(scene, parameters, method, options):
+    random = np.random.default_rng(3)
+    n = len(scene.coordinates)
+    weights = {name: random.standard_normal(n) for name in "qp"}
+    options = {"method": method, "step": scene.step / 5, **options}
+    forward = scene.integrator(**options).jacobian(6, parameters)
+    back = scene.integrator(**options).gradient(6, weights, parameters)
+    expected = weights["q"] @ forward.q + weights["p"] @ forward.p
+    found = np.concatenate([back.q, back.v, list(back.parameters.values())])
+    assert np.abs(found - expected).max() <= 1e-11 * max(1.0, np.abs(expected).max())

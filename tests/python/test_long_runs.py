@@ -157,3 +157,16 @@ def test_progress_is_shown_where_it_is_asked_for(skate, capfd):
     assert "%" in told or "tqdm" in told
     skate.run(steps=10_000, every=100, step=0.01, progress=False)
     assert capfd.readouterr().err == ""
+
+
+@pytest.mark.parametrize("derivatives", [lambda integrator: integrator.gradient(10**7, {"q": [1.0, 0.0, 0.0]}),
+                                         lambda integrator: integrator.jacobian(10**7)])
+def test_ctrl_c_ends_derivatives(derivatives):
+    integrator = ds.load("chaplygin_sleigh").integrator(method="type1/gl:2", step=1e-3)
+    timer, begin = interrupt_soon(), time.perf_counter()
+    with pytest.raises(KeyboardInterrupt):
+        derivatives(integrator)
+    timer.join()
+    assert time.perf_counter() - begin < 10.0 and integrator.time > 0.0
+    integrator.reset()
+    assert np.isfinite(integrator.gradient(3, {"q": [1.0, 0.0, 0.0]}).q).all()

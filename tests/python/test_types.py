@@ -25,7 +25,7 @@ def test_every_public_name_is_documented():
         return [getattr(owner, name) for name in vars(owner) if not name.startswith("_")]
 
     missing = [name for name in ds.__all__ if callable(getattr(ds, name)) and not (getattr(ds, name).__doc__ or "").strip()]
-    for cls in (ds.Scene, ds.Run, ds.Integrator, ds.Ensemble, ds.Study, ds.Equilibrium, ds.Fit, ds.SolvedStart):
+    for cls in (ds.Scene, ds.Points, ds.Run, ds.BoundaryMotion, ds.ControlledMotion, ds.Integrator, ds.Ensemble, ds.Study, ds.Equilibrium, ds.Fit, ds.SolvedStart):
         missing += [f"{cls.__name__}.{member.__name__}" for member in public(cls)
                     if callable(member) and not (member.__doc__ or "").strip()]
     assert not missing

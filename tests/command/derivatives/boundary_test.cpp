@@ -64,7 +64,7 @@ TEST_F(Boundary, PeriodicOrbitsHaveMultipliers) {
 TEST_F(Boundary, RefusesWithTheReason) {
   expect_misuse("boundary knife_edge --to x=1 y=1 ph=0", {"5 conditions", "6 are given", "nonholonomic"});
   expect_misuse("boundary kepler_e06 --to x=1", {"4 conditions", "3 are given"});
-  expect_misuse("boundary kepler_e06 --to z=1 y=0", {"--to", "'z'", "v_ or p_"});
+  expect_misuse("boundary kepler_e06 --to z=1 y=0", {"the end", "'z'", "v_ or p_"});
   expect_misuse("boundary kepler_e06", {"--to", "--periodic"});
   expect_misuse("boundary kepler_e06 --periodic --to x=1 y=0", {"--periodic", "--from"});
   expect_misuse("boundary pendulum_cartesian --to x=0.1 y=0.2 --end 1", {"the place at the end", "off"});
