@@ -234,11 +234,14 @@ BoundaryReport solve_boundary_values(const BoundaryProblem& problem) {
     return std::make_unique<boundary::FamilyOfEnds>(equations, at, sizes, power);
   };
   const Vector at_guess = u;
-  boundary::NewtonReport search = boundary::newton(equations, u, problem.max_iterations, factor);
-  if (conditions.families && !search.converged) {  // less damping, for conditions that are all but degenerate
+  boundary::NewtonReport search =
+      boundary::newton(equations, u, problem.max_iterations, factor, problem.go_on);
+  const bool ended = problem.go_on && !problem.go_on();
+  if (conditions.families && !search.converged &&
+      !ended) {  // less damping, for conditions that are all but degenerate
     power = 2.0;
     u = at_guess;
-    search = boundary::newton(equations, u, problem.max_iterations, factor);
+    search = boundary::newton(equations, u, problem.max_iterations, factor, problem.go_on);
   }
   BoundaryReport report;
   report.iterations = search.iterations;
@@ -252,7 +255,8 @@ BoundaryReport solve_boundary_values(const BoundaryProblem& problem) {
     report.ending =
         "no motion fulfils the conditions near the guess: they contradict each other, or the rows";
   else
-    report.ending = "Newton's method has not converged: " + search.failure + advice(conditions);
+    report.ending =
+        "Newton's method has not converged: " + search.failure + (ended ? "" : advice(conditions));
   const Solved solved{equations, integrator, problem, u};
   add_points(solved, report);
   if (!report.converged) return report;

@@ -56,6 +56,7 @@ struct BoundaryProblem {
   BoundaryConditions conditions;
   GuessedMotion guess;
   int max_iterations = 60;
+  std::function<bool()> go_on = {};  ///< asked before each iteration; false ends the search where it is
 };
 
 /// Jacobi's solution of the discrete Hamilton-Jacobi equation (Ohsawa, Bloch, Leok, SIAM J. Control Optim.

@@ -16,7 +16,7 @@ OptimalControlReport solve_optimal_control(const ControlProblem& problem) {
   boundary::ControlProgram program(problem);
   Vector u = program.start();
   const boundary::InteriorPointReport search =
-      boundary::solve(program, problem.max_iterations, problem.tolerance, u);
+      boundary::solve(program, problem.max_iterations, problem.tolerance, problem.go_on, u);
   OptimalControlReport report;
   report.iterations = search.iterations;
   program.describe(u, report);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <diracstep/boundary_values/boundary_values.hpp>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -41,7 +42,8 @@ struct ControlProblem {
   int degree = 0;
   Vector lower_q = {}, upper_q = {};  ///< bounds of q at the ends of the steps; empty: none
   int max_iterations = 500;
-  double tolerance = 1e-9;  ///< of the optimality conditions, scaled as Ipopt scales them
+  double tolerance = 1e-9;           ///< of the optimality conditions, scaled as Ipopt scales them
+  std::function<bool()> go_on = {};  ///< asked in each iteration; false ends the search where it is
 };
 
 struct [[nodiscard]] OptimalControlReport {

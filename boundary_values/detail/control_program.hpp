@@ -3,6 +3,7 @@
 #include <diracstep/boundary_values/detail/controlled_force.hpp>
 #include <diracstep/boundary_values/detail/motion_equations.hpp>
 #include <diracstep/boundary_values/optimal_control.hpp>
+#include <functional>
 #include <memory>
 #include <string>
 #include <utility>
@@ -66,6 +67,7 @@ struct InteriorPointReport {
 };
 
 /// Ipopt from program.start() on; u is its last iterate.  Throws Misuse where the library has none.
-InteriorPointReport solve(ControlProgram& program, int max_iterations, double tolerance, Vector& u);
+InteriorPointReport solve(ControlProgram& program, int max_iterations, double tolerance,
+                          const std::function<bool()>& go_on, Vector& u);
 
 }  // namespace diracstep::boundary

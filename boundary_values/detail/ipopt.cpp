@@ -19,7 +19,8 @@ using Ipopt::Number;
 /// A control program as Ipopt asks for it.  An exception is kept, and ends the search.
 class Program final : public Ipopt::TNLP {
  public:
-  Program(ControlProgram& program, Vector& u) : program_(program), u_(u), jacobian_(program.jacobian(u)) {
+  Program(ControlProgram& program, const std::function<bool()>& go_on, Vector& u)
+      : program_(program), go_on_(go_on), u_(u), jacobian_(program.jacobian(u)) {
     hessian_ = program.hessian_entries();
   }
 
@@ -110,6 +111,12 @@ class Program final : public Ipopt::TNLP {
     });
   }
 
+  bool intermediate_callback(Ipopt::AlgorithmMode, Index, Number, Number, Number, Number, Number, Number,
+                             Number, Number, Index, const Ipopt::IpoptData*,
+                             Ipopt::IpoptCalculatedQuantities*) override {
+    return !go_on_ || go_on_();
+  }
+
   void finalize_solution(Ipopt::SolverReturn, Index n, const Number* x, const Number*, const Number*, Index,
                          const Number*, const Number*, Number, const Ipopt::IpoptData*,
                          Ipopt::IpoptCalculatedQuantities*) override {
@@ -131,6 +138,7 @@ class Program final : public Ipopt::TNLP {
   }
 
   ControlProgram& program_;
+  const std::function<bool()>& go_on_;
   Vector& u_;
   Sparse jacobian_;
   std::vector<std::pair<int, int>> hessian_;
@@ -153,6 +161,8 @@ std::string words(Ipopt::ApplicationReturnStatus status) {
     case Ipopt::Restoration_Failed:
     case Ipopt::Search_Direction_Becomes_Too_Small:
       return "no step of the search comes nearer to a solution: more steps or another guess may help";
+    case Ipopt::User_Requested_Stop:
+      return "interrupted";
     case Ipopt::Diverging_Iterates:
       return "the iterates grow without bound: the cost may have no minimum";
     default:
@@ -162,8 +172,9 @@ std::string words(Ipopt::ApplicationReturnStatus status) {
 
 }  // namespace
 
-InteriorPointReport solve(ControlProgram& program, int max_iterations, double tolerance, Vector& u) {
-  Ipopt::SmartPtr<Program> of = new Program(program, u);
+InteriorPointReport solve(ControlProgram& program, int max_iterations, double tolerance,
+                          const std::function<bool()>& go_on, Vector& u) {
+  Ipopt::SmartPtr<Program> of = new Program(program, go_on, u);
   Ipopt::SmartPtr<Ipopt::IpoptApplication> application = new Ipopt::IpoptApplication(false);
   application->Options()->SetStringValue("sb", "yes");
   application->Options()->SetIntegerValue("print_level", 0);
@@ -190,7 +201,7 @@ InteriorPointReport solve(ControlProgram& program, int max_iterations, double to
 
 namespace diracstep::boundary {
 
-InteriorPointReport solve(ControlProgram&, int, double, Vector&) {
+InteriorPointReport solve(ControlProgram&, int, double, const std::function<bool()>&, Vector&) {
   throw Misuse(
       "optimal control needs Ipopt, and this library was built without: install coinor-libipopt-dev, then "
       "run "

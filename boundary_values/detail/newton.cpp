@@ -156,7 +156,8 @@ Columns FamilyOfEnds::transition() const {
   return basis.transpose() * end_by_start_ * basis;
 }
 
-NewtonReport newton(MotionEquations& equations, Vector& u, int max_iterations, const FactorEnds& factor) {
+NewtonReport newton(MotionEquations& equations, Vector& u, int max_iterations, const FactorEnds& factor,
+                    const std::function<bool()>& go_on) {
   NewtonReport report;
   double damping = 1.0;
   // Where all comes to rest at zero, corrections are measured by the guess.
@@ -183,6 +184,10 @@ NewtonReport newton(MotionEquations& equations, Vector& u, int max_iterations, c
     }
     damping = length < near_round_off ? 1.0 : std::min(1.0, 4.0 * damping);
     for (;; damping *= 0.5) {
+      if (go_on && !go_on()) {
+        report.failure = "interrupted";
+        return report;
+      }
       if (damping < smallest_damping) {
         report.failure = "no shorter step of it comes nearer to a solution";
         return report;

@@ -76,8 +76,9 @@ struct NewtonReport {
 };
 
 /// Newton's method from u on; `factor` makes the linear systems at an iterate, and throws Error where it
-/// cannot.
-NewtonReport newton(MotionEquations& equations, Vector& u, int max_iterations, const FactorEnds& factor);
+/// cannot.  `go_on`, where there is one, ends the iteration with false.
+NewtonReport newton(MotionEquations& equations, Vector& u, int max_iterations, const FactorEnds& factor,
+                    const std::function<bool()>& go_on);
 
 /// The largest number of each Kind of unknown, 1 where all are zero.
 Vector sizes_by_kind(const MotionEquations& equations, const Vector& u);

@@ -6,6 +6,7 @@
 #include <diracstep/boundary_values/boundary_values.hpp>
 #include <diracstep/command/arguments.hpp>
 #include <diracstep/command/end_conditions.hpp>
+#include <diracstep/command/interrupt.hpp>
 #include <diracstep/command/verbs.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/runs/run.hpp>
@@ -168,6 +169,7 @@ std::string doubt_of_steps(BoundaryProblem problem, const BoundaryReport& found)
   problem.options.step *= 0.5;
   problem.guess = through_points(found.times, found.q, found.v);
   const BoundaryReport finer = solve_boundary_values(problem);
+  if (interrupted()) return "interrupted before it was compared with that of steps of half the size";
   if (!finer.converged)
     return "with steps of half the size no motion is found near it: it is that of the steps";
   double size = 0.0;
@@ -212,16 +214,18 @@ void run_boundary(BoundaryArguments arguments, Session& session) {
                           grid.steps,
                           conditions_of(arguments, *entry.scene),
                           {}};
+  problem.go_on = [] { return !interrupted(); };
   problem.options.step = grid.step;
   problem.guess = guess_of(arguments, problem, session);
+  catch_interrupts();
   BoundaryReport report = solve_boundary_values(problem);
   const bool places = report.converged && problem.conditions.start_held && problem.conditions.end_held;
-  if (places && report.doubt.empty()) report.doubt = doubt_of_steps(problem, report);
+  if (places && report.doubt.empty() && !interrupted()) report.doubt = doubt_of_steps(problem, report);
   if (!arguments.out.empty()) write_motion(arguments.out, report, *entry.scene);
   const std::string method =
       Integrator(entry.scene, session.registry, session.solvers, problem.options).method().name;
   print(arguments.json ? boundary_json(report, problem, method) : boundary_text(report, problem, method));
-  if (places && arguments.guess.empty())
+  if (places && arguments.guess.empty() && !interrupted())
     if (const std::string other = other_motion(problem, report, session); !other.empty()) say(other);
   if (report.converged && !report.doubt.empty()) {
     say("doubted: " + report.doubt);

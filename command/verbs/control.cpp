@@ -6,6 +6,7 @@
 #include <diracstep/boundary_values/optimal_control.hpp>
 #include <diracstep/command/arguments.hpp>
 #include <diracstep/command/end_conditions.hpp>
+#include <diracstep/command/interrupt.hpp>
 #include <diracstep/command/verbs.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/numerics/near_names.hpp>
@@ -193,6 +194,7 @@ ControlProblem control_problem(ControlArguments& arguments, Session& session) {
   problem.degree = arguments.degree;
   problem.max_iterations = arguments.iterations;
   problem.tolerance = arguments.tolerance;
+  problem.go_on = [] { return !interrupted(); };
   constexpr double infinite = std::numeric_limits<double>::infinity();
   problem.lower_q = Vector::Constant(scene.dimension(), -infinite);
   problem.upper_q = -problem.lower_q;
@@ -204,6 +206,7 @@ ControlProblem control_problem(ControlArguments& arguments, Session& session) {
 
 void run_control(ControlArguments arguments, Session& session) {
   const ControlProblem problem = control_problem(arguments, session);
+  catch_interrupts();
   const OptimalControlReport report = solve_optimal_control(problem);
   if (!arguments.out.empty()) write_controlled(arguments.out, report, problem);
   const std::string method =
