@@ -326,7 +326,8 @@ FitReport fit(const FitProblem& problem, const FitData& data, const Vector& para
   search.parameters.ftol = search.parameters.xtol = 1e-13;
   const auto status = search.minimize(report.parameters);
   report.ending = words(status);
-  report.converged = status > 0 && status != Eigen::LevenbergMarquardtSpace::TooManyFunctionEvaluation;
+  report.converged = status > 0 && status != Eigen::LevenbergMarquardtSpace::TooManyFunctionEvaluation &&
+                     status != Eigen::LevenbergMarquardtSpace::UserAsked;
   measure_uncertainty(problem, residuals, report);
   report.evaluations = residuals.evaluations();
   report.residuals = Columns::Constant(data.values.rows(), data.values.cols(), nan);

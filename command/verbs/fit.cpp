@@ -121,7 +121,8 @@ std::string fit_text(const FitReport& report, const std::vector<std::string>& na
   for (std::size_t k = 0; k < names.size(); ++k)
     if (!std::isfinite(report.interval[static_cast<Eigen::Index>(k)]))
       open += (open.empty() ? "" : ", ") + names[k];
-  if (!open.empty()) text += fmt::format("the data do not determine {}: intervals are infinite\n", open);
+  if (!open.empty() && std::isfinite(report.residual))
+    text += fmt::format("the data do not determine {}: intervals are infinite\n", open);
   return text +
          fmt::format("\nstandard deviation of what is left: {:.6g} (units of sigma)\n", report.residual);
 }

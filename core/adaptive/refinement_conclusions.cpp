@@ -4,6 +4,7 @@
 #include <diracstep/core/adaptive/refinement_search.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/runs/growth_check.hpp>
+#include <diracstep/core/system/kinks.hpp>
 
 /// What a RefinementSearch concludes from its runs: whether there is to be another one, whether forces that
 /// change fast or round-off that grows speak against the last, and how the search ends.
@@ -66,6 +67,14 @@ double RefinementSearch::predicted_solves() const {
   return convergence_.work_to_go() * static_cast<double>(effort(report_.runs.back()));
 }
 
+/// Whether the forces change at known times and within less than a step: the survey divides the motion there.
+bool RefinementSearch::ramps_of_time() const {
+  const double start = motion_.scene->start.time, step = std::abs(plan_.mean_step(refinement_));
+  return std::ranges::any_of(
+      motion_.scene->kinks->instants(std::min(start, motion_.end), std::max(start, motion_.end)),
+      [&](const Kinks::Instant& instant) { return instant.width > 0.0 && instant.width < step; });
+}
+
 /// Begins anew with compensated sums where round-off shows without them.
 bool RefinementSearch::compensate() {
   if (!motion_.may_compensate || report_.compensated_sums || !convergence_.near_round_off()) return false;
@@ -81,9 +90,10 @@ bool RefinementSearch::conclude() {
     if (!survey(true)) return report_.refusal.empty();
     return accept();
   }
-  // Runs that do not follow the motion yet cross the kinks in other places than it does.
-  if (convergence_.runs() >= 4 && !convergence_.order_confirmed() && !surveyed_ && !kinks_on_the_way() &&
-      !survey(false))
+  // Runs that do not follow the motion yet cross its kinks in other places; ramps of the time stay where they
+  // are.
+  if (convergence_.runs() >= 4 && !convergence_.order_confirmed() && !surveyed_ &&
+      (!kinks_on_the_way() || ramps_of_time()) && !survey(false))
     return report_.refusal.empty();
   if (compensate()) return true;
   const std::size_t patience = kinks_on_the_way() ? runs_to_resolve_kinks : runs_to_converge;

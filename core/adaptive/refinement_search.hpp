@@ -69,6 +69,7 @@ class RefinementSearch {
   void count(ErrorControlRun& now, const Work& work);
   bool time_is_up() const;
   bool kinks_on_the_way() const;
+  bool ramps_of_time() const;
   bool reached_end(double t) const;
   bool stopped(long max_solves);
   bool survey(bool accepted);

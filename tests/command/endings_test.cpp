@@ -267,24 +267,29 @@ lagrangian = "v_x^2/2 + cos(x)"
 coordinates = { x = {} }
 parameters = { u = 0 }
 force = { x = "u" }
-span = { end = 10, step = 0.0005 }
+span = { end = 10, step = 0.005 }
 control = { parameters = ["u"], cost = "u^2" }
 )toml");
-  const std::vector<std::string> verbs{
-      "study steering_table --methods type1/gl:2 --out '" + path("study") + "'",
-      "fit " + swing + " '" + path("measured.csv") + "' --parameters k",
-      "boundary " + swing + " --from x=1 --to x=0.3 --end 20 --step 2e-5",
-      "control " + controlled + " --to x=1 v_x=0"};
+  struct Verb {
+    std::string line;
+    std::chrono::milliseconds before;  ///< the signal: to come to the phase that lasts
+  };
+  const std::vector<Verb> verbs{
+      {"study steering_table --methods type1/gl:2 --out '" + path("study") + "'", 3s},
+      {"fit " + swing + " '" + path("measured.csv") + "' --parameters k", 500ms},
+      {"boundary " + swing + " --from x=1 --to x=0.3 --end 20 --step 1e-4", 500ms},
+      {"control " + controlled + " --to x=1 v_x=0", 500ms},
+      {"check --scenes", 500ms},
+      {"orders", 500ms}};
   const std::string messages = path("messages");
-  for (const std::string& verb : verbs)
-    for (const int signal : {SIGTERM, SIGHUP}) {
-      Started process(verb, messages);
-      std::this_thread::sleep_for(2s);
-      process.send(signal);
-      ASSERT_TRUE(process.ends_within(3s)) << verb;
-      EXPECT_EQ(process.status(), 1) << verb;
-      EXPECT_NE(contents(messages).find("interrupted"), std::string::npos) << verb << contents(messages);
-    }
+  for (const Verb& verb : verbs) {
+    Started process(verb.line, messages);
+    std::this_thread::sleep_for(verb.before);
+    process.send(SIGTERM);
+    ASSERT_TRUE(process.ends_within(15s)) << verb.line << ": most of it is for a loaded machine";
+    EXPECT_EQ(process.status(), 1) << verb.line;
+    EXPECT_NE(contents(messages).find("interrupted"), std::string::npos) << verb.line << contents(messages);
+  }
 }
 
 }  // namespace

@@ -98,6 +98,22 @@ TEST_F(StatedErrors, AMotionThatSticksIsRefusedAfterFewRuns) {
   }
 }
 
+/// x'' = −x + tanh((t − a)/w): to w² the ramp is a jump from −1 to 1.
+TEST_F(StatedErrors, TheMotionIsDividedAtASteepRampOfTheTime) {
+  for (const double a : {8.6918, 3.3}) {
+    const std::string file = scene("ramp_of_time",
+                                   "lagrangian = \"v_x^2/2 - x^2/2\"\n[coordinates]\nx = {}\n[start]\nx = 1\n"
+                                   "[force]\nx = \"tanh((t - " +
+                                       std::to_string(a) + ")/2e-5)\"\n[span]\nend = 10\nstep = 0.1");
+    const Outcome outcome = run("run " + file + " --error 1e-6 --json");
+    ASSERT_EQ(outcome.status, 0) << outcome.err;
+    const Json json = Json::parse(outcome.out);
+    EXPECT_NEAR(json["end"]["q"]["x"].get<double>(), 1.0 + 2.0 * std::cos(10.0) - 2.0 * std::cos(10.0 - a),
+                1e-6);
+    EXPECT_LT(json["error_control"]["solves"].get<long>(), 20000);
+  }
+}
+
 /// Masses of ratio 1e-13 on one sum: round-off of the steps is amplified, to some 1e-6 of the light one.
 TEST_F(StatedErrors, AnAcceptedEstimateIsBelowTheErrorAskedFor) {
   const std::string file = scene("degen", R"toml(
