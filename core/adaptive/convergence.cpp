@@ -105,7 +105,7 @@ bool Convergence::by_stagnation() const { return stagnates() && estimate_ <= err
 std::string Convergence::grounds() const {
   std::ostringstream text;
   if (at_round_off() && *std::ranges::max_element(differences_) <= several * round_off_) {
-    text << "that of round-off: the method is exact for this motion, whatever its step";
+    text << "that of round-off, by which already the coarsest of the runs differ";
   } else if (at_round_off()) {
     text << "that of round-off, to which the runs have come";
   } else if (by_order() || by_three_runs()) {

@@ -21,8 +21,8 @@ namespace diracstep {
 ///    the estimate as well, with an observed order of 0.5 at least; where the steps of two runs are in a
 ///    ratio r above 0.7, their difference counts 0.3/(1 − r) times, since runs of any order agree whose steps
 ///    are nearly the same; or
-///  * two differences in a row that are round-off: there is no order to observe.  Either all are, and the
-///    method is exact for the motion, or the runs have come to round-off; or
+///  * two differences in a row that are round-off: there is no order to observe.  Either all are, as where
+///    the method is exact for the motion, or the runs have come to round-off; or
 ///  * three refinements in a row that did not halve the difference, ten times the largest of which is below
 ///    the error asked for: round-off that the motion or the linear systems amplify.  That is the estimate.
 ///
