@@ -1,6 +1,7 @@
 #pragma once
 
 #include <diracstep/boundary_values/boundary_values.hpp>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>

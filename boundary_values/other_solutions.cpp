@@ -24,7 +24,7 @@ std::string doubt_of_steps(BoundaryProblem problem, const BoundaryReport& found)
   problem.options.step *= 0.5;
   problem.guess = through_points(found.times, found.q, found.v.array().isFinite().select(found.v, 0.0));
   const BoundaryReport finer = solve_boundary_values(problem);
-  if (finer.interrupted) return "";
+  if (finer.interrupted) return "interrupted before it was compared with that of steps of half the size";
   if (!finer.converged)
     return "with steps of half the size no motion is found near it: it is that of the steps";
   const double off = apart(found, finer);

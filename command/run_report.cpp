@@ -202,10 +202,7 @@ std::string search_text(const ErrorControlReport& search) {
   std::string text = search_table(search);
   if (!search.division.empty()) text += search.division + '\n';
   if (search.ok())
-    text += fmt::format("estimated error {:.2e}, {}, {} solves in all\n", search.estimate,
-                        std::isnan(search.observed_order)
-                            ? "that of round-off: the runs differ by no more, and show no order"
-                            : fmt::format("observed order {:.1f}", search.observed_order),
+    text += fmt::format("estimated error {:.2e}, {}, {} solves in all\n", search.estimate, search.grounds,
                         search.work.solves);
   return text + (search.warning.empty() ? "" : "warning: " + search.warning + "\n") + "\n";
 }
@@ -229,6 +226,7 @@ Json search_json(const ErrorControlReport& search) {
             {"step", search.step},
             {"estimate", Json(search.estimate)},
             {"observed_order", Json(search.observed_order)},
+            {"grounds", search.ok() ? Json(search.grounds) : Json(nullptr)},
             {"division", search.division.empty() ? Json(nullptr) : Json(search.division)},
             {"warning", search.warning.empty() ? Json(nullptr) : Json(search.warning)},
             {"refusal", search.refusal.empty() ? Json(nullptr) : Json(search.refusal)},

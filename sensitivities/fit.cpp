@@ -12,6 +12,8 @@ namespace diracstep {
 
 namespace {
 
+constexpr const char* interrupted_fit = "interrupted";
+
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
@@ -53,6 +55,7 @@ class MotionAt {
       const double way = data_.times[k] - last;
       const double count = std::max(1.0, std::ceil(std::abs(way / problem_.steps.step) * (1.0 - 1e-9)));
       for (double i = 0.0; way != 0.0 && i < count; ++i) {
+        if (problem_.go_on && !problem_.go_on()) return void(motion.failure = interrupted_fit);
         const StepReport report = integrator.step(way / count);
         if (!report.ok()) return void(motion.failure = report.failure);
         sensitivities.follow(z);
@@ -155,7 +158,7 @@ class Residuals {
       f[i] = motion_.failure.empty() ? (motion_.values(k, c) - data_.values(k, c)) / sigma(c) : no_motion;
       if (!std::isfinite(f[i])) f[i] = no_motion;
     }
-    return 0;
+    return motion_.failure == interrupted_fit ? -1 : 0;
   }
 
   int df(const Vector& parameters, Columns& jacobian) {
@@ -239,6 +242,8 @@ std::string words(Eigen::LevenbergMarquardtSpace::Status status) {
       return "no smaller sum of squares can be told from round-off";
     case TooManyFunctionEvaluation:
       return "the evaluations allowed are used up";
+    case UserAsked:
+      return interrupted_fit;
     default:
       return "the search could not go on";
   }
@@ -310,7 +315,8 @@ FitReport fit(const FitProblem& problem, const FitData& data, const Vector& para
     throw Misuse("fit: " + std::to_string(residuals.values()) + " measured numbers for " +
                  std::to_string(parameters.size()) + " parameters");
   require_times(data, problem.scene(parameters).scene->start.time, problem.steps.step);
-  if (const std::string failure = residuals.at(parameters).failure; !failure.empty())
+  if (const std::string failure = residuals.at(parameters).failure;
+      !failure.empty() && failure != interrupted_fit)
     throw Misuse("fit: the motion where the search begins: " + failure);
   FitReport report;
   report.parameters = parameters;
@@ -320,7 +326,8 @@ FitReport fit(const FitProblem& problem, const FitData& data, const Vector& para
   search.parameters.ftol = search.parameters.xtol = 1e-13;
   const auto status = search.minimize(report.parameters);
   report.ending = words(status);
-  report.converged = status > 0 && status != Eigen::LevenbergMarquardtSpace::TooManyFunctionEvaluation;
+  report.converged = status > 0 && status != Eigen::LevenbergMarquardtSpace::TooManyFunctionEvaluation &&
+                     status != Eigen::LevenbergMarquardtSpace::UserAsked;
   measure_uncertainty(problem, residuals, report);
   report.evaluations = residuals.evaluations();
   report.residuals = Columns::Constant(data.values.rows(), data.values.cols(), nan);

@@ -38,6 +38,7 @@ struct FitProblem {
   /// Functions of a point of the motion that columns may name, with these parameters; they do not read the
   /// forces of rows.  Their derivatives are taken by central differences along those of the motion.
   std::function<std::vector<PointFunction>(const Vector& parameters)> outputs = {};
+  std::function<bool()> go_on = {};  ///< asked within each motion; false ends the search with the best so far
 };
 
 /// Parameters by least squares, Σ ((measured − motion)/σ)², with the exact derivatives of the discrete

@@ -3,6 +3,7 @@
 #include <diracstep/boundary_values/detail/controlled_force.hpp>
 #include <diracstep/boundary_values/detail/motion_equations.hpp>
 #include <diracstep/boundary_values/optimal_control.hpp>
+#include <functional>
 #include <memory>
 #include <string>
 #include <utility>

@@ -189,6 +189,11 @@ NewtonReport newton(MotionEquations& equations, Vector& u, int max_iterations, c
     }
     damping = length < near_round_off ? 1.0 : std::min(1.0, 4.0 * damping);
     for (;; damping *= 0.5) {
+      if (go_on && !go_on()) {
+        report.interrupted = true;
+        report.failure = "interrupted after " + std::to_string(report.iterations) + " iterations";
+        return report;
+      }
       if (damping < smallest_damping) {
         report.failure = "no shorter step of it comes nearer to a solution";
         return report;

@@ -8,6 +8,7 @@
 #include <diracstep/boundary_values/other_solutions.hpp>
 #include <diracstep/command/arguments.hpp>
 #include <diracstep/command/guess_file.hpp>
+#include <diracstep/command/interrupt.hpp>
 #include <diracstep/command/motion_search.hpp>
 #include <diracstep/command/verbs.hpp>
 #include <diracstep/core/numerics/errors.hpp>
@@ -126,18 +127,20 @@ void run_boundary(BoundaryArguments arguments, Session& session) {
                           grid.steps,
                           conditions_of(arguments, *entry.scene),
                           {}};
+  problem.go_on = [] { return !interrupted(); };
   problem.options.step = grid.step;
   problem.guess =
       arguments.guess.empty() ? usual_guess(problem) : guess_from_file(arguments.guess, *problem.scene);
+  catch_interrupts();
   BoundaryReport report = solve_boundary_values(problem);
   const bool places = report.converged && problem.conditions.start_held && problem.conditions.end_held;
-  if (places && report.doubt.empty()) report.doubt = doubt_of_steps(problem, report);
+  if (places && report.doubt.empty() && !interrupted()) report.doubt = doubt_of_steps(problem, report);
   if (!arguments.out.empty())
     write_motion(arguments.out, *entry.scene, {report.times, report.q, report.v, report.p});
   const std::string method =
       Integrator(entry.scene, session.registry, session.solvers, problem.options).method().name;
   print(arguments.json ? boundary_json(report, problem, method) : boundary_text(report, problem, method));
-  if (places && arguments.guess.empty())
+  if (places && arguments.guess.empty() && !interrupted())
     if (const std::string other = other_motion(problem, report); !other.empty()) say(other);
   if (report.converged && !report.doubt.empty()) {
     say("doubted: " + report.doubt);

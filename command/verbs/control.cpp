@@ -7,6 +7,7 @@
 #include <diracstep/boundary_values/named_ends.hpp>
 #include <diracstep/command/arguments.hpp>
 #include <diracstep/command/guess_file.hpp>
+#include <diracstep/command/interrupt.hpp>
 #include <diracstep/command/motion_search.hpp>
 #include <diracstep/command/verbs.hpp>
 #include <diracstep/core/numerics/errors.hpp>
@@ -130,6 +131,7 @@ ControlProblem control_problem(ControlArguments& arguments, Session& session) {
   problem.degree = arguments.degree;
   problem.max_iterations = arguments.iterations;
   problem.tolerance = arguments.tolerance;
+  problem.go_on = [] { return !interrupted(); };
   set_bounds(problem, parameters(arguments.at_least, "--at-least"),
              parameters(arguments.at_most, "--at-most"));
   problem.guess = arguments.guess.empty() ? usual_guess(problem) : guess_from_file(arguments.guess, scene);
@@ -138,6 +140,7 @@ ControlProblem control_problem(ControlArguments& arguments, Session& session) {
 
 void run_control(ControlArguments arguments, Session& session) {
   const ControlProblem problem = control_problem(arguments, session);
+  catch_interrupts();
   const OptimalControlReport report = solve_optimal_control(problem);
   if (!arguments.out.empty()) write_controlled(arguments.out, report, problem);
   const std::string method =

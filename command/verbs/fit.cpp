@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <diracstep/command/arguments.hpp>
+#include <diracstep/command/interrupt.hpp>
 #include <diracstep/command/verbs.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/numerics/near_names.hpp>
@@ -120,7 +121,8 @@ std::string fit_text(const FitReport& report, const std::vector<std::string>& na
   for (std::size_t k = 0; k < names.size(); ++k)
     if (!std::isfinite(report.interval[static_cast<Eigen::Index>(k)]))
       open += (open.empty() ? "" : ", ") + names[k];
-  if (!open.empty()) text += fmt::format("the data do not determine {}: intervals are infinite\n", open);
+  if (!open.empty() && std::isfinite(report.residual))
+    text += fmt::format("the data do not determine {}: intervals are infinite\n", open);
   return text +
          fmt::format("\nstandard deviation of what is left: {:.6g} (units of sigma)\n", report.residual);
 }
@@ -248,11 +250,13 @@ void run_fit(FitArguments arguments, Session& session) {
         for (Output& output : diracstep::make_scene(arguments.scene, all_of(values)).outputs)
           functions.push_back(std::move(output.at));
         return functions;
-      }};
+      },
+      [] { return !interrupted(); }};
   if (const std::string doubt = problem.scene(begin).doubt; !doubt.empty()) {
     say(doubt);
     session.exit_status = doubted;
   }
+  catch_interrupts();
   const FitReport report = fit(problem, data, begin);
   if (!arguments.residuals.empty()) write_residuals(arguments.residuals, data, report, entry);
   if (!arguments.picture.empty()) draw_residuals(arguments.picture, data, report, entry);

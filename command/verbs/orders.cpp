@@ -95,6 +95,10 @@ void orders(const OrdersArguments& options, Session& session) {
                                 {"measured", row.measured.order},
                                 {"holds", holds(row)}});
   print(options.json ? to_text(json, 2) + '\n' : table);
+  if (interrupted()) {
+    say("interrupted; what was measured is there");
+    session.exit_status = failed;
+  }
   for (const OrderTableRow& row : rows)
     if (!holds(row)) {
       say(fmt::format("{} composed to order {}: claim and measurement differ", row.method, row.order));

@@ -57,6 +57,9 @@ void check_published_cases(bool json, Session& session) {
   }
   print(json ? as_json(cases) : as_text(cases));
   if (!std::ranges::all_of(cases, &PublishedCase::passed)) session.exit_status = failed;
+  if (!interrupted()) return;
+  say("interrupted");
+  session.exit_status = failed;
 }
 
 }  // namespace diracstep::command

@@ -10,6 +10,9 @@ namespace {
 constexpr double unlike = 0.3;             // 1 − the ratio of steps from which runs may agree for no reason
 constexpr double safety = 2.5;             // between the estimate and the error asked for
 constexpr double aimed = 0.2;              // part of the error asked for that the next run aims at
+constexpr double least_order = 0.5;        // observed, of differences that prove something
+constexpr double several = 10.0;           // between round-off as it adds up and what is laid to it
+constexpr double stagnant_safety = 10.0;   // between differences that do not fall and the error
 constexpr double round_off_alone = 1e-15;  // differences below this hold nothing else
 constexpr double round_off = 1e-7;         // differences that stop falling below this are laid to round-off
 
@@ -34,8 +37,9 @@ void Convergence::clear() {
   stagnant_ = 0;
 }
 
-void Convergence::add(double step, double difference) {
+void Convergence::add(double step, double difference, double round_off) {
   steps_.push_back(step);
+  round_off_ = round_off;
   if (runs() < 2) return;
   stagnant_ = runs() > 2 && difference > 0.5 * differences_.back() ? stagnant_ + 1 : 0;
   differences_.push_back(difference);
@@ -53,8 +57,12 @@ void Convergence::insert(std::size_t later, double step, double from_coarser, do
 void Convergence::judge() {
   double usable = order_;
   for (const std::size_t last : {runs(), runs() - 1})
-    if (const double p = order_of(last); p < order_ - 1.0) usable = std::min(usable, std::max(p, 0.5));
+    if (const double p = order_of(last); p < order_ - 1.0)
+      usable = std::min(usable, std::max(p, least_order));
   estimate_ = differences_.back() / (std::pow(1.0 / ratio(runs() - 1), usable) - 1.0);
+  if (!extrapolates_) estimate_ = std::max(estimate_, difference());
+  if (stagnates() && !(order_of(runs()) >= least_order))
+    estimate_ = stagnant_safety * largest_since_stagnation();
 }
 
 double Convergence::order_of(std::size_t runs) const {
@@ -76,7 +84,38 @@ bool Convergence::agree(std::size_t k, double ratio) const {
   return safety * likeness * differences_[k - 1] <= error_;
 }
 
-bool Convergence::by_three_runs() const { return runs() >= 3 && agree(runs() - 1) && agree(runs() - 2); }
+bool Convergence::by_three_runs() const {
+  return runs() >= 3 && agree(runs() - 1) && agree(runs() - 2) && order_of(runs()) >= least_order &&
+         safety * estimate_ <= error_;
+}
+
+bool Convergence::at_round_off() const {
+  return runs() >= 3 && agree(runs() - 1) && agree(runs() - 2) &&
+         std::max(differences_[runs() - 2], differences_[runs() - 3]) <= several * round_off_;
+}
+
+/// Of the differences that were not halved and the one that they followed.
+double Convergence::largest_since_stagnation() const {
+  const std::size_t count = std::min(differences_.size(), stagnant_runs + 1);
+  return *std::max_element(differences_.end() - static_cast<std::ptrdiff_t>(count), differences_.end());
+}
+
+bool Convergence::by_stagnation() const { return stagnates() && estimate_ <= error_; }
+
+std::string Convergence::grounds() const {
+  std::ostringstream text;
+  if (at_round_off() && *std::ranges::max_element(differences_) <= several * round_off_) {
+    text << "that of round-off, by which already the coarsest of the runs differ";
+  } else if (at_round_off()) {
+    text << "that of round-off, to which the runs have come";
+  } else if (by_order() || by_three_runs()) {
+    text.precision(1);
+    text << "observed order " << std::fixed << observed_order();
+  } else {
+    text << "ten times what the runs differ by, which no longer falls: round-off, amplified";
+  }
+  return text.str();
+}
 
 std::size_t Convergence::confirmed_by_run_before() const {
   if (runs() < 2 || accepted()) return 0;

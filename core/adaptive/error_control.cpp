@@ -175,11 +175,13 @@ RunReport run_again(const std::shared_ptr<const Scene>& scene, const Registry& r
   RunReport done;
   Sample sample;
   long node = 0;
+  const auto at_node = [&](const detail::ReadNode& read, bool last) {
+    if (node++ % every != 0 && !last) return true;
+    return read(momentum, sample).ok() && observer(sample);
+  };
   done.last = detail::run_steps_of(completed(scene), registry, solvers, report.steps, report.adaptive,
-                                   report.end.time, work, [&](const detail::ReadNode& read, bool last) {
-                                     if (node++ % every != 0 && !last) return true;
-                                     return read(momentum, sample).ok() && observer(sample);
-                                   });
+                                   report.end.time, work, at_node)
+                  .last;
   return done;
 }
 

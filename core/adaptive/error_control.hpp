@@ -66,7 +66,8 @@ struct ErrorControlReport {
   double estimate = std::numeric_limits<double>::quiet_NaN();
   double observed_order = std::numeric_limits<double>::quiet_NaN();  ///< NaN where the runs differ by
                                                                      ///< round-off alone
-  Work work;                                                         ///< of all runs, output included
+  std::string grounds;  ///< why the estimate of an accepted run is believed, as "observed order 8.0"
+  Work work;            ///< of all runs, output included
   std::vector<ErrorControlRun> runs;
 
   /// What repeats the run that `end` is of: see run_again().

@@ -118,7 +118,8 @@ ErrorControlReport solve_events_to_error(const std::shared_ptr<const Scene>& sta
       continue;
     }
     failures = 0;
-    convergence.add(std::abs(integrator.step), convergence.runs() == 0 ? 0.0 : runs.difference(last, run));
+    convergence.add(std::abs(integrator.step), convergence.runs() == 0 ? 0.0 : runs.difference(last, run),
+                    detail::round_off_of(run.work.steps));
     last = std::move(run);
     report.step = integrator.step;
     report.end = last.end;
@@ -128,7 +129,10 @@ ErrorControlReport solve_events_to_error(const std::shared_ptr<const Scene>& sta
     report.runs.back().difference = convergence.difference();
     report.runs.back().estimate = report.estimate;
     report.runs.back().observed_order = report.observed_order;
-    if (convergence.accepted()) break;
+    if (convergence.accepted()) {
+      report.grounds = convergence.grounds();
+      break;
+    }
     if (convergence.stagnates())
       report.refusal = convergence.obstacle();
     else if (const double to_go = 2.0 * static_cast<double>(last.work.solves) * convergence.work_to_go();

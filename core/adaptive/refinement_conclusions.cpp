@@ -4,6 +4,7 @@
 #include <diracstep/core/adaptive/refinement_search.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/runs/growth_check.hpp>
+#include <diracstep/core/system/kinks.hpp>
 
 /// What a RefinementSearch concludes from its runs: whether there is to be another one, whether forces that
 /// change fast or round-off that grows speak against the last, and how the search ends.
@@ -66,6 +67,14 @@ double RefinementSearch::predicted_solves() const {
   return convergence_.work_to_go() * static_cast<double>(effort(report_.runs.back()));
 }
 
+/// Whether the forces change at known times and within less than a step: the survey divides the motion there.
+bool RefinementSearch::ramps_of_time() const {
+  const double start = motion_.scene->start.time, step = std::abs(plan_.mean_step(refinement_));
+  return std::ranges::any_of(
+      motion_.scene->kinks->instants(std::min(start, motion_.end), std::max(start, motion_.end)),
+      [&](const Kinks::Instant& instant) { return instant.width > 0.0 && instant.width < step; });
+}
+
 /// Begins anew with compensated sums where round-off shows without them.
 bool RefinementSearch::compensate() {
   if (!motion_.may_compensate || report_.compensated_sums || !convergence_.near_round_off()) return false;
@@ -81,9 +90,10 @@ bool RefinementSearch::conclude() {
     if (!survey(true)) return report_.refusal.empty();
     return accept();
   }
-  // Runs that do not follow the motion yet cross the kinks in other places than it does.
-  if (convergence_.runs() >= 4 && !convergence_.order_confirmed() && !surveyed_ && !kinks_on_the_way() &&
-      !survey(false))
+  // Runs that do not follow the motion yet cross its kinks in other places; ramps of the time stay where they
+  // are.
+  if (convergence_.runs() >= 4 && !convergence_.order_confirmed() && !surveyed_ &&
+      (!kinks_on_the_way() || ramps_of_time()) && !survey(false))
     return report_.refusal.empty();
   if (compensate()) return true;
   const std::size_t patience = kinks_on_the_way() ? runs_to_resolve_kinks : runs_to_converge;
@@ -148,23 +158,41 @@ void RefinementSearch::divide(const ForceSurveyReport& found) {
                      std::to_string(plan_.stretches().size()) + " stretches";
 }
 
+/// A run from beside the start: its first point and its end, which is empty where it does not get there or
+/// where the rows allow no such start.
+std::pair<Sample, Sample> RefinementSearch::run_beside(const Counted& run) {
+  auto moved = std::make_shared<Scene>(*motion_.scene);
+  moved->start = beside(moved->start, largest_position_, largest_velocity_);
+  Sample first, end;
+  Work work;
+  const auto at_node = [&](const ReadNode& read, bool last) {
+    if (first.q.size() == 0 && !read(Momentum::projected, first).ok()) return false;
+    if (last && !read(Momentum::projected, end).ok()) end = {};
+    return !time_is_up() && !(motion_.options.go_on && !motion_.options.go_on());
+  };
+  try {
+    (void)run_steps_of(moved, motion_.registry, motion_.solvers, steps_of(run.refinement), report_.adaptive,
+                       motion_.end, work, at_node);
+  } catch (const Misuse&) {  // a row of large units at rest: the velocity is off it
+    end = {};
+  }
+  report_.work.solves += work.solves;
+  return {first, end};
+}
+
 /// How much farther apart a run and one from beside its start end than they begin, relative to the sizes of
 /// both; 0 where that is not known.
 double RefinementSearch::amplification(const Counted& run) {
-  auto moved = std::make_shared<Scene>(*motion_.scene);
-  moved->start = beside(moved->start, largest_position_, largest_velocity_);
-  Sample end;
-  Work work;
-  (void)run_steps_of(moved, motion_.registry, motion_.solvers, steps_of(run.refinement), report_.adaptive,
-                     motion_.end, work, [&](const ReadNode& read, bool last) {
-                       if (last && !read(Momentum::projected, end).ok()) end = {};
-                       return !time_is_up();
-                     });
-  report_.work.solves += work.solves;
+  const auto [first, end] = run_beside(run);
   if (end.q.size() == 0) return 0.0;
-  double apart = relative_change(end.q, run.end.q, largest_position_);
-  if (largest_momentum_ > 0.0) apart = std::max(apart, relative_change(end.p, run.end.p, largest_momentum_));
-  return std::isfinite(apart) ? apart / distance_beside : 0.0;
+  double growth = relative_change(end.q, run.end.q, largest_position_) / distance_beside;
+  if (largest_momentum_ > 0.0) {
+    // The momenta of a heavy coordinate whose way is short are far apart from the first.
+    const double begin = path_.empty() ? 0.0 : max_norm(first.p - path_.front().p) / largest_momentum_;
+    growth = std::max(
+        growth, relative_change(end.p, run.end.p, largest_momentum_) / std::max(distance_beside, begin));
+  }
+  return std::isfinite(growth) ? growth : 0.0;
 }
 
 /// The error that round-off alone leaves, as far as the motion amplifies it; the finest run is asked where a
@@ -197,8 +225,10 @@ bool RefinementSearch::accept() {
   report_.estimate = std::max(report_.estimate, left);
   accepted_ = true;
   report_.warning = doubt_;
+  report_.grounds = left > convergence_.estimate() ? "that of round-off, which the motion amplifies"
+                                                   : convergence_.grounds();
   // Orders of differences that are round-off say nothing.
-  if (convergence_.difference() <= round_off_of(last_steps_)) report_.observed_order = std::nan("");
+  if (convergence_.at_round_off()) report_.observed_order = std::nan("");
   return false;
 }
 

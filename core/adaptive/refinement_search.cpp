@@ -16,6 +16,7 @@ namespace {
 // Of the ends of a step between whose kinks more parts are taken: in parts of the error, and at round-off.
 constexpr double unresolved_allowed = 0.01, least_unresolved = 1e-11;
 constexpr int max_failures = 12;  // of runs in a row
+constexpr int most_stuck = 5;     // of them, of a motion that sticks at a kink: shorter steps do not free it
 constexpr long fewest_steps = 4;  // of a run with variable steps that counts
 constexpr long nodes_between_looks = 64;
 constexpr std::size_t runs_kept = 3;
@@ -29,8 +30,8 @@ constexpr long steps_for_a_rescue = 50;     // of a run that goes on
 RefinementSearch::RefinementSearch(const Motion& motion, ErrorControlReport& report, double first)
     : motion_(motion),
       report_(report),
-      convergence_(report.order, motion.options.error),
       local_(report.adaptive && motion.registry.method(report.method).info.damped),
+      convergence_(report.order, motion.options.error, !local_),
       first_(first),
       eps_step_(std::copysign(first, motion.end - motion.scene->start.time)),
       unit_(motion.options.first_step > 0.0 ? 1 : 2),
@@ -122,11 +123,11 @@ RefinementSearch::Passed RefinementSearch::pass(long refinement, ErrorControlRun
     ended_ = motion_.options.go_on && !motion_.options.go_on();
     return !ended_ && !time_is_up() && report_.work.steps + nodes <= motion_.options.max_solves;
   };
-  const StepReport done = run_steps_of(motion_.scene, motion_.registry, motion_.solvers, steps,
+  const StepsTaken done = run_steps_of(motion_.scene, motion_.registry, motion_.solvers, steps,
                                        report_.adaptive, motion_.end, passed.work, at_node);
   count(now, passed.work);
   const Sample& end = passed.end;
-  now.failure = done.failure;
+  now.failure = done.last.failure;
   if (given_up) now.failure = "given up: its steps are too long to be solved from their guesses";
   if (now.failure.empty() && end.q.size() == 0) {
     now.failure = ended_          ? "interrupted"
@@ -137,7 +138,7 @@ RefinementSearch::Passed RefinementSearch::pass(long refinement, ErrorControlRun
   }
   if (now.failure.empty() && !(end.q.allFinite() && end.p.allFinite())) now.failure = "the end is not finite";
   if (!now.failure.empty()) {
-    passed.outcome = Outcome::failed;
+    passed.outcome = done.sticks ? Outcome::sticks : Outcome::failed;
     return passed;
   }
   energy.see(end);
@@ -174,7 +175,8 @@ RefinementSearch::Outcome RefinementSearch::run(long refinement) {
     coarsest_ = {refinement, steps, passed.end};
   else
     now.difference = difference(passed.end, report_.end);
-  convergence_.add(local_ ? first_ / static_cast<double>(refinement) : now.step, now.difference);
+  convergence_.add(local_ ? first_ / static_cast<double>(refinement) : now.step, now.difference,
+                   round_off_of(steps));
   report_.end = passed.end;
   if (last_.size() == runs_kept) last_.erase(last_.begin());
   last_.push_back({refinement, steps, std::move(passed.end)});
@@ -233,6 +235,11 @@ bool RefinementSearch::next(long max_solves) {
   switch (run(refinement_)) {
     case Outcome::ended:
       return !stopped(max_solves);
+    case Outcome::sticks:
+      if (++stuck_ == most_stuck)
+        return refuse("the " + std::to_string(most_stuck) +
+                      " finest of the runs end alike: " + report_.runs.back().failure);
+      [[fallthrough]];
     case Outcome::failed:
       if (++failures_ > max_failures)
         return refuse("a run failed even with the step " + to_text(report_.runs.back().step, 3) + ": " +
@@ -242,7 +249,7 @@ bool RefinementSearch::next(long max_solves) {
       refinement_ *= 2;
       return true;
     case Outcome::counts:
-      failures_ = 0;
+      failures_ = stuck_ = 0;
   }
   confirm();
   return (measuring_ && convergence_.runs() >= runs_to_measure) || conclude();

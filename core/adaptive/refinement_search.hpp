@@ -6,6 +6,7 @@
 #include <diracstep/core/adaptive/error_control.hpp>
 #include <diracstep/core/adaptive/force_survey.hpp>
 #include <diracstep/core/adaptive/search_run.hpp>
+#include <utility>
 
 namespace diracstep::detail {
 
@@ -37,7 +38,7 @@ class RefinementSearch {
   bool converged() const { return convergence_.accepted(); }
 
  private:
-  enum class Outcome { counts, does_not_count, failed, ended };
+  enum class Outcome { counts, does_not_count, failed, sticks, ended };
   /// A run that counts.
   struct Counted {
     long refinement, steps;
@@ -68,6 +69,7 @@ class RefinementSearch {
   void count(ErrorControlRun& now, const Work& work);
   bool time_is_up() const;
   bool kinks_on_the_way() const;
+  bool ramps_of_time() const;
   bool reached_end(double t) const;
   bool stopped(long max_solves);
   bool survey(bool accepted);
@@ -75,6 +77,7 @@ class RefinementSearch {
   std::vector<PathPoint> path_of(long refinement);
   void divide(const ForceSurveyReport& found);
   bool accept();
+  std::pair<Sample, Sample> run_beside(const Counted& run);
   double amplification(const Counted& run);
   double amplified_round_off(bool accepted);
   bool refuse_unless_amplified(const std::string& why);
@@ -83,9 +86,9 @@ class RefinementSearch {
 
   const Motion& motion_;
   ErrorControlReport& report_;
+  bool local_;  ///< variable steps by their local error, of which the error at the end is no power
   Convergence convergence_;
   StepPlan plan_;
-  bool local_;  ///< variable steps by their local error
   double first_;
   double eps_step_ = 0.0;  ///< of the options of variable steps, with its sign
   long unit_;  ///< refinement of the coarsest run: above 1 there are sizes between those of two runs
@@ -94,7 +97,7 @@ class RefinementSearch {
   std::vector<PathPoint> path_ = {};  ///< of that run, or of the last one with variable steps
   std::vector<Counted> last_ = {};    ///< the last three runs that count, the finest at the end
   double largest_position_ = 0.0, largest_momentum_ = 0.0, largest_velocity_ = 0.0;  ///< at the nodes read
-  int failures_ = 0, divisions_ = 0;
+  int failures_ = 0, stuck_ = 0, divisions_ = 0;
   double growth_ = 0.0;  ///< of errors, where it has been asked for
   bool surveyed_ = false, ended_ = false, measuring_ = false, accepted_ = false;
   std::string fast_;   ///< empty, or where the forces change fast

@@ -8,7 +8,7 @@ namespace {
 
 constexpr double rounding_of_time = 1e-12;  // of the time of a node, in parts of the motion
 
-StepReport run_fixed(Integrator& integrator, const ErrorControlReport::Steps& steps, double end,
+StepsTaken run_fixed(Integrator& integrator, const ErrorControlReport::Steps& steps, double end,
                      const AtNode& at_node) {
   const double span = std::abs(end - integrator.time());
   const ReadNode read = [&](Momentum momentum, Sample& sample) {
@@ -17,14 +17,17 @@ StepReport run_fixed(Integrator& integrator, const ErrorControlReport::Steps& st
     return report;
   };
   if (!at_node(read, false)) return {};
+  StepsTaken taken;
   long left = steps.plan.steps() * steps.refinement;
-  return steps.plan.run(
+  taken.last = steps.plan.run(
       integrator, steps.refinement, [&] { return at_node(read, --left == 0); },
       [&](const KinkPassed& kink) {
         return at_node(
             [&](Momentum momentum, Sample& sample) { return integrator.sample(kink, momentum, sample); },
             false);
       });
+  taken.sticks = !taken.last.ok() && !integrator.stuck_at_kink().empty();
+  return taken;
 }
 
 constexpr double far_ahead = 1e7;  // steps, which no run is allowed
@@ -63,13 +66,13 @@ StepReport run_variable(AdaptiveIntegrator& integrator, double end, const AtNode
 
 }  // namespace
 
-StepReport run_steps_of(const std::shared_ptr<const Scene>& scene, const Registry& registry,
+StepsTaken run_steps_of(const std::shared_ptr<const Scene>& scene, const Registry& registry,
                         const SolverFactory& solvers, const ErrorControlReport::Steps& steps, bool adaptive,
                         double end, Work& work, const AtNode& at_node) {
-  StepReport report;
+  StepsTaken taken;
   if (adaptive) {
     AdaptiveIntegrator integrator(scene, registry, solvers, steps.integrator, steps.variable);
-    report = run_variable(integrator, end, [&](const ReadNode& read, bool last) {
+    taken.last = run_variable(integrator, end, [&](const ReadNode& read, bool last) {
       work = integrator.work();
       return at_node(read, last);
     });
@@ -80,13 +83,13 @@ StepReport run_steps_of(const std::shared_ptr<const Scene>& scene, const Registr
     work.jacobian_evaluations += integrator.side_work().jacobian_evaluations;
   } else {
     Integrator integrator(scene, registry, solvers, steps.integrator);
-    report = run_fixed(integrator, steps, end, [&](const ReadNode& read, bool last) {
+    taken = run_fixed(integrator, steps, end, [&](const ReadNode& read, bool last) {
       work = integrator.work();
       return at_node(read, last);
     });
     work = integrator.work();
   }
-  return report;
+  return taken;
 }
 
 }  // namespace diracstep::detail

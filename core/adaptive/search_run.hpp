@@ -11,8 +11,14 @@ using ReadNode = std::function<SolveReport(Momentum, Sample&)>;
 /// Called at the start, at each node and at the end; false ends the run.
 using AtNode = std::function<bool(const ReadNode& read, bool last)>;
 
+struct StepsTaken {
+  StepReport last;
+  /// Whether the last step was refused because the motion crosses a kink again and again.
+  bool sticks = false;
+};
+
 /// One run with the steps of a report.  `work` is what it has taken so far, at each node and at the end.
-StepReport run_steps_of(const std::shared_ptr<const Scene>& scene, const Registry& registry,
+StepsTaken run_steps_of(const std::shared_ptr<const Scene>& scene, const Registry& registry,
                         const SolverFactory& solvers, const ErrorControlReport::Steps& steps, bool adaptive,
                         double end, Work& work, const AtNode& at_node);
 

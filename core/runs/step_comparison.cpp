@@ -12,6 +12,7 @@ constexpr double doubted_way = 0.25, doubted_change = 0.5;
 constexpr double doubted_of_all = 0.01;  // of the whole motion
 constexpr int higher_order = 3;
 constexpr double no_change = 1e-9;  // of a velocity or momentum, in parts of its size
+constexpr double from_rest = 0.5;   // of the way of a step, which the velocity at its start makes
 constexpr long fewest_steps = 3;    // before velocities and momenta count
 
 std::string line(double time, double part, const char* of) {
@@ -46,8 +47,14 @@ void StepComparison::add(const Sample& start, double h, const Sample& whole, con
   const double rounding = at_rest * std::max(max_norm(start.q), std::abs(h) * rest_.speed(h));
   if (first_.size() == 0) first_ = start.q;
   extent_ = std::max({extent_, max_norm(start.q - first_), max_norm(whole.q - first_)});
-  const double difference = max_norm(whole.q - parts.q) / std::max(longest_way_, rounding);
-  if (difference > 0.0 && !(difference <= worst_)) {
+  rounding_ = std::max(rounding_, rounding);
+  const double apart = max_norm(whole.q - parts.q), difference = apart / std::max(longest_way_, rounding);
+  if (std::abs(h) * max_norm(start.v) < from_rest * max_norm(whole.q - start.q)) {
+    if (apart > out_of_rest_) {
+      out_of_rest_ = apart;
+      out_of_rest_time_ = start.time;
+    }
+  } else if (difference > 0.0 && !(difference <= worst_)) {
     worst_ = difference;
     worst_time_ = start.time;
   }
@@ -57,6 +64,11 @@ void StepComparison::add(const Sample& start, double h, const Sample& whole, con
   momentum_.add(start.p, whole.p, parts.p, start.time);
 }
 
+double StepComparison::worst() const {
+  const double out_of_rest = out_of_rest_ > 0.0 ? out_of_rest_ / std::max(longest_way_, rounding_) : 0.0;
+  return out_of_rest > 0.0 && !(out_of_rest <= worst_) ? out_of_rest : worst_;
+}
+
 double StepComparison::part_of_motion() const {
   const double way = std::max(extent_, longest_way_);
   return std::max(way > 0.0 ? position_.largest / way : 0.0,
@@ -64,7 +76,9 @@ double StepComparison::part_of_motion() const {
 }
 
 std::string StepComparison::text() const {
-  if (worst_ > doubted_way) return line(worst_time_, worst_, "the way of a step");
+  if (const double part = worst(); part > doubted_way)
+    return line(part > worst_ || std::isnan(worst_) ? out_of_rest_time_ : worst_time_, part,
+                "the way of a step");
   if (order_ >= higher_order) {
     const double way = std::max(extent_, longest_way_);
     if (position_.largest > doubted_of_all * way && position_.largest > no_change * position_.size)

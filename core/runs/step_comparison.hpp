@@ -11,8 +11,11 @@ namespace diracstep {
 /// step: where it spans whole turns of a motion, halves of it see the same phase twice and end where it does.
 ///
 /// Positions are doubted above a quarter of  max h |v|∞ : methods of order 1 stay below at h times the rate
-/// of the motion of 1, the others at more.  Velocities and momenta, whose way may be short at a turning
-/// point, are measured by the longest way of the whole run, and doubted above a half of it.
+/// of the motion of 1, the others at more.  A step out of rest, in which the velocity grows to more than its
+/// own size, is measured by the longest way of the whole run: under a force that grows as a power of the time
+/// its parts differ from it by the same part of its own way whatever its size.  Velocities and momenta, whose
+/// way may be short at a turning point, are measured by the longest way of the whole run, and doubted above a
+/// half of it.
 ///
 /// A step of order 3 and above that differs from its parts by a hundredth of the whole motion, of the way
 /// from the first point compared and the largest momentum, is doubted too: no resolved motion has such steps,
@@ -30,7 +33,7 @@ class StepComparison {
   /// Empty, or a line that names the worst step so far.
   std::string text() const;
   /// The largest difference of positions so far; NaN before the first.
-  double worst() const { return worst_; }
+  double worst() const;
   /// The largest difference of positions so far, in parts of the way of the motion, or of momenta in parts of
   /// the largest.
   double part_of_motion() const;
@@ -44,6 +47,7 @@ class StepComparison {
 
   RestSizes rest_;
   double longest_way_ = 0.0, worst_ = std::numeric_limits<double>::quiet_NaN(), worst_time_ = 0.0;
+  double out_of_rest_ = 0.0, out_of_rest_time_ = 0.0, rounding_ = 0.0;  ///< a difference; of positions
   Differences velocity_, momentum_, position_;
   int order_;
   Vector first_;  ///< position

@@ -57,6 +57,11 @@ void KinkFinder::look_at(Node node, const Source& source) {
     case Op::max:
       return add_switch(found_.kinks, graph_.subtract(data.a, data.b), node,
                         data.op == Op::min ? "min" : "max", source);
+    case Op::sqrt:  // of a square: |u|
+      if (const NodeData square = graph_[data.a];
+          (square.op == Op::power && square.c == 2) || (square.op == Op::multiply && square.a == square.b))
+        return add_switch(found_.kinks, square.a, node, "sqrt", source);
+      break;
     case Op::tanh:
     case Op::atan:
       add_switch(found_.ramps, data.a, node, data.op == Op::tanh ? "tanh" : "atan", source);

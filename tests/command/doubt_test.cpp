@@ -347,5 +347,53 @@ value = 0.5
   EXPECT_NE(wrong.err.find("spin"), std::string::npos) << wrong.err;
 }
 
+/// Under t^n the parts of the first steps differ by the same part of their way whatever the step.
+TEST_F(Doubt, IsNotRaisedByStepsOutOfRest) {
+  for (const int n : {3, 6}) {
+    const double exact = std::pow(2.0, n + 2) / ((n + 1) * (n + 2));
+    for (const char* step : {"0.05", "0.0125"}) {
+      const std::string file =
+          scene("ramp", "lagrangian = \"v_x^2/2 + x*t^" + std::to_string(n) +
+                            "\"\n[coordinates]\nx = {}\n[span]\nend = 2\nstep = " + step);
+      const Outcome outcome = run("run " + file + " --method type1/left --json");
+      EXPECT_EQ(outcome.status, 0) << outcome.err;
+      EXPECT_NEAR(Json::parse(outcome.out)["end"]["q"]["x"].get<double>() / exact, 1.0, std::stod(step));
+    }
+  }
+}
+
+/// x'' = −x − 0.1 v/|v|: between its turns the motion is an arc of a circle about ∓0.1 in the plane of x and
+/// v.
+TEST_F(Doubt, AJumpUnderARootOfASquareIsSteppedTo) {
+  const std::string file = scene("dry", R"toml(
+lagrangian = "v_x^2/2 - x^2/2"
+[coordinates]
+x = {}
+[force]
+x = "-0.1*v_x/sqrt(v_x^2)"
+[start]
+x = 1
+v_x = -0.1
+[span]
+end = 9
+step = 0.1
+)toml");
+  double x = 1.0, v = -0.1, t = 0.0;
+  for (double centre = 0.1;; centre = -centre) {
+    double turn = std::atan2(v, x - centre);
+    if (turn <= 1e-9) turn += std::acos(-1.0);
+    const double a = x - centre, left = std::min(turn, 9.0 - t);
+    x = centre + a * std::cos(left) + v * std::sin(left);
+    v = left < turn ? -a * std::sin(left) + v * std::cos(left) : 0.0;
+    t += left;
+    if (left < turn) break;
+  }
+  const Outcome outcome = run("run " + file + " --json");
+  const Json end = Json::parse(outcome.out)["end"];
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_NEAR(end["q"]["x"].get<double>(), x, 1e-7);
+  EXPECT_NEAR(end["v"]["x"].get<double>(), v, 1e-7);
+}
+
 }  // namespace
 }  // namespace diracstep::testing

@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <chrono>
+#include <cmath>
 #include <csignal>
 #include <random>
 #include <thread>
@@ -48,11 +49,16 @@ class Started {
     send(signal);
     return wait();
   }
+  /// After ends_within().
+  int status() const { return status_; }
   bool ends_within(std::chrono::milliseconds time) {
     const auto deadline = std::chrono::steady_clock::now() + time;
     int status = 0;
     while (std::chrono::steady_clock::now() < deadline) {
-      if (waitpid(process_, &status, WNOHANG) == process_) return ended_ = true;
+      if (waitpid(process_, &status, WNOHANG) == process_) {
+        status_ = WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
+        return ended_ = true;
+      }
       std::this_thread::sleep_for(5ms);
     }
     return false;
@@ -61,6 +67,7 @@ class Started {
  private:
   pid_t process_ = -1;
   bool ended_ = false;
+  int status_ = 0;
 };
 
 class Endings : public Command {
@@ -241,6 +248,49 @@ TEST_F(Endings, APowerCutBeforeAnyWriteLeavesWhatCanBeResumed_slow) {
   EXPECT_GT(resumed, cuts / 2);
 }
 #endif
+
+/// Phases that last: a reference and a baseline of IDA, a fit, boundary values, controls.
+TEST_F(Endings, EveryVerbEndsSoonAfterASignalAndSaysSo) {
+  const std::string swing = scene("swing", R"toml(
+lagrangian = "v_x^2/2 - k*x^2/2"
+coordinates = { x = {} }
+parameters = { k = 1.3 }
+start = { x = 1 }
+span = { end = 100, step = 0.0001 }
+)toml");
+  std::string measured = "t,x\n";
+  for (int k = 1; k <= 10; ++k)
+    measured += std::to_string(10 * k) + "," + std::to_string(std::cos(10.0 * k * std::sqrt(1.2))) + "\n";
+  std::ofstream(path("measured.csv")) << measured;
+  const std::string controlled = scene("controlled", R"toml(
+lagrangian = "v_x^2/2 + cos(x)"
+coordinates = { x = {} }
+parameters = { u = 0 }
+force = { x = "u" }
+span = { end = 10, step = 0.005 }
+control = { parameters = ["u"], cost = "u^2" }
+)toml");
+  struct Verb {
+    std::string line;
+    std::chrono::milliseconds before;  ///< the signal: to come to the phase that lasts
+  };
+  const std::vector<Verb> verbs{
+      {"study steering_table --methods type1/gl:2 --out '" + path("study") + "'", 3s},
+      {"fit " + swing + " '" + path("measured.csv") + "' --parameters k", 500ms},
+      {"boundary " + swing + " --from x=1 --to x=0.3 --end 20 --step 1e-4", 500ms},
+      {"control " + controlled + " --to x=1 v_x=0", 500ms},
+      {"check --scenes", 500ms},
+      {"orders", 500ms}};
+  const std::string messages = path("messages");
+  for (const Verb& verb : verbs) {
+    Started process(verb.line, messages);
+    std::this_thread::sleep_for(verb.before);
+    process.send(SIGTERM);
+    ASSERT_TRUE(process.ends_within(15s)) << verb.line << ": most of it is for a loaded machine";
+    EXPECT_EQ(process.status(), 1) << verb.line;
+    EXPECT_NE(contents(messages).find("interrupted"), std::string::npos) << verb.line << contents(messages);
+  }
+}
 
 }  // namespace
 }  // namespace diracstep::testing

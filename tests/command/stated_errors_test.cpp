@@ -83,5 +83,101 @@ TEST_F(StatedErrors, VariableStepsFromRestEnd) {
   EXPECT_NE(limited.err.find("10 steps did not reach the end"), std::string::npos) << limited.err;
 }
 
+/// x'' = −x − 0.1 sign(v) from x = 1: each swing loses 0.2, and at t = 5π the spring no longer moves the
+/// mass.
+TEST_F(StatedErrors, AMotionThatSticksIsRefusedAfterFewRuns) {
+  for (const char* friction : {"-0.1*sign(v_x)", "if(v_x > 0, -0.1, 0.1)"}) {
+    const std::string file =
+        scene("dry", "lagrangian = \"v_x^2/2 - x^2/2\"\n[coordinates]\nx = {}\n[force]\nx = \"" +
+                         std::string(friction) + "\"\n[start]\nx = 1\n[span]\nend = 20\nstep = 0.1\n");
+    const Outcome outcome = run("run " + file + " --error 1e-6 --json");
+    EXPECT_EQ(outcome.status, 1) << outcome.err;
+    EXPECT_NE(outcome.err.find("crosses a jump in line 6 again and again"), std::string::npos) << outcome.err;
+    EXPECT_NE(outcome.err.find("from t = 15.7"), std::string::npos) << outcome.err;
+    EXPECT_LT(Json::parse(outcome.out)["error_control"]["solves"].get<long>(), 20000);
+  }
+}
+
+/// x'' = −x + tanh((t − a)/w): to w² the ramp is a jump from −1 to 1.
+TEST_F(StatedErrors, TheMotionIsDividedAtASteepRampOfTheTime) {
+  for (const double a : {8.6918, 3.3}) {
+    const std::string file = scene("ramp_of_time",
+                                   "lagrangian = \"v_x^2/2 - x^2/2\"\n[coordinates]\nx = {}\n[start]\nx = 1\n"
+                                   "[force]\nx = \"tanh((t - " +
+                                       std::to_string(a) + ")/2e-5)\"\n[span]\nend = 10\nstep = 0.1");
+    const Outcome outcome = run("run " + file + " --error 1e-6 --json");
+    ASSERT_EQ(outcome.status, 0) << outcome.err;
+    const Json json = Json::parse(outcome.out);
+    EXPECT_NEAR(json["end"]["q"]["x"].get<double>(), 1.0 + 2.0 * std::cos(10.0) - 2.0 * std::cos(10.0 - a),
+                1e-6);
+    EXPECT_LT(json["error_control"]["solves"].get<long>(), 20000);
+  }
+}
+
+/// Masses of ratio 1e-13 on one sum: round-off of the steps is amplified, to some 1e-6 of the light one.
+TEST_F(StatedErrors, AnAcceptedEstimateIsBelowTheErrorAskedFor) {
+  const std::string file = scene("degen", R"toml(
+lagrangian = "(v_x+v_y)^2/2 + 1e-13*v_y^2/2 - (x+y)^2/2 - 1e-13*y^2/2"
+[coordinates]
+x = {}
+y = {}
+[start]
+v_x = -1
+v_y = 1
+[span]
+end = 1.5
+step = 0.1
+)toml");
+  for (const double error : {1e-5, 1e-6}) {
+    const Outcome outcome = run("run " + file + " --json --error " + std::to_string(error));
+    const Json json = Json::parse(outcome.out), found = json["error_control"];
+    const double off = std::abs(json["end"]["q"]["y"].get<double>() / std::sin(1.5) - 1.0);
+    EXPECT_LT(off, found["estimate"].get<double>()) << outcome.out;
+    if (outcome.status == 0) {
+      EXPECT_LE(found["estimate"].get<double>(), error);
+    }
+  }
+}
+
+/// One scale for all coordinates took the start beside a light one for one far from a heavy one, and a start
+/// beside rest in millimetres for one off the rows: x = 1e-6 cos t of 1e12 kg, y = 1e6 cos 2t of 1e-12 kg.
+TEST_F(StatedErrors, UnitsDoNotMakeAMotionUncertain) {
+  const std::string masses = scene("masses", R"toml(
+lagrangian = "1e12*(v_x^2/2 - x^2/2) + 1e-12*(v_y^2/2 - 4*y^2/2)"
+[coordinates]
+x = {}
+y = {}
+[start]
+x = 1e-6
+y = 1e6
+[span]
+end = 5.0
+step = 0.1
+)toml");
+  const Outcome outcome = run("run " + masses + " --error 1e-6 --json");
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  const Json end = Json::parse(outcome.out)["end"];
+  EXPECT_NEAR(end["q"]["y"].get<double>() / (1e6 * std::cos(10.0)), 1.0, 1e-6);
+  EXPECT_NEAR(end["p"]["x"].get<double>() / (-1e6 * std::sin(5.0)), 1.0, 1e-6);
+  const std::string pendulum = scene("millimetres", R"toml(
+lagrangian = "1e-3*(v_x^2/2 + v_y^2/2 - 9810*y)"
+[coordinates]
+x = {}
+y = {}
+[[rows]]
+name = "rod"
+equation = "x^2 + y^2 = 1e6"
+[start]
+x = 1000
+[span]
+end = 1.0
+step = 0.02
+)toml");
+  const Outcome swung = run("run " + pendulum + " --error 1e-6 --json");
+  ASSERT_EQ(swung.status, 0) << swung.err;
+  // The same in metres by SciPy's DOP853 at 1e-13, of the angle.
+  EXPECT_NEAR(Json::parse(swung.out)["end"]["q"]["x"].get<double>(), -986.291751131, 1e-3);
+}
+
 }  // namespace
 }  // namespace diracstep::testing

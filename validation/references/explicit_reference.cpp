@@ -156,6 +156,7 @@ class ExplicitIntegration {
   static int rate(sunrealtype t, N_Vector y, N_Vector f, void* data) noexcept {
     auto& self = *static_cast<ExplicitIntegration*>(data);
     return self.callbacks_.guarded([&] {
+      if (self.options_.look && ++self.evaluations_ % evaluations_between_looks == 0) self.options_.look();
       auto values = map(f);
       return self.equations_.rate(t, map(y), values) && values.allFinite() ? 0 : 1;  // 1: try a shorter step
     });
@@ -164,6 +165,7 @@ class ExplicitIntegration {
   const Scene& scene_;
   ReferenceOptions options_;
   ReducedEquations equations_;
+  long evaluations_ = 0;
   detail::Context context_;  // outlives everything made from it
   detail::MessageSink sink_;
   detail::VectorHandle y_;

@@ -229,6 +229,7 @@ class IdaIntegration {
 
   static int residual(sunrealtype t, N_Vector y, N_Vector rate, N_Vector f, void* data) {
     return self(data).callbacks_.guarded([&] {
+      self(data).look_around();
       auto values = map(f);
       self(data).dae_.residual(t, map(y), map(rate), values);
       return values.allFinite() ? 0 : 1;  // IDA then tries a shorter step
@@ -242,6 +243,10 @@ class IdaIntegration {
       self(data).dae_.jacobian(t, cj, map(y), map(rate), values);
       return values.allFinite() ? 0 : 1;
     });
+  }
+
+  void look_around() {
+    if (options_.look && ++evaluations_ % evaluations_between_looks == 0) options_.look();
   }
 
   void make_shells() {
@@ -261,6 +266,7 @@ class IdaIntegration {
   const Scene& scene_;
   ReferenceOptions options_;
   double atol_;
+  long evaluations_ = 0;
   ImplicitLagrangianDae dae_;
   AccelerationProblem acceleration_problem_;
   std::unique_ptr<NonlinearSolver> acceleration_solver_;

@@ -124,6 +124,8 @@ class KernelIda {
 
   static int residual(sunrealtype t, N_Vector y, N_Vector rate, N_Vector f, void* data) noexcept {
     return self(data).callbacks_.guarded([&] {
+      if (self(data).options_.look && ++self(data).evaluations_ % evaluations_between_looks == 0)
+        self(data).options_.look();
       auto values = map(f);
       self(data).take(t, map(y), map(rate), values);
       return values.allFinite() ? 0 : 1;
@@ -154,6 +156,7 @@ class KernelIda {
   const Scene& scene_;
   ReferenceOptions options_;
   Eigen::Index n_, m_, size_;
+  long evaluations_ = 0;
   std::unique_ptr<MomentumVelocityProblem> velocity_;
   FirstOrderPoint point_;
   SparsityPattern pattern_;

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <diracstep/core/integrator/integrator.hpp>
+#include <functional>
 #include <string>
 
 namespace diracstep {
@@ -26,6 +27,8 @@ struct ReferenceOptions {
   Vector sizes = {};   ///< of q, v, p, whose parts absolute tolerances are; empty: 1 for each; IDA only
   long max_steps = 5'000'000;
   DaeFormulation formulation = DaeFormulation::rates;  ///< of IDA
+  /// Called now and then within the integration; what it throws ends it and passes through.
+  std::function<void()> look = {};
 };
 
 /// One run of an integrator of the continuous system.  `failure` is empty, or says why and where it stopped;
@@ -42,6 +45,8 @@ struct ReferenceRun {
 
   bool ok() const { return failure.empty(); }
 };
+
+inline constexpr long evaluations_between_looks = 64;
 
 /// Throws Misuse, naming the integrator, unless the scene's start is consistent, t_end is a finite time after
 /// it, and the options are in their ranges.

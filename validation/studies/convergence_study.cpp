@@ -111,7 +111,7 @@ class StudyInProgress {
         entry_, registry_, solvers_, study_.t_end, options_.reference_budget,
         [&] { look(0.0, "a converged reference"); }, damped());
     const bool by_ida = !ours.missing.empty() && entry_.events.empty();  // which knows no events
-    return by_ida ? reference_end(entry_, study_.t_end) : ours;
+    return by_ida ? reference_end(entry_, study_.t_end, [&] { look(0.0, "a reference by IDA"); }) : ours;
   }
 
   /// CPU seconds that the ladder which begins now may take: an even share of what is left.
@@ -306,6 +306,7 @@ class StudyInProgress {
     std::vector<Sample> ends(rtols.size());
     const auto run = [&](double rtol, int repeats, Sample& end) {
       ReferenceOptions reference{.rtol = rtol, .sizes = sizes(), .formulation = formulation};
+      reference.look = [&] { look(part, fmt::format("{}, rtol {:g}", baseline, rtol)); };
       if (std::isfinite(options_.time_limit)) reference.max_steps = most_steps_in_limited_time;
       return run_baseline(baseline, *entry_.scene, study_.t_end, reference, repeats, reference_, end);
     };

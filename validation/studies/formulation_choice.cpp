@@ -23,8 +23,8 @@ Candidate tried(DaeFormulation formulation, const Scene& scene, double t_end,
   Candidate candidate{formulation, {}};
   for (const double rtol : rtols) {
     if (look) look();
-    const ReferenceRun run =
-        integrate_with_ida(scene, t_end, {.rtol = rtol, .sizes = sizes, .formulation = formulation});
+    const ReferenceRun run = integrate_with_ida(
+        scene, t_end, {.rtol = rtol, .sizes = sizes, .formulation = formulation, .look = look});
     if (run.ok()) candidate.points.push_back({rtol, reference.distance(run.end), run.cpu_seconds});
     if (run.cpu_seconds > budget) break;
   }

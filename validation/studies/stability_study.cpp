@@ -93,10 +93,13 @@ class Watching {
   WatchResult result_;
 };
 
+/// Ends a run of IDA from within.
+struct CaseEnded {};
+
 /// The reference at the end, where the case has one; IDA is asked only where nothing else can be watched.
-ReferenceEnd reference_of(const StabilityCase& that) {
+ReferenceEnd reference_of(const StabilityCase& that, const std::function<void()>& look) {
   if (that.watches.empty() || (that.scene.reference.at && that.scene.reference.at(that.t_end)))
-    return reference_end(that.scene, that.t_end);
+    return reference_end(that.scene, that.t_end, look);
   return {.kind = {}, .how = {}, .missing = "no reference", .q = {}, .p = {}};
 }
 
@@ -111,7 +114,13 @@ class CaseRun {
  public:
   CaseRun(const StabilityCase& that, Integrator& integrator, StabilityRow& row,
           const std::function<bool()>& going_on)
-      : case_(that), integrator_(integrator), row_(row), going_on_(going_on), reference_(reference_of(that)) {
+      : case_(that),
+        integrator_(integrator),
+        row_(row),
+        going_on_(going_on),
+        reference_(reference_of(that, [&] {
+          if (going_on && !going_on()) throw CaseEnded{};
+        })) {
     for (const WatchedQuantity& watch : that.watches) watching_.emplace_back(watch, integrator.scene().start);
   }
 
@@ -169,14 +178,15 @@ class CaseRun {
   Sample end_;
 };
 
-IdaBeside run_ida_beside(const StabilityCase& that, const ReferenceEnd& reference, double rtol) {
+IdaBeside run_ida_beside(const StabilityCase& that, const ReferenceEnd& reference, double rtol,
+                         const std::function<void()>& look) {
   IdaBeside beside{.rtol = rtol};
   try {
     const auto given = completed(that.scene.scene);
     const auto without = given->refuse_redundant_rows ? given : with_independent_rows(given);
     const Scene& scene = *without;
     const ReferenceRun run =
-        integrate_with_ida(scene, that.t_end, {.rtol = rtol, .max_steps = ida_max_steps});
+        integrate_with_ida(scene, that.t_end, {.rtol = rtol, .max_steps = ida_max_steps, .look = look});
     beside.cpu_seconds = run.cpu_seconds;
     if (!run.ok()) {
       beside.status = run.failure;
@@ -195,11 +205,12 @@ IdaBeside run_ida_beside(const StabilityCase& that, const ReferenceEnd& referenc
   return beside;
 }
 
-std::vector<IdaBeside> ida_ladder(const StabilityCase& that, double most_seconds) {
-  const ReferenceEnd reference = reference_of(that);
+std::vector<IdaBeside> ida_ladder(const StabilityCase& that, double most_seconds,
+                                  const std::function<void()>& look) {
+  const ReferenceEnd reference = reference_of(that, look);
   std::vector<IdaBeside> runs;
   for (int decade = 3; decade <= 12; ++decade) {
-    runs.push_back(run_ida_beside(that, reference, std::pow(10.0, -decade)));
+    runs.push_back(run_ida_beside(that, reference, std::pow(10.0, -decade), look));
     if (!(runs.back().cpu_seconds <= std::max(most_seconds, ida_least_budget))) break;
   }
   return runs;
@@ -232,8 +243,14 @@ StabilityResult run_case(const StabilityCase& that, const Registry& registry, co
     result.rows.push_back(std::move(row));
     if (result.rows.back().cpu_seconds > most_seconds) most_seconds = result.rows.back().cpu_seconds;
   }
-  if (!with_ida || !look(that.name + ": IDA")) return result;
-  result.ida = ida_ladder(that, most_seconds);
+  if (!with_ida) return result;
+  try {
+    result.ida = ida_ladder(that, most_seconds, [&] {
+      if (!look(that.name + ": IDA")) throw CaseEnded{};
+    });
+  } catch (const CaseEnded&) {
+    return result;
+  }
   for (StabilityRow& row : result.rows)
     if (std::isfinite(row.cpu_seconds)) row.ida = at_cost(result.ida, row.cpu_seconds);
   return result;
@@ -269,6 +286,8 @@ StabilityRow run_stability_case(const StabilityCase& that, const Registry& regis
                           {.method = method.name, .order = method.order, .step = grid.step});
     row.order = integrator.options().order;
     CaseRun(that, integrator, row, going_on).run(grid.steps);
+  } catch (const CaseEnded&) {
+    row.message = "interrupted";
   } catch (const Misuse& misuse) {
     row.message = misuse.what();
   }

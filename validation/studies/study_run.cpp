@@ -18,7 +18,7 @@ namespace {
 constexpr double long_run = 0.03;         // CPU seconds above which a run is repeated less often
 constexpr double own_warm_up = 0.1;       // … above which it is not run once more to warm up
 constexpr double reference_rtol = 1e-13;  // of IDA, where a scene has no reference
-constexpr long steps_between_looks = 4096;
+constexpr long steps_between_looks = 256;
 
 CpuSeconds summary(std::vector<double> seconds) {
   std::ranges::sort(seconds);
@@ -49,9 +49,9 @@ double violation(const ConstraintRows& rows, const Sample& end) {
 }
 
 /// In the first formulation that completes of those that keep φ = 0.
-ReferenceEnd true_end_by_ida(const Scene& scene, double t_end) {
+ReferenceEnd true_end_by_ida(const Scene& scene, double t_end, const std::function<void()>& look) {
   ReferenceRun fine;
-  ReferenceOptions options{.rtol = reference_rtol};
+  ReferenceOptions options{.rtol = reference_rtol, .look = look};
   for (const DaeFormulation formulation :
        {DaeFormulation::rates, DaeFormulation::rates_loose, DaeFormulation::index_2}) {
     options.formulation = formulation;
@@ -122,9 +122,9 @@ std::optional<ReferenceEnd> known_point(const CatalogueScene& scene, double t) {
   return reference;
 }
 
-ReferenceEnd reference_end(const CatalogueScene& scene, double t_end) {
+ReferenceEnd reference_end(const CatalogueScene& scene, double t_end, const std::function<void()>& look) {
   if (auto known = known_point(scene, t_end)) return *std::move(known);
-  return true_end_by_ida(*completed(scene.scene), t_end);
+  return true_end_by_ida(*completed(scene.scene), t_end, look);
 }
 
 namespace {

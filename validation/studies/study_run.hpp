@@ -71,8 +71,9 @@ struct ReferenceEnd {
 /// The scene's reference at time t with p = ∂L/∂v; empty where it does not reach t.
 std::optional<ReferenceEnd> known_point(const CatalogueScene& scene, double t);
 
-/// The scene's reference at t_end with p = ∂L/∂v, or IDA's result at the tolerance 1e-13 where there is none.
-ReferenceEnd reference_end(const CatalogueScene& scene, double t_end);
+/// The scene's reference at t_end with p = ∂L/∂v, or IDA's result at the tolerance 1e-13 where there is none;
+/// `look` is that of ReferenceOptions.
+ReferenceEnd reference_end(const CatalogueScene& scene, double t_end, const std::function<void()>& look = {});
 
 /// Largest |φ(q)| and |A(q)v + b| at a point.
 double largest_violation(const Scene& scene, const Sample& at);

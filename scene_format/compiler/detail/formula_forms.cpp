@@ -37,13 +37,17 @@ CircuitQuery::Name FormulaParser::Reader::circuit_name() {
   return name;
 }
 
-/// x where the condition holds and y elsewhere; on its edge the mean of both.
-Node FormulaParser::Reader::chosen(const Condition& condition, Node x, Node y) {
+/// x where the condition holds and y elsewhere; on its edge the mean of both.  Jumps are named by the place.
+Node FormulaParser::Reader::chosen(const Condition& condition, Node x, Node y, std::size_t offset) {
+  const auto where = [&](Node difference, Node value) {
+    const Node node = graph_.where(difference, value);
+    return graph_[node].op == Op::where ? located(node, offset) : node;
+  };
   if (condition.parts.empty())
-    return graph_.add(graph_.where(condition.difference, x),
-                      graph_.where(graph_.negative(condition.difference), y));
+    return graph_.add(where(condition.difference, x), where(graph_.negative(condition.difference), y));
   const Condition &first = condition.parts[0], &second = condition.parts[1];
-  return condition.both ? chosen(first, chosen(second, x, y), y) : chosen(first, x, chosen(second, x, y));
+  return condition.both ? chosen(first, chosen(second, x, y, offset), y, offset)
+                        : chosen(first, x, chosen(second, x, y, offset), offset);
 }
 
 FormulaParser::Reader::Condition FormulaParser::Reader::comparison() {
@@ -71,22 +75,25 @@ FormulaParser::Reader::Condition FormulaParser::Reader::condition() {
 }
 
 Node FormulaParser::Reader::choice() {
+  const std::size_t offset = at();
   const Condition when = condition();
   expect(',', "',' and the value where the comparison holds");
   const Node x = expression();
   expect(',', "',' and the value where it does not");
   const Node y = expression();
   expect(')', "')'");
-  return chosen(when, x, y);
+  return chosen(when, x, y, offset);
 }
 
 /// a − b floor(a/b).
 Node FormulaParser::Reader::modulo() {
+  const std::size_t offset = at();
   const Node a = expression();
   expect(',', "',' and the second argument of mod");
   const Node b = expression();
   expect(')', "')'");
-  return graph_.subtract(a, graph_.multiply(b, graph_.apply(Op::floor, graph_.divide(a, b))));
+  const Node whole = located(graph_.apply(Op::floor, graph_.divide(a, b)), offset);
+  return graph_.subtract(a, graph_.multiply(b, whole));
 }
 
 /// An input at the time, or at what stands in parentheses behind its name.

@@ -96,7 +96,7 @@ class FormulaParser::Reader : FormulaScanner {
   };
 
   /// x where the condition holds and y elsewhere; on its edge the mean of both.
-  Node chosen(const Condition& condition, Node x, Node y);
+  Node chosen(const Condition& condition, Node x, Node y, std::size_t offset);
   Condition comparison();
   Condition condition();
   Node choice();

@@ -42,6 +42,26 @@ TEST(Kinks, SwitchingFunctionsChangeSignWhereDerivativesJump) {
   EXPECT_TRUE(kinks->instants(0.0, 10.0).empty()) << "where these lie depends on the motion";
 }
 
+TEST(Kinks, TheRootOfASquareIsOne) {
+  for (const char* force : {"sqrt((x - 2)^2)", "sqrt((x - 2)*(x - 2))"}) {
+    const auto kinks = kinks_of(force);
+    ASSERT_NE(kinks, nullptr) << force;
+    ASSERT_EQ(kinks->count(), 1) << force;
+    Vector g(1);
+    kinks->evaluate(0.0, one(1.75), one(0.0), g);
+    EXPECT_EQ(g[0], -0.25) << force;
+  }
+  EXPECT_EQ(kinks_of("-v_x/sqrt(1 + v_x^2)"), nullptr);
+}
+
+TEST(Kinks, JumpsAreNamedByTheirLine) {
+  for (const char* force : {"if(x > 2, 1, 3)", "if(x > 2 and v_x < 1, 1, 3)", "mod(x, 2)", "sign(x)"}) {
+    const auto kinks = kinks_of(force);
+    ASSERT_NE(kinks, nullptr) << force;
+    for (const std::string& name : kinks->names()) EXPECT_EQ(name, "a jump in line 11") << force;
+  }
+}
+
 TEST(Kinks, TimesOfSwitchesAndPulsesAreExact) {
   const auto switched = kinks_of("min(1, max(0, steep*(t - on))) - min(1, max(0, steep*(t - off)))");
   const auto at = switched->instants(0.0, 10.0);
