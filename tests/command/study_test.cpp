@@ -24,8 +24,12 @@ TEST_F(StudyCommand, ScenesOnManifoldsHaveTheOrdersOfTheirStagesBesideIda) {
     for (const Json& row : study["rows"]) {
       EXPECT_EQ(row["status"], "ok") << row;
       const double error = std::max(row["error_q"].get<double>(), row["error_p"].get<double>());
-      if (row["method"] == "ida" && row["rtol"] == 1e-9) EXPECT_LT(error, 1e-6) << scene;
-      if (row["method"] == "erk" && row["rtol"] == 1e-9) EXPECT_LT(error, 1e-7) << scene;
+      if (row["method"] == "ida" && row["rtol"] == 1e-9) {
+        EXPECT_LT(error, 1e-6) << scene;
+      }
+      if (row["method"] == "erk" && row["rtol"] == 1e-9) {
+        EXPECT_LT(error, 1e-7) << scene;
+      }
     }
     ASSERT_EQ(study["measured_order"].size(), 2u);
     for (std::size_t k = 0; k < 2; ++k)

@@ -78,7 +78,7 @@ TEST(GroupReferenceOfTheCatalogue, IdaMeetsTheReferenceOfEveryScene) {
     if (!entry.scene->space) continue;
     ++scenes;
     const auto known = known_point(entry, entry.t_end);
-    ASSERT_TRUE(known) << name;
+    ASSERT_TRUE(known) << name << ": its reference is not whole";
     const ReferenceRun ida = integrate_with_ida(*entry.scene, entry.t_end, {.rtol = 1e-11});
     ASSERT_TRUE(ida.ok()) << name << ": " << ida.failure;
     EXPECT_LT(known->distance(ida.end), name == "heavy_top_so3" ? 1e-4 : 1e-6) << name;  // at 150 rad/s
@@ -88,7 +88,8 @@ TEST(GroupReferenceOfTheCatalogue, IdaMeetsTheReferenceOfEveryScene) {
 
 /// Frames of a sphere turn about their point, which is no difference of two ends; where they point is.
 TEST(FramesOfSpheres, AreTurnedToThoseOfTheReference) {
-  const Scene& scene = *group_scenes::all_scenes().back().scene;
+  const std::shared_ptr<const Scene> sphere = group_scenes::all_scenes().back().scene;
+  const Scene& scene = *sphere;
   ASSERT_FALSE(scene.space->turns().empty());
   Sample here, turned;
   here.q = scene.start.q;
