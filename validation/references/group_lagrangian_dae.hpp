@@ -14,9 +14,9 @@ namespace diracstep {
 ///
 /// with F the derivative of L along the space, f the force; the other formulations as in
 /// implicit_lagrangian_dae.hpp.  Nothing holds q on the space: quaternions leave norm 1 by the tolerance of
-/// the integration, see ReferenceRun::off_space.  The Jacobian is a full matrix; derivatives by q are those
-/// along the space, B⁺ before them, and leave out the part across it, which such motions have from errors of
-/// the iteration alone.  O. Brüls, A. Cardona, J. Comput. Nonlinear Dynam. 5 (2010) for the equations.
+/// the integration, see ReferenceRun::off_space.  The Jacobian is a full matrix; its derivatives by q are
+/// those along the space, with B⁺ behind them, and differences of the residual across it.  O. Brüls, A.
+/// Cardona, J. Comput. Nonlinear Dynam. 5 (2010) for the equations.
 class GroupLagrangianDae final : public ContinuousDae {
  public:
   /// The scene must have a space and outlive this.
@@ -30,6 +30,7 @@ class GroupLagrangianDae final : public ContinuousDae {
  private:
   /// v + A_holᵀ M, the velocity that moves q.
   Vector moving_velocity(double t, ConstVectorRef y, ConstVectorRef multipliers) const;
+  void add_across(double t, ConstVectorRef y, ConstVectorRef rate, const Columns& basis, VectorRef values);
   const ConstVectorRef& multipliers(const ConstVectorRef& y, const ConstVectorRef& rate) const;
 
   const Scene& scene_;
