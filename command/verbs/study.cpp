@@ -21,7 +21,6 @@
 #include <diracstep/reports/study_comparison.hpp>
 #include <diracstep/reports/study_page.hpp>
 #include <diracstep/reports/study_plot.hpp>
-#include <diracstep/scene_format/position_names.hpp>
 #include <diracstep/scene_format/scene_file.hpp>
 #include <diracstep/solvers/sundials_build.hpp>
 #include <exception>
@@ -276,10 +275,7 @@ void study(const StudyArguments& options, Session& session) {
     return study_gradients({options.scenes, options.set, options.end, options.out, options.json}, session);
   require_files(options, session);
   std::vector<CatalogueScene> scenes = chosen_scenes(options, session);
-  for (const CatalogueScene& entry : scenes) {
-    require_flat(*entry.scene, "study");
-    tell_baselines_left_out(entry);
-  }
+  for (const CatalogueScene& entry : scenes) tell_baselines_left_out(entry);
   const StudyOptions chosen = study_options(options);
   const std::string before = options.compare.empty() ? "" : earlier_study(options.compare);
   std::optional<OutputDirectory> out = report_directory(options);

@@ -1,8 +1,10 @@
+#include <algorithm>
 #include <diracstep/core/integrator/integrator.hpp>
 #include <diracstep/core/integrator/step_sequence.hpp>
 #include <diracstep/core/spaces/space.hpp>
 #include <diracstep/core/steps/groups/step.hpp>
 #include <diracstep/core/system/first_order_motions.hpp>
+#include <diracstep/core/system/kept_momenta.hpp>
 
 namespace diracstep {
 
@@ -18,6 +20,21 @@ PlanLine space_line(const Scene& scene) {
                                   : sizes};
 }
 
+/// The first of them by name, and how many more.
+PlanLine kept_momenta_line(const Scene& scene, const std::vector<std::string>& names) {
+  constexpr std::size_t named = 6;
+  std::string text;
+  for (std::size_t i = 0; i < std::min(named, names.size()); ++i) text += (i > 0 ? ", " : "") + names[i];
+  if (names.size() > named) text += " and " + std::to_string(names.size() - named) + " more";
+  const std::string function = scene.by_hamiltonian() ? "H" : "L";
+  return {
+      "cyclic coordinates", text,
+      function + (scene.space ? " does not change along them, as axes of space, and neither rows nor forces "
+                                "act there: these momenta in space are kept"
+                              : " does not depend on them, and neither rows nor forces act along them: "
+                                "their momenta are kept")};
+}
+
 }  // namespace
 
 std::vector<PlanLine> Integrator::plan() const {
@@ -30,6 +47,8 @@ std::vector<PlanLine> Integrator::plan() const {
   lines.push_back(
       {"step", info.name, info.solved_as.empty() ? info.summary : info.summary + "; " + info.solved_as});
   if (scene_->space) lines.push_back(space_line(*scene_));
+  if (const auto kept = kept_momenta(*scene_); !kept.empty())
+    lines.push_back(kept_momenta_line(*scene_, kept));
   lines.push_back(
       {"unknowns", problem.traits().unknowns,
        solver != nullptr ? "one nonlinear system in each solve" : "the graph is solved for its end"});

@@ -55,7 +55,7 @@ TEST_F(SceneVerbs, CheckRunsEverySceneAgainstItsPublishedValues) {
     EXPECT_FALSE(one["source"].get<std::string>().empty()) << one;
     scenes.insert(one["scene"].get<std::string>());
   }
-  EXPECT_EQ(scenes.size(), 56U);
+  EXPECT_EQ(scenes.size(), 66U);
   expect_misuse("check --scenes knife_edge", {"--scenes"});
 }
 

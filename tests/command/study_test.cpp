@@ -13,18 +13,32 @@ class StudyCommand : public Command {
   const std::string small = "--orders 2,4 --steps 0.1,0.05,0.025 --rtols 1e-6,1e-8 --repeat 2 --end 5";
 };
 
-TEST_F(StudyCommand, ScenesOnManifoldsAreRefusedByName) {
-  const std::string file = scene("top", R"(
-lagrangian = "(w_R[1]^2 + w_R[2]^2 + 2*w_R[3]^2)/2"
-[coordinates]
-R = "SO3"
-[start]
-w_R = [1, 0, 1]
-[span]
-end = 1
-step = 0.1
-)");
-  expect_misuse("study " + file, {"study", "'top'"});
+/// Errors on groups and spheres: of the stored numbers, where those of a sphere are told up to its frame.
+TEST_F(StudyCommand, ScenesOnManifoldsHaveTheOrdersOfTheirStagesBesideIda) {
+  for (const char* scene : {"chaplygin_ball_so3", "conical_pendulum_s2"}) {
+    const Outcome outcome = run(std::string("study ") + scene +
+                                " --json --methods type1/gl:1,type1/gl:2 --steps 0.05,0.025,0.0125,0.00625 "
+                                "--rtols 1e-6,1e-9 --repeat 1");
+    ASSERT_EQ(outcome.status, 0) << outcome.err;
+    const Json study = Json::parse(outcome.out)["studies"][0];
+    for (const Json& row : study["rows"]) {
+      EXPECT_EQ(row["status"], "ok") << row;
+      const double error = std::max(row["error_q"].get<double>(), row["error_p"].get<double>());
+      if (row["method"] == "ida" && row["rtol"] == 1e-9) {
+        EXPECT_LT(error, 5e-6) << scene;
+      }
+      if (row["method"] == "erk" && row["rtol"] == 1e-9) {
+        EXPECT_LT(error, 1e-7) << scene;
+      }
+    }
+    int told = 0;  // compositions of high order are at round-off at every one of these steps
+    for (const Json& measured : study["measured_order"]) {
+      if (!measured["slope"].is_number()) continue;
+      ++told;
+      EXPECT_NEAR(measured["slope"].get<double>(), measured["order"].get<double>(), 0.2) << scene << measured;
+    }
+    EXPECT_GE(told, 3) << scene;
+  }
 }
 
 // Names the scene that takes longest first, so that its thread ends last.

@@ -134,7 +134,8 @@ int sweep(int largest) {
     const Scene& scene = *entry.scene;
     if (!entry.needs.empty() || scene.dimension() + scene.rows() > largest) continue;
     if (completed(entry.scene)->lagrangian->structure().y_hessian_zero) continue;
-    if (entry.scene->kinks || !entry.events.empty()) continue;  // of which a plugin tells nothing
+    if (scene.space || entry.scene->kinks || !entry.events.empty())
+      continue;  // of which a plugin tells nothing
     ++scenes;
     SCOPED_TRACE(name);
 

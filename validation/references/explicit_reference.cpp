@@ -13,7 +13,8 @@
 
 namespace diracstep {
 
-ReducedEquations::ReducedEquations(const Scene& scene, bool dense) : n_(scene.dimension()) {
+ReducedEquations::ReducedEquations(const Scene& scene, bool dense)
+    : space_(scene.space.get()), numbers_(scene.storage_size()), n_(scene.dimension()) {
   const NonlinearProblem* problem = nullptr;
   if (scene.lagrangian->structure().y_hessian_zero)
     problem = (phase_velocity_ = std::make_unique<PhaseSpaceVelocityProblem>(scene, dense)).get();
@@ -42,9 +43,12 @@ bool ReducedEquations::rate(double t, ConstVectorRef y, VectorRef rate) {
     rate = solution_;
     return true;
   }
-  acceleration_->begin(t, y.head(n_), y.tail(n_));
+  acceleration_->begin(t, y.head(numbers_), y.tail(n_));
   if (!solve_linear(*acceleration_)) return false;
-  rate.head(n_) = y.tail(n_);
+  if (space_ != nullptr)
+    rate.head(numbers_) = space_->tangent_basis(y.head(numbers_)) * y.tail(n_);
+  else
+    rate.head(n_) = y.tail(n_);
   rate.tail(n_) = solution_.head(n_);
   return true;
 }
@@ -52,7 +56,7 @@ bool ReducedEquations::rate(double t, ConstVectorRef y, VectorRef rate) {
 bool ReducedEquations::read(double t, ConstVectorRef y, Vector& v, Vector& forces) {
   Vector at_y(size());
   if (!rate(t, y, at_y)) return false;
-  v = at_y.head(n_);
+  v = space_ != nullptr ? Vector(y.tail(n_)) : Vector(at_y.head(n_));
   forces = solution_.tail(solution_.size() - n_);
   return true;
 }
@@ -73,8 +77,8 @@ class ExplicitIntegration {
         equations_(scene, scene.dimension() + scene.rows() <= largest_full_system()) {
     y_.reset(require(N_VNew_Serial(equations_.size(), context_), "N_VNew_Serial"));
     auto y = map(y_.get());
-    y.head(scene.dimension()) = scene.start.q;
-    if (y.size() > scene.dimension()) y.tail(scene.dimension()) = scene.start.v;
+    y.head(scene.storage_size()) = scene.start.q;
+    if (y.size() > scene.storage_size()) y.tail(scene.dimension()) = scene.start.v;
   }
 
   ReferenceRun run_arkode(double t_end) {
@@ -141,11 +145,12 @@ class ExplicitIntegration {
     Sample& end = run.end;
     const auto y = map(y_.get());
     end.time = t;
-    end.q = y.head(scene_.dimension());
+    end.q = y.head(scene_.storage_size());
     if (!equations_.read(t, y, end.v, end.lambda)) {
       if (run.ok()) run.failure = "the accelerations at the end are not determined";
       end.v = Vector::Constant(scene_.dimension(), std::numeric_limits<double>::quiet_NaN());
     }
+    put_on_space(scene_, run);
     Vector force(scene_.dimension());
     end.p.resize(scene_.dimension());
     scene_.lagrangian->gradient(t, end.q, end.v, force, end.p);

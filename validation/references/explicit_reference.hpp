@@ -1,5 +1,6 @@
 #pragma once
 
+#include <diracstep/core/spaces/space.hpp>
 #include <diracstep/core/system/first_order_motions.hpp>
 #include <diracstep/core/system/saddle_point.hpp>
 #include <diracstep/solvers/detail/linear_solver.hpp>
@@ -13,6 +14,7 @@ namespace diracstep {
 /// differentiated, so that a numerical solution drifts off them.
 ///
 ///   L regular on Δ_Q   y = (q, v),   q̇ = v,   v̇ = a with  [∂²L/∂v² −Aᵀ; A 0] (a, Λ) = …
+///   … on a space       y = (q, v),   q̇ = B v,  with the stored numbers q and B = d(q τ(x))/dx at x = 0
 ///   L linear in v      y = q,        q̇ = v with  (Dθᵀ − Dθ) v = ∂H/∂q
 ///
 /// The accelerations are those of AccelerationProblem, the velocities those of PhaseSpaceVelocityProblem.
@@ -21,7 +23,7 @@ class ReducedEquations {
   /// With `dense` the linear system of a rate is factored as a full matrix.
   ReducedEquations(const Scene& scene, bool dense);
 
-  int size() const { return (acceleration_ ? 2 : 1) * n_; }
+  int size() const { return numbers_ + (acceleration_ ? n_ : 0); }
 
   /// ẏ at y; false where the linear system is singular.
   bool rate(double t, ConstVectorRef y, VectorRef rate);
@@ -32,7 +34,8 @@ class ReducedEquations {
  private:
   bool solve_linear(NonlinearProblem& problem);
 
-  int n_;
+  const Space* space_;                                 ///< null in R^n
+  int numbers_, n_;                                    ///< of q and v
   std::unique_ptr<AccelerationProblem> acceleration_;  ///< one of the two
   std::unique_ptr<PhaseSpaceVelocityProblem> phase_velocity_;
   std::unique_ptr<detail::LinearSolver> linear_solver_;

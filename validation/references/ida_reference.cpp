@@ -13,6 +13,7 @@
 #include <diracstep/solvers/detail/linear_solver.hpp>
 #include <diracstep/solvers/detail/shells.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
+#include <diracstep/validation/references/group_lagrangian_dae.hpp>
 #include <diracstep/validation/references/ida_reference.hpp>
 #include <diracstep/validation/references/implicit_lagrangian_dae.hpp>
 #include <diracstep/validation/references/kernel_reference.hpp>
@@ -29,6 +30,11 @@ using detail::require;
 
 constexpr double loose_tolerance = 1e2;  // of multipliers that no test is to wait for
 
+std::unique_ptr<ContinuousDae> continuous_dae(const Scene& scene, bool dense, DaeFormulation formulation) {
+  if (scene.space) return std::make_unique<GroupLagrangianDae>(scene, formulation);
+  return std::make_unique<ImplicitLagrangianDae>(scene, dense, formulation);
+}
+
 struct FreeIda {
   void operator()(void* memory) const { IDAFree(&memory); }
 };
@@ -42,16 +48,16 @@ class IdaIntegration {
       : scene_(scene),
         options_(options),
         atol_(options.atol > 0.0 ? options.atol : options.rtol),
-        dae_(scene, ImplicitLagrangianDae::unknowns(scene, options.formulation) <= largest_full_system(),
-             options.formulation),
-        acceleration_problem_(
-            scene, ImplicitLagrangianDae::unknowns(scene, options.formulation) <= largest_full_system()),
+        size_(dae_unknowns(scene, options.formulation)),
+        numbers_(scene.storage_size()),
+        dae_(continuous_dae(scene, size_ <= largest_full_system(), options.formulation)),
+        acceleration_problem_(scene, size_ <= largest_full_system()),
         acceleration_solver_(kinsol()(acceleration_problem_)),
         acceleration_(Vector::Zero(acceleration_problem_.size())),
-        linear_solver_(detail::make_linear_solver(dae_.pattern())),
-        values_(Vector::Zero(dae_.pattern().nonzeros())) {
+        linear_solver_(detail::make_linear_solver(dae_->pattern())),
+        values_(Vector::Zero(dae_->pattern().nonzeros())) {
     for (auto* vector : {&y_, &rate_, &tolerance_, &differential_})
-      vector->reset(require(N_VNew_Serial(dae_.size(), context_), "N_VNew_Serial"));
+      vector->reset(require(N_VNew_Serial(size_, context_), "N_VNew_Serial"));
   }
 
   ReferenceRun run(double t_end) {
@@ -75,9 +81,7 @@ class IdaIntegration {
 
  private:
   void* ida() const { return ida_.get(); }
-  Eigen::Map<Vector> column(const auto& vector) const {
-    return {N_VGetArrayPointer(vector.get()), dae_.size()};
-  }
+  Eigen::Map<Vector> column(const auto& vector) const { return {N_VGetArrayPointer(vector.get()), size_}; }
 
   SolveReport solve_acceleration(double t, ConstVectorRef q, ConstVectorRef v) {
     acceleration_problem_.begin(t, q, v);
@@ -86,7 +90,7 @@ class IdaIntegration {
 
   /// The velocity at the start that a Lagrangian linear in v determines, whatever the scene gives.
   SolveReport solve_phase_space_velocity(VectorRef v) {
-    PhaseSpaceVelocityProblem problem(scene_, dae_.size() <= largest_full_system());
+    PhaseSpaceVelocityProblem problem(scene_, size_ <= largest_full_system());
     problem.begin(scene_.start.time, scene_.start.q);
     return kinsol()(problem)->solve(v);
   }
@@ -110,12 +114,12 @@ class IdaIntegration {
   /// system.
   std::string make_start() {
     const Start& start = scene_.start;
-    const Eigen::Index n = start.q.size(), m = scene_.rows();
+    const Eigen::Index n = scene_.dimension(), m = scene_.rows();
     auto y = column(y_), rate = column(rate_);
     y.setZero();
     rate.setZero();
-    y.head(n) = start.q;
-    y.segment(n, n) = start.v;
+    y.head(numbers_) = start.q;
+    y.segment(numbers_, n) = start.v;
     const FirstOrderMotions motions = first_order_motions(scene_);
     const bool linear_in_v = motions.exist(), alone = motions.u.cols() == 0 && m == 0 && !scene_.force;
     const SolveReport report = !linear_in_v ? solve_acceleration(start.time, start.q, start.v)
@@ -124,13 +128,18 @@ class IdaIntegration {
     if (!report.ok())
       return std::string(linear_in_v ? "start: velocity: " : "start: acceleration and forces: ") +
              describe(report.status);
-    rate.head(n) = y.segment(n, n);
-    if (!linear_in_v) rate.segment(n, n) = acceleration_.head(n);  // v̇ appears nowhere: a prediction alone
-    (options_.formulation == DaeFormulation::index_2 ? y : rate).segment(3 * n, m) = acceleration_.tail(m);
-    Vector f(dae_.size());  // with p = 0 and ṗ = 0 the residual is what they must be
-    dae_.residual(start.time, y, rate, f);
-    rate.segment(2 * n, n) = -f.segment(n, n);
-    y.segment(2 * n, n) = -f.segment(2 * n, n);
+    const Eigen::Index momentum = numbers_ + n;
+    const auto v = y.segment(numbers_, n);
+    rate.head(numbers_) = scene_.space ? Vector(scene_.space->tangent_basis(start.q) * v) : Vector(v);
+    // v̇ appears nowhere: a prediction alone
+    if (!linear_in_v) rate.segment(numbers_, n) = acceleration_.head(n);
+    (options_.formulation == DaeFormulation::index_2 ? y : rate).segment(momentum + n, m) =
+        acceleration_.tail(m);
+    Vector f(size_);  // with p = 0 and ṗ = 0 the residual is what they must be
+    dae_->residual(start.time, y, rate, f);
+    y.segment(momentum, n) = -f.segment(momentum, n);
+    if (scene_.space) dae_->residual(start.time, y, rate, f);  // there p is in the rate of p
+    rate.segment(momentum, n) = -f.segment(numbers_, n);
     return {};
   }
 
@@ -159,7 +168,7 @@ class IdaIntegration {
   /// are left to themselves every tolerance from 1e-4 to 1e-14 completes on the squeezer with 0.33, against
   /// seven of eleven.
   void set_error_control() {
-    const int n = scene_.dimension(), multipliers = dae_.size() - 3 * n;
+    const Eigen::Index n = scene_.dimension(), multipliers = size_ - numbers_ - 2 * n;
     const bool loose = options_.formulation == DaeFormulation::rates_loose ||
                        options_.formulation == DaeFormulation::index_2;
     column(tolerance_).setConstant(atol_);
@@ -167,7 +176,8 @@ class IdaIntegration {
       if (options_.sizes[i] > 0.0) column(tolerance_)[i] = atol_ * options_.sizes[i];
     if (loose) column(tolerance_).tail(multipliers).setConstant(loose_tolerance);
     require(IDASVtolerances(ida(), options_.rtol, tolerance_.get()), "IDASVtolerances");
-    column(differential_) << Vector::Ones(n), Vector::Zero(n), Vector::Ones(n), Vector::Zero(multipliers);
+    column(differential_) << Vector::Ones(numbers_), Vector::Zero(n), Vector::Ones(n),
+        Vector::Zero(multipliers);
     require(IDASetId(ida(), differential_.get()), "IDASetId");
     require(IDASetSuppressAlg(ida(), 1), "IDASetSuppressAlg");
     const double round_off =
@@ -180,7 +190,7 @@ class IdaIntegration {
   /// Newton iteration fails; a tenth of the square root of the tolerance is small enough for a step of
   /// order 1.
   double first_step(double t_end) const {
-    const int n = 3 * scene_.dimension();
+    const Eigen::Index n = numbers_ + 2 * scene_.dimension();
     const Vector y = column(y_).head(n).cwiseAbs(), rate = column(rate_).head(n).cwiseAbs();
     const Vector allowed = options_.rtol * y + column(tolerance_).head(n);
     const double tolerances_per_time = rate.cwiseQuotient(allowed).maxCoeff();
@@ -209,8 +219,9 @@ class IdaIntegration {
     const int n = scene_.dimension();
     Sample& end = run.end;
     end.time = t;
-    end.q = column(y_).head(n);
-    end.v = column(y_).segment(n, n);
+    end.q = column(y_).head(numbers_);
+    end.v = column(y_).segment(numbers_, n);
+    put_on_space(scene_, run);
     Vector force(n);
     end.p.resize(n);
     scene_.lagrangian->gradient(t, end.q, end.v, force, end.p);
@@ -231,7 +242,7 @@ class IdaIntegration {
     return self(data).callbacks_.guarded([&] {
       self(data).look_around();
       auto values = map(f);
-      self(data).dae_.residual(t, map(y), map(rate), values);
+      self(data).dae_->residual(t, map(y), map(rate), values);
       return values.allFinite() ? 0 : 1;  // IDA then tries a shorter step
     });
   }
@@ -240,7 +251,7 @@ class IdaIntegration {
                       void* data, N_Vector, N_Vector, N_Vector) {
     return self(data).callbacks_.guarded([&] {
       Vector& values = self(data).values_;
-      self(data).dae_.jacobian(t, cj, map(y), map(rate), values);
+      self(data).dae_->jacobian(t, cj, map(y), map(rate), values);
       return values.allFinite() ? 0 : 1;
     });
   }
@@ -267,7 +278,9 @@ class IdaIntegration {
   ReferenceOptions options_;
   double atol_;
   long evaluations_ = 0;
-  ImplicitLagrangianDae dae_;
+  int size_;              ///< unknowns
+  Eigen::Index numbers_;  ///< stored numbers of q among them, before v
+  std::unique_ptr<ContinuousDae> dae_;
   AccelerationProblem acceleration_problem_;
   std::unique_ptr<NonlinearSolver> acceleration_solver_;
   Vector acceleration_;  ///< (a, Λ̇) at the point last solved for

@@ -2,16 +2,12 @@
 
 namespace diracstep {
 
-namespace {
-
 bool stabilised(const ConstraintRows& rows, DaeFormulation formulation) {
   return rows.holonomic() && formulation != DaeFormulation::velocity;
 }
 
-}  // namespace
-
-int ImplicitLagrangianDae::unknowns(const Scene& scene, DaeFormulation formulation) {
-  int count = 3 * scene.dimension() + scene.rows();
+int dae_unknowns(const Scene& scene, DaeFormulation formulation) {
+  int count = scene.storage_size() + 2 * scene.dimension() + scene.rows();
   for (const auto& block : scene.constraints)
     if (stabilised(*block, formulation)) count += block->rows();
   return count;
@@ -22,7 +18,7 @@ ImplicitLagrangianDae::ImplicitLagrangianDae(const Scene& scene, bool dense, Dae
       force_(scene.force),
       formulation_(formulation),
       n_(scene.dimension()),
-      size_(unknowns(scene, formulation)),
+      size_(dae_unknowns(scene, formulation)),
       layout_(size_, size_),
       diagonal_(SparsityPattern::diagonal(n_)),
       ones_(Vector::Ones(n_)),

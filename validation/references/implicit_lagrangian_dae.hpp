@@ -2,6 +2,7 @@
 
 #include <diracstep/core/numerics/sparsity_pattern.hpp>
 #include <diracstep/core/system/scene.hpp>
+#include <diracstep/validation/references/continuous_dae.hpp>
 #include <diracstep/validation/references/reference_run.hpp>
 #include <memory>
 #include <vector>
@@ -15,22 +16,16 @@ namespace diracstep {
 ///
 /// where Λ̇ are the forces of all rows and Ṁ, present for holonomic rows only, keeps φ = 0 (stabilisation of
 /// Gear, Gupta and Leimkuhler).  In `index_2` Λ and M stand in place of Λ̇ and Ṁ; `velocity` is without M and
-/// φ = 0.
-class ImplicitLagrangianDae {
+/// φ = 0.  In R^n only; on groups and spheres there is group_lagrangian_dae.hpp.
+class ImplicitLagrangianDae final : public ContinuousDae {
  public:
   /// With `dense` the Jacobian is a full matrix.
   ImplicitLagrangianDae(const Scene& scene, bool dense, DaeFormulation formulation = DaeFormulation::rates);
 
-  /// How many unknowns it has.
-  static int unknowns(const Scene& scene, DaeFormulation formulation);
-
-  int size() const { return size_; }
-  const SparsityPattern& pattern() const { return pattern_; }
-
-  void residual(double t, ConstVectorRef y, ConstVectorRef rate, VectorRef f);
-
-  /// ∂F/∂y + cj ∂F/∂ẏ on pattern().
-  void jacobian(double t, double cj, ConstVectorRef y, ConstVectorRef rate, VectorRef values);
+  int size() const override { return size_; }
+  const SparsityPattern& pattern() const override { return pattern_; }
+  void residual(double t, ConstVectorRef y, ConstVectorRef rate, VectorRef f) override;
+  void jacobian(double t, double cj, ConstVectorRef y, ConstVectorRef rate, VectorRef values) override;
 
  private:
   /// A block of rows, the places of its Λ and M among the unknowns, and its values at the last point.

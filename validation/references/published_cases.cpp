@@ -5,6 +5,7 @@
 #include <diracstep/core/runs/event_steps.hpp>
 #include <diracstep/core/runs/run.hpp>
 #include <diracstep/validation/references/published_cases.hpp>
+#include <diracstep/validation/references/reference_run.hpp>
 
 namespace diracstep {
 
@@ -52,6 +53,9 @@ std::vector<PublishedCase> run_published_cases(const CatalogueScene& entry, cons
   common.run = entry.recommended;
   common.run.step = grid.step;
   common.failure = run_to_end(entry, registry, solvers, grid.step, grid.steps, end);
+  if (const auto point = entry.reference.at ? entry.reference.at(common.run.end) : std::nullopt;
+      point && common.failure.empty())
+    end = in_frames_of(point->q, end, entry.scene->space.get());
   std::vector<PublishedCase> cases;
   for (const KnownState& known : entry.known) {
     if (std::abs(known.t - common.run.end) > 1e-9 * std::max(1.0, std::abs(known.t))) continue;

@@ -1,6 +1,7 @@
 #include <cmath>
 #include <ctime>
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/spaces/space.hpp>
 #include <diracstep/validation/references/reference_run.hpp>
 #include <limits>
 #include <sstream>
@@ -29,17 +30,41 @@ void require_reference(const char* integrator, const Scene& scene, double t_end,
     message << integrator << ": " << option << " = " << value << "; " << which;
     throw Misuse(message.str());
   };
-  if (scene.space) throw Misuse(std::string(integrator) + ": scene '" + scene.name + "' is not in R^n");
   require_consistent(scene, scene.start);
   require(t_end > scene.start.time && std::isfinite(t_end), "t_end", t_end,
           "a finite time after the start is needed");
   require(options.rtol >= 1e-14 && options.rtol <= 1e-1, "rtol", options.rtol,
           "it must lie in [1e-14, 1e-1]");
-  if (options.sizes.size() != 0 && options.sizes.size() != 3 * scene.dimension())
+  if (options.sizes.size() != 0 && options.sizes.size() != scene.storage_size() + 2 * scene.dimension())
     throw Misuse("the sizes of a baseline are those of q, v and p");
   require(options.atol >= 0.0 && std::isfinite(options.atol), "atol", options.atol,
           "a finite number, 0 or more, is needed");
   require(options.max_steps >= 1, "max_steps", static_cast<double>(options.max_steps), "1 or more is needed");
+}
+
+void put_on_space(const Scene& scene, ReferenceRun& run) {
+  if (!scene.space) return;
+  const Vector numbers = run.end.q;
+  run.end.q = scene.space->normalised(numbers);
+  run.off_space = (run.end.q - numbers).lpNorm<Eigen::Infinity>();
+}
+
+Sample in_frames_of(ConstVectorRef q, const Sample& end, const Space* space) {
+  if (space == nullptr || space->turns().empty()) return end;
+  const Vector between = space->difference(q, end.q);
+  if (!between.allFinite()) return end;
+  const Eigen::Index d = space->group_dimension();
+  Vector back = Vector::Zero(d), column(d);
+  for (const int turn : space->turns()) back[turn] = -between[turn];
+  Columns adjoint(d, d), adjoint_back(d, d), dtau(d, d), dtau_back(d, d);
+  space->maps(back, adjoint, adjoint_back, dtau, dtau_back);
+  Sample turned = end;
+  turned.q = space->moved(end.q, back);
+  space->embed(end.v, column);
+  space->restrict(adjoint_back * column, turned.v);
+  space->embed(end.p, column);
+  space->restrict(adjoint.transpose() * column, turned.p);
+  return turned;
 }
 
 int largest_full_system() {

@@ -41,6 +41,7 @@ struct ReferenceRun {
   long jacobian_evaluations = 0;
   long newton_iterations = 0;
   long error_test_failures = 0;
+  double off_space = 0.0;    ///< on groups and spheres: how far q had left the space before it was put back
   double cpu_seconds = 0.0;  ///< thread time of the start and the integration, without set-up
 
   bool ok() const { return failure.empty(); }
@@ -52,6 +53,15 @@ inline constexpr long evaluations_between_looks = 64;
 /// it, and the options are in their ranges.
 void require_reference(const char* integrator, const Scene& scene, double t_end,
                        const ReferenceOptions& options);
+
+/// Puts the stored numbers at the end onto the space and tells in `off_space` how far off they were; nothing
+/// in R^n.
+void put_on_space(const Scene& scene, ReferenceRun& run);
+
+/// The end of a motion with the frames of spheres turned to those of `q`.  A frame turns about its point by
+/// what depends on the steps and is never seen; without that turn, configurations and momenta are to be
+/// compared. What is given where no factor is a sphere, or where the ends are too far apart to tell.
+Sample in_frames_of(ConstVectorRef q, const Sample& end, const Space* space);
 
 /// CPU time of the calling thread.
 double thread_seconds();

@@ -134,7 +134,7 @@ class Accelerations final : public SizedEquations {
 }  // namespace
 
 std::unique_ptr<SizedEquations> sized_equations(const Scene& scene) {
-  if (!scene.lagrangian || scene.force || scene.storage_size() != scene.dimension()) return nullptr;
+  if (!scene.lagrangian || scene.force || scene.space) return nullptr;
   const PhaseStructure& structure = scene.lagrangian->structure();
   if (structure.y_hessian_zero || !structure.autonomous || scene.constraints.size() > 1) return nullptr;
   if (!scene.constraints.empty() && !scene.constraints.front()->workless()) return nullptr;

@@ -32,7 +32,8 @@ constexpr double first_step = 8.0;        ///< times the scene's own
 constexpr long steps_per_look = 256;
 constexpr int most_halvings = 30;
 
-double distance(const Sample& a, const Sample& b) {
+double distance(const Sample& given, const Sample& b, const Scene& scene) {
+  const Sample a = in_frames_of(b.q, given, scene.space.get());
   return std::max(relative_error(a.q, b.q), relative_error(a.p, b.p));
 }
 
@@ -74,7 +75,7 @@ class Refinement {
       last = thread_seconds() - run_begin;
       if (!best.failure.empty()) continue;  // a shorter step may be solved
       if (any) {
-        const double change = distance(before, end);
+        const double change = distance(before, end, *scene_.scene);
         const bool falls = std::isnan(best.change) || change < still_falling * best.change;
         if (!falls && best.change < converged) break;
         if (falls) {
@@ -177,8 +178,9 @@ ReferenceEnd converged_reference(const CatalogueScene& scene, const Registry& re
   reference.missing.clear();
   reference.q = found[0].end.q;
   reference.p = found[0].end.p;
-  reference.self_error =
-      std::max({found[0].change, found[1].change, distance(found[1].end, found[0].end), smallest_claim});
+  reference.space = scene.scene->space;
+  reference.self_error = std::max(
+      {found[0].change, found[1].change, distance(found[1].end, found[0].end, *scene.scene), smallest_claim});
   reference.how = fmt::format("{} of order {} at {} {:.3g} and its {}, beside {} of order {} at {:.3g}",
                               found[0].method, found[0].order, damped ? "eps" : "step", found[0].step,
                               damped ? "tenfold" : "double", found[1].method, found[1].order, found[1].step);

@@ -325,8 +325,9 @@ class StudyInProgress {
     compare(study_.rows.back(), ends.back(), row.ok(), tighter);
   }
 
-  static void compare(StudyRow& row, const Sample& end, bool tighter_ok, const Sample& tighter) {
+  void compare(StudyRow& row, const Sample& given, bool tighter_ok, const Sample& tighter) const {
     if (!row.ok() || !tighter_ok) return;
+    const Sample end = in_frames_of(tighter.q, given, entry_.scene->space.get());
     row.self_error = std::max(relative_error(end.q, tighter.q), relative_error(end.p, tighter.p));
   }
 

@@ -64,7 +64,8 @@ ReferenceEnd true_end_by_ida(const Scene& scene, double t_end, const std::functi
                          .how = fmt::format("IDA at rtol {:g}, beside {:g}", reference_rtol, options.rtol),
                          .missing = fine.ok() ? "" : "no reference: IDA stopped: " + fine.failure,
                          .q = fine.end.q,
-                         .p = fine.end.p};
+                         .p = fine.end.p,
+                         .space = scene.space};
   if (options.formulation != DaeFormulation::rates)
     reference.how += std::string(", formulation ") + name(options.formulation);
   if (fine.ok() && coarse.ok()) reference.self_error = reference.distance(coarse.end);
@@ -93,7 +94,8 @@ std::string run_once(Integrator& integrator, long steps, Momentum momentum, cons
 
 }  // namespace
 
-double ReferenceEnd::distance(const Sample& end) const {
+double ReferenceEnd::distance(const Sample& given) const {
+  const Sample end = in_frames_of(q, given, space.get());
   return p.size() == 0 ? relative_error(end.q, q)
                        : std::max(relative_error(end.q, q), relative_error(end.p, p));
 }
@@ -112,7 +114,8 @@ std::optional<ReferenceEnd> known_point(const CatalogueScene& scene, double t) {
                          .self_error = scene.reference.self_error,
                          .missing = {},
                          .q = point->q,
-                         .p = Vector::Zero(point->q.size())};
+                         .p = Vector::Zero(scene.scene->dimension()),
+                         .space = scene.scene->space};
   Vector force = reference.p;
   const auto lagrangian = completed(scene.scene)->lagrangian;
   if (lagrangian)
@@ -158,7 +161,8 @@ NaturalSizes natural_sizes(const Scene& scene, const Sample& end) {
 
 }  // namespace
 
-void judge(StudyRow& row, const Scene& scene, const Sample& end, const ReferenceEnd& reference) {
+void judge(StudyRow& row, const Scene& scene, const Sample& given, const ReferenceEnd& reference) {
+  const Sample end = reference.missing.empty() ? in_frames_of(reference.q, given, scene.space.get()) : given;
   const double energy = scene.energy(scene.start);
   row.constraint = largest_violation(scene, end);
   const double change = std::abs(end.energy - energy);

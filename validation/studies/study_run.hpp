@@ -62,7 +62,8 @@ struct ReferenceEnd {
   double self_error = StudyRow::none;
   std::string missing;  ///< empty, or why there is no reference
   Vector q;
-  Vector p;  ///< empty where velocities do not determine it: H is degenerate
+  Vector p;                                 ///< empty where velocities do not determine it: H is degenerate
+  std::shared_ptr<const Space> space = {};  ///< of the scene, null in R^n
 
   /// The larger of the relative errors in q and p.
   double distance(const Sample& end) const;

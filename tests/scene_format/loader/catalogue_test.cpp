@@ -74,7 +74,7 @@ TEST(DegenerateCircuit, IdaMeetsTheClosedFormToo) {
   EXPECT_LT((ida.end.v - exact->v).lpNorm<Eigen::Infinity>(), 1e-7);
 }
 
-TEST(CatalogueScenes, EveryCaseIsThere) { EXPECT_EQ(scene_names().size(), 56u); }
+TEST(CatalogueScenes, EveryCaseIsThere) { EXPECT_EQ(scene_names().size(), 66u); }
 
 TEST(CatalogueScenes, ParametersThatHaveReferencesOfTheirOwn) {
   EXPECT_EQ(make_scene("stiff_spring_pendulum", {{"k", 1e6}}).known.size(), 1u);

@@ -14,7 +14,7 @@
 #include <sstream>
 
 /// Scenes written from docs/scene_format.md alone, examples/scenes: a mechanism, a rolling body, a circuit,
-/// vortices, rotations.
+/// vortices.
 namespace diracstep {
 namespace {
 
@@ -38,7 +38,6 @@ TEST_P(OwnScenes, MeetTheirClosedForms) {
 INSTANTIATE_TEST_SUITE_P(Examples, OwnScenes,
                          ::testing::Values("trammel", "coin_on_incline", "rlc_circuit", "vortex_ring",
                                            "relativistic_charge", "canonical_vortices", "turning_skate",
-                                           "heavy_top_so3", "suslov_so3", "knife_edge_se2",
                                            "first_order_nonholonomic", "first_order_holonomic",
                                            "mixed_orders", "massless_slider", "moving_kernel",
                                            "pendulum_tension", "canonical_pendulum", "stewart_platform"),

@@ -29,6 +29,7 @@ TEST_P(PointsAtOnce, GiveTheBitsOfThePointsOneByOne) {
   for (const std::string& name : scene_names()) {
     const CatalogueScene entry = make_scene(name);
     const Scene& scene = *entry.scene;
+    if (scene.space) continue;  // configurations have more numbers than velocities: no columns of both
     const PointColumns points = at(scene);
     const int n = scene.dimension(), count = points.count;
     if (scene.lagrangian) {
