@@ -60,7 +60,7 @@ Integrator::Integrator(PreparedScene prepared, const Registry& registry, const S
                                                *reader_, *sequence_)),
       solved_stages_(std::make_unique<std::vector<SolvedStage>>()),
       left_out_(scene_->whole ? std::make_unique<LeftOutRows>(*scene_) : nullptr) {
-  if (method_.info.damped) division_->resolve_to_first_kink();
+  if (method_.info.damped) division_->take_no_acceleration();
   reset(scene_->start);
 }
 
