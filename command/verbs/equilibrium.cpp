@@ -48,7 +48,7 @@ constexpr int default_modes = 10;  // of a scene that is too large for full matr
 /// A kink of the formulas at the point, across which derivatives jump; empty where there is none.
 std::string kink_there(const Scene& scene, const Equilibrium& at) {
   constexpr double beside = 1e-7;  // of the largest coordinate or velocity
-  if (!scene.kinks || scene.kinks->count() == 0) return {};
+  if (!scene.kinks || scene.kinks->count() == 0 || scene.space) return {};
   Vector here(scene.kinks->count()), before = here, behind = here;
   scene.kinks->evaluate(at.time, at.q, at.v, here);
   const double largest = std::max(at.q.lpNorm<Eigen::Infinity>(), scene.start.q.lpNorm<Eigen::Infinity>());

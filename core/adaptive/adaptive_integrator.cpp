@@ -125,15 +125,16 @@ AdaptiveIntegrator::AdaptiveIntegrator(const std::shared_ptr<const Scene>& scene
       sign_(options_.step > 0.0 ? 1.0 : -1.0) {
   if (adaptive_.control == StepControl::local_error) {
     whole_.emplace(std::make_shared<const Scene>(main_.scene()), registry, solvers, options_);
+    whole_->end_steps_at_kinks();
     local_.emplace(adaptive_.eps, main_.options().order, span(), adaptive_.smallest_step);
     if (adaptive_.end) instants_ = instants_on_the_way(main_.scene(), *adaptive_.end);
     if (adaptive_.end && may_change_later(main_.scene(), *adaptive_.end))
       longest_ = longest_of_such * std::abs(options_.step);
   } else {
     meter_.emplace(make_meter(main_.scene(), solvers, adaptive_, options_.step, report_.accelerations));
-    if (adaptive_.control != StepControl::in_step) main_.end_steps_at_kinks();
-    side_.end_steps_at_kinks();
   }
+  if (adaptive_.control != StepControl::in_step) main_.end_steps_at_kinks();
+  side_.end_steps_at_kinks();
   fractions_ = eps_fractions(options_, main_.options().order, adaptive_.control);
   options_.order = side_.options().order;
   reset();

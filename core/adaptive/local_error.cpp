@@ -14,11 +14,20 @@ namespace {
 constexpr std::size_t most_instants = 200;
 constexpr int most_stuck = 20;  // steps one after the other that cross a kink undivided
 constexpr double below_eps = 0.9, most_growth = 10.0, most_shrinking = 0.1, after_failure = 0.25;
+constexpr int most_parts_to_kinks = 8, most_ends = 4;
+constexpr double at_end = 0.01;               // of a step: both end at the same kink
+constexpr double least_half = 32.0;           // in units of round-off of the time
 constexpr double shortest_over_kinks = 1e-6;  // of the motion: so short steps do not cross kinks in a row
 constexpr double of_the_rate = 1e-6;          // of T ẏ, which counts as a size
 // Errors that are round-off, and what is allowed beside them.
 constexpr double hardly_less = 0.5, erratic = 0.2, above_errors = 100.0;
 constexpr double of_the_largest = 1e-10, above_round_off = 4e-16;
+
+/// Whether nothing is left to step of a step.
+bool is_round_off_of_time(double left, double size, double start) {
+  return std::abs(left) <=
+         std::max(1e-14 * std::abs(size), 4.0 * std::numeric_limits<double>::epsilon() * std::abs(start));
+}
 
 }  // namespace
 
@@ -68,23 +77,48 @@ void LocalErrorControl::start(const Integrator& at) {
   sliding_ = 0;
 }
 
-/// The halves by one integrator, the whole step by the other; false where one fails.
-bool LocalErrorControl::take_both(Integrator& fine, Integrator& whole, double size, StepReport& report) {
+/// The halves by one integrator, the whole step by the other; false where one fails.  Both end their steps at
+/// the first kink that they cross, so that each part of the motion is judged by its own error: `size` becomes
+/// that of the whole, and where the halves come to a kink clearly before its end, the part to there is taken
+/// instead.
+bool LocalErrorControl::take_both(Integrator& fine, Integrator& whole, double& size, StepReport& report) {
   const double start = fine.time();
-  whole.restart(start, q_, p_, v_);
-  report = whole.step(size);
-  if (!report.ok()) return false;
-  report = fine.step(0.5 * size);
-  crossed_ = !fine.kinks_passed().empty();
-  if (report.ok()) report = fine.step(start + size - fine.time());
-  crossed_ = crossed_ || !fine.kinks_passed().empty();
-  const std::string& stuck = fine.stuck_at_kink();
-  stuck_ = stuck.empty() ? 0 : stuck_ + 1;
-  if (stuck_ > most_stuck) {
-    report.solve.status = SolveStatus::refused;
-    report.failure = stuck;
+  for (int tried = 0; tried < most_parts_to_kinks; ++tried) {
+    whole.restart(start, q_, p_, v_);
+    report = whole.step(size);
+    if (!report.ok()) return false;
+    crossed_ = !whole.kinks_passed().empty();
+    size = whole.time() - start;
+    const double round_off = least_half * std::numeric_limits<double>::epsilon() * std::abs(start);
+    if (crossed_ && std::abs(size) <= round_off) {  // nothing to divide
+      fine.restart(whole.time(), whole.position(), whole.momentum(), whole.velocity_estimate());
+      return true;
+    }
+    report = fine.step(0.5 * size);
+    double left = whole.time() - fine.time();
+    for (int k = 0; k < most_ends && report.ok() && !is_round_off_of_time(left, size, start); ++k) {
+      const bool passed = !fine.kinks_passed().empty();
+      crossed_ = crossed_ || passed;
+      if (passed && std::abs(left) > at_end * std::abs(size)) break;
+      report = fine.step(left);
+      left = whole.time() - fine.time();
+    }
+    if (!report.ok()) return false;
+    crossed_ = crossed_ || !fine.kinks_passed().empty();
+    const std::string& stuck = fine.stuck_at_kink();
+    stuck_ = stuck.empty() ? 0 : stuck_ + 1;
+    if (stuck_ > most_stuck) {
+      report.solve.status = SolveStatus::refused;
+      report.failure = stuck;
+      return false;
+    }
+    if (is_round_off_of_time(left, size, start)) return true;
+    size = fine.time() - start;
+    fine.restart(start, q_, p_, v_);
   }
-  return report.ok();
+  report.solve.status = SolveStatus::no_convergence;
+  report.failure = "a step from t = " + to_text(start) + " and its halves cross other kinks, at any size";
+  return false;
 }
 
 Vector LocalErrorControl::differences(const Integrator& fine, const Integrator& whole) const {
@@ -110,8 +144,6 @@ LocalErrorControl::Worst LocalErrorControl::error(const Integrator& fine, const 
   };
   add(q_, fine.position(), seen_.q, 0);
   add(p_, fine.momentum(), seen_.p, q_.size());
-  const double unresolved = std::max(fine.unresolved_between_kinks(), whole.unresolved_between_kinks());
-  worst.part = std::max(worst.part, unresolved / std::max(eps_, of_the_largest));
   return worst;
 }
 
@@ -123,8 +155,9 @@ bool LocalErrorControl::is_round_off(Integrator& fine, Integrator& whole, double
   if (whole.met_kinks()) return false;
   const Vector first = differences(fine, whole);
   StepReport report;
+  double other_size = 0.999 * size;
   fine.restart(start, q_, p_, v_);
-  if (!take_both(fine, whole, 0.999 * size, report) || whole.met_kinks()) return false;
+  if (!take_both(fine, whole, other_size, report) || whole.met_kinks()) return false;
   const Vector other = differences(fine, whole);
   const auto jumps = [&](Eigen::Index i) {
     return std::abs(other[i] - first[i]) > erratic * std::abs(first[i]);
@@ -153,7 +186,8 @@ StepReport LocalErrorControl::advance(Integrator& fine, Integrator& whole, doubl
     const double part = worst.part;
     if (taken && (part <= 1.0 || std::abs(size) <= smallest_)) {
       const double growth = part > 0.0 ? below_eps * std::pow(part, -1.0 / (order_ + 1)) : most_growth;
-      next = size * std::clamp(growth, most_shrinking, first ? most_growth : 1.0);
+      next = crossed_ ? std::copysign(first_size(), size)
+                      : size * std::clamp(growth, most_shrinking, first ? most_growth : 1.0);
       if (std::abs(size) >= shortest_over_kinks * span_)
         sliding_ = 0;
       else if (crossed_)

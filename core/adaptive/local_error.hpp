@@ -30,6 +30,9 @@ bool may_change_later(const Scene& scene, double end);
 /// how its error falls where it is stiff (Hairer, Wanner, Solving Ordinary Differential Equations II, IV.8),
 /// at most to a tenth.
 ///
+/// A step ends behind the first kink in q and v that the motion crosses, the halves where the whole does:
+/// each side is judged by its own error, and a first step is taken behind it.
+///
 /// Where e does not fall with the size and becomes another one for a size that differs by a thousandth, it is
 /// round-off, as that of the charge of 100 µF beside junctions of 1 pF before anything has charged it: ten
 /// times as much is then allowed of that component.
@@ -45,9 +48,9 @@ class LocalErrorControl {
   double first_size() const { return first_part * span_; }
 
   /// Takes one step of `fine` beside one of `whole`, of the size given or, where that has too large an error
-  /// or fails, a smaller one; `size` becomes the one taken, `next` the one to try next.  Fails, with `fine`
-  /// where it was, where the size would fall below the round-off of the time, and where many steps are stuck
-  /// at a kink, which no size resolves.
+  /// or fails, or crosses a kink, a smaller one; `size` becomes the one taken, `next` the one to try next.
+  /// Both integrators are to end steps at kinks.  Fails, with `fine` where it was, where the size would fall
+  /// below the round-off of the time, and where many steps are stuck at a kink, which no size resolves.
   StepReport advance(Integrator& fine, Integrator& whole, double& size, double& next);
 
   /// Steps that had too large an error or failed.
@@ -67,7 +70,7 @@ class LocalErrorControl {
   };
 
   bool is_round_off(Integrator& fine, Integrator& whole, double start, double size, const Worst& worst);
-  bool take_both(Integrator& fine, Integrator& whole, double size, StepReport& report);
+  bool take_both(Integrator& fine, Integrator& whole, double& size, StepReport& report);
   Worst error(const Integrator& fine, const Integrator& whole, double size);
   Vector differences(const Integrator& fine, const Integrator& whole) const;
 

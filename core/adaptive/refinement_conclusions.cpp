@@ -170,12 +170,17 @@ std::pair<Sample, Sample> RefinementSearch::run_beside(const Counted& run) {
     if (last && !read(Momentum::projected, end).ok()) end = {};
     return !time_is_up() && !(motion_.options.go_on && !motion_.options.go_on());
   };
-  try {
-    (void)run_steps_of(moved, motion_.registry, motion_.solvers, steps_of(run.refinement), report_.adaptive,
-                       motion_.end, work, at_node);
-  } catch (const Misuse&) {  // a row of large units at rest: the velocity is off it
-    end = {};
-  }
+  auto steps = steps_of(run.refinement);
+  // A row of large units at rest, or of a state that follows within a microsecond, is off by more than a
+  // start may be.
+  for (const bool projected : {false, true}) try {
+      steps.integrator.project_start = projected;
+      (void)run_steps_of(moved, motion_.registry, motion_.solvers, steps, report_.adaptive, motion_.end, work,
+                         at_node);
+      break;
+    } catch (const Misuse&) {  // a point that cannot be started from
+      end = {};
+    }
   report_.work.solves += work.solves;
   return {first, end};
 }

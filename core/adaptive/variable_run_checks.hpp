@@ -39,6 +39,7 @@ class VariableRunChecks {
   std::string text() const;
 
  private:
+  bool at_kink() const;
   bool divide(double size);
 
   AdaptiveIntegrator& integrator_;

@@ -60,7 +60,7 @@ Integrator::Integrator(PreparedScene prepared, const Registry& registry, const S
       division_(std::make_unique<StepDivision>(scene_, options_.step, has_node_at_end(method_.info, options_),
                                                *reader_, *sequence_)),
       left_out_(scene_->whole ? std::make_unique<LeftOutRows>(*scene_) : nullptr) {
-  if (method_.info.damped) division_->resolve_to_first_kink();
+  if (method_.info.damped) division_->take_no_acceleration();
   reset(scene_->start);
 }
 

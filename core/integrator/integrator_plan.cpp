@@ -1,10 +1,10 @@
 #include <algorithm>
 #include <diracstep/core/integrator/integrator.hpp>
+#include <diracstep/core/integrator/kept_momenta.hpp>
 #include <diracstep/core/integrator/step_sequence.hpp>
 #include <diracstep/core/spaces/space.hpp>
 #include <diracstep/core/steps/groups/step.hpp>
 #include <diracstep/core/system/first_order_motions.hpp>
-#include <diracstep/core/system/kept_momenta.hpp>
 
 namespace diracstep {
 

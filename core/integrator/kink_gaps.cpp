@@ -11,9 +11,9 @@ namespace {
 constexpr std::size_t most_parts_of_a_gap = 128;
 constexpr double same_end = 2e-12;  // relative: the places of kinks are round-off below it
 
-/// The lengths from kink to kink of a step, the first from `start`, or 0 where that is NaN.
-void find_gaps(double start, const std::vector<KinkPassed>& kinks, std::vector<double>& gaps) {
-  gaps.assign(1, std::isnan(start) ? 0.0 : std::abs(kinks.front().time - start));
+/// The lengths from kink to kink of a step, behind a 0 for the way to the first one.
+void find_gaps(const std::vector<KinkPassed>& kinks, std::vector<double>& gaps) {
+  gaps.assign(1, 0.0);
   for (std::size_t k = 1; k < kinks.size(); ++k) gaps.push_back(std::abs(kinks[k].time - kinks[k - 1].time));
 }
 
@@ -40,13 +40,12 @@ bool StepDivision::follow_in(std::size_t parts, const State& start, Work& work) 
 /// Divides what lies between the kinks of the step just solved until twice as many parts lead to the same
 /// end.  False where no division leads to an end any more.
 bool StepDivision::resolve_gaps(const State& start, Work& work) {
-  const std::size_t fewest = resolves_to_first_ ? 1 : 2;
-  const double from = resolves_to_first_ ? undivided_.front().start : std::nan("");
-  if (end_at_kinks_ || passed_.size() < fewest || start.q.size() != start.v.size()) return true;
+  constexpr std::size_t fewest = 2;
+  if (end_at_kinks_ || passed_.size() < fewest) return true;
   for (std::size_t parts = 2;; parts *= 2) {
     const State coarse = sequence_->end();
     const std::vector<double> gaps = gaps_;
-    find_gaps(from, passed_, gaps_);
+    find_gaps(passed_, gaps_);
     if (!follow_in(parts, start, work)) {
       unresolved_ = HUGE_VAL;
       gaps_ = gaps;

@@ -41,11 +41,10 @@ int StepDivision::ahead(const Vector& here) const {
 }
 
 /// The acceleration by the forces at the start, which those behind a kink are no part of: the end of a step
-/// that has taken these in tells nothing of it.  Zero of damping methods, whose steps may be far longer than
-/// the times of stiff forces.
+/// that has taken these in tells nothing of it.  Zero where it is not to be taken.
 void StepDivision::find_acceleration(Interval step, const State& start) {
   acceleration_.setZero(start.v.size());
-  if (resolves_to_first_) return;
+  if (!takes_acceleration_) return;
   force_.resize(start.v.size());
   momentum_.resize(start.v.size());
   scene_->force_and_momentum(step.start, start.q, start_velocity_, start.p, force_, momentum_);
@@ -67,7 +66,11 @@ double StepDivision::place_ahead(Interval step, const State& start) {
   constexpr double quarter = 0.25;
   const auto crosses_by = [&](double place) {
     const double time = place * step.size;
-    position_ = start.q + time * start_velocity_ + (0.5 * time * time) * acceleration_;
+    position_ = time * start_velocity_ + (0.5 * time * time) * acceleration_;
+    if (scene_->space)
+      position_ = scene_->space->moved(start.q, position_);
+    else
+      position_ += start.q;
     speed_ = start_velocity_ + time * acceleration_;
     kinks_->evaluate(step.start + time, position_, speed_, between_);
     for (Eigen::Index k = 0; k < between_.size(); ++k)
@@ -89,9 +92,9 @@ double StepDivision::place_ahead(Interval step, const State& start) {
 
 /// Where between the ends of a step, in parts of it, a kink is on another side than at both; 0 where none.
 double StepDivision::hidden_place(Interval step, const State& start, const State& end) {
-  if (start.q.size() != start.v.size()) return 0.0;  // points that cannot be subtracted
   find_acceleration(step, start);
   if (const double place = place_ahead(step, start); place > 0.0) return place;
+  if (scene_->space) return 0.0;  // points that cannot be subtracted
   velocity_ = (end.q - start.q) / step.size;
   speed_up_ = velocity_ - start.v;  // in the time of the step
   for (const double place : {0.5, 0.25, 0.75}) {

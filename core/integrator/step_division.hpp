@@ -36,9 +36,9 @@ class StepDivision {
 
   /// From now on a step ends behind the first kink that the motion crosses within it.
   void end_at_kinks() { end_at_kinks_ = true; }
-  /// From now on the way to the first kink is divided as what lies between two: for steps that are judged by
-  /// two halves of them, which come to a kink in their first half by the same part.
-  void resolve_to_first_kink() { resolves_to_first_ = true; }
+  /// From now on no acceleration at the start of a step tells of kinks ahead: steps of damping methods may be
+  /// far longer than the times of stiff forces.
+  void take_no_acceleration() { takes_acceleration_ = false; }
 
   /// Afterwards sequence.end() is where the step ends; no trace of it is left before it is accepted.
   StepSequence::Outcome solve(Interval step, const State& start, Guess guess, Work& work);
@@ -99,7 +99,7 @@ class StepDivision {
   bool divided_ = false;
   std::vector<double> gaps_;  ///< lengths of what is divided, to each kink; 0 where that is not
   std::size_t parts_of_gap_ = 1;
-  bool resolves_to_first_ = false;
+  bool takes_acceleration_ = true;
   double unresolved_ = 0.0;
   SolveReport last_, solved_;  ///< of the part solved last, and of all that were kept
   double to_zero_ = 0.0;       ///< from the end of the part solved last, without sign

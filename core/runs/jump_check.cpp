@@ -12,14 +12,14 @@ bool jumps_at(const KinkPassed& kink, const Integrator& end, Integrator& reader)
   constexpr double near = 1e-6, nearer = 1e-7;  // of a step
   const Scene& scene = reader.scene();
   const Eigen::Index n = scene.dimension();
-  if (scene.space) return false;  // formulas on them show no kinks
   Sample at;
   if (!reader.sample(kink, Momentum::projected, at).ok()) return true;
   const double size = std::abs(reader.options().step), later = end.time() - kink.time;
   const Vector bend = later != 0.0 ? Vector((end.velocity_estimate() - at.v) / later) : Vector::Zero(n);
   const auto force_at = [&](double away) {
     Vector force(n), momentum(n), more(n);
-    const Vector q = kink.at.q + away * at.v, v = at.v + away * bend;
+    const Vector v = at.v + away * bend;
+    const Vector q = scene.space ? scene.space->moved(kink.at.q, away * at.v) : kink.at.q + away * at.v;
     scene.force_and_momentum(kink.time, q, v, kink.at.p, force, momentum);
     if (!scene.force) return force;
     scene.force->value(kink.time, q, v, more);

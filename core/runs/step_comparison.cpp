@@ -10,6 +10,7 @@ namespace {
 
 constexpr double doubted_way = 0.25, doubted_change = 0.5;
 constexpr double doubted_of_all = 0.01;  // of the whole motion
+constexpr double beyond_usual = 10.0;    // of steps at kinks, times the differences of usual ones
 constexpr int higher_order = 3;
 constexpr double no_change = 1e-9;  // of a velocity or momentum, in parts of its size
 constexpr double from_rest = 0.5;   // of the way of a step, which the velocity at its start makes
@@ -39,7 +40,8 @@ bool StepComparison::Differences::doubted() const {
   return largest > doubted_change * std::max(way, no_change * size);
 }
 
-void StepComparison::add(const Sample& start, double h, const Sample& whole, const Sample& parts) {
+void StepComparison::add(const Sample& start, double h, const Sample& whole, const Sample& parts,
+                         Place place) {
   ++steps_;
   longest_way_ = std::max({longest_way_, std::abs(h) * max_norm(start.v), max_norm(whole.q - start.q),
                            max_norm(parts.q - start.q)});
@@ -62,6 +64,22 @@ void StepComparison::add(const Sample& start, double h, const Sample& whole, con
   position_.add(start.q, whole.q, parts.q, start.time);
   velocity_.add(start.v, whole.v, parts.v, start.time);
   momentum_.add(start.p, whole.p, parts.p, start.time);
+  const Worst here{max_norm(whole.q - parts.q), max_norm(whole.p - parts.p)};
+  if (place == Place::fast) return;
+  Worst& worst = place == Place::at_kink ? at_kinks_ : usual_;
+  worst = {std::max(worst.position, here.position), std::max(worst.momentum, here.momentum)};
+  if (place == Place::usual) return;
+  sum_at_kinks_.position += here.position;
+  sum_at_kinks_.momentum += here.momentum;
+}
+
+double StepComparison::sum_at_kinks() const {
+  const double way = std::max(extent_, longest_way_);
+  double sum = 0.0;
+  if (way > 0.0 && at_kinks_.position > beyond_usual * usual_.position) sum = sum_at_kinks_.position / way;
+  if (momentum_.size > 0.0 && at_kinks_.momentum > beyond_usual * usual_.momentum)
+    sum = std::max(sum, sum_at_kinks_.momentum / momentum_.size);
+  return sum;
 }
 
 double StepComparison::worst() const {

@@ -17,6 +17,9 @@ namespace diracstep {
 /// way may be short at a turning point, are measured by the longest way of the whole run, and doubted above a
 /// half of it.
 ///
+/// Steps and parts of them at kinks that the motion crosses are added up apart: a force behind one may be far
+/// stiffer than all that the other steps see.
+///
 /// A step of order 3 and above that differs from its parts by a hundredth of the whole motion, of the way
 /// from the first point compared and the largest momentum, is doubted too: no resolved motion has such steps,
 /// and in a run that is soon slow, as after a start under drag, it may be the only one.
@@ -24,11 +27,18 @@ class StepComparison {
  public:
   static constexpr double first_part = 0.382;
 
+  /// Of a step: where it is looked at for no reason, at a kink, or where the motion turned fast.
+  enum class Place { usual, at_kink, fast };
+
   /// The scene, one with a Lagrangian, must outlive this.
   explicit StepComparison(const Scene& scene, int order = 1) : rest_(scene), order_(order) {}
 
   /// A step of size h from `start`, where it led, and where its parts did.  q, v and p are read.
-  void add(const Sample& start, double h, const Sample& whole, const Sample& parts);
+  void add(const Sample& start, double h, const Sample& whole, const Sample& parts,
+           Place place = Place::usual);
+  /// What steps and parts of them at kinks differ by, in parts of the motion, added up; 0 where the worst of
+  /// them is no worse than ten times the usual ones.
+  double sum_at_kinks() const;
 
   /// Empty, or a line that names the worst step so far.
   std::string text() const;
@@ -52,6 +62,10 @@ class StepComparison {
   int order_;
   Vector first_;  ///< position
   double extent_ = 0.0;
+  struct Worst {
+    double position = 0.0, momentum = 0.0;
+  };
+  Worst usual_, at_kinks_, sum_at_kinks_;
   long steps_ = 0;
 };
 

@@ -2,14 +2,15 @@
 #include <cmath>
 #include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/core/runs/step_size_check.hpp>
-#include <vector>
+#include <sstream>
 
 namespace diracstep {
 
 namespace {
 
 constexpr long steps_for_a_look = 600, fewest_looks = 3;
-constexpr double shortest_part = 1e-6;  // of a step, behind a kink
+constexpr double shortest_part = 1e-6;     // of a step, behind a kink
+constexpr double doubted_at_kinks = 2e-4;  // of the motion
 
 }  // namespace
 
@@ -40,7 +41,7 @@ void StepSizeCheck::follow(const Integrator& integrator) {
 void StepSizeCheck::compare(Integrator& integrator) {
   divided_ = false;
   if (!integrator.sample(Momentum::projected, whole_).ok()) return;
-  comparison_.add(start_, integrator.options().step, whole_, parts_);
+  comparison_.add(start_, integrator.options().step, whole_, parts_, place_);
 }
 
 void StepSizeCheck::keep_kinks(Integrator& integrator) {
@@ -67,10 +68,25 @@ void StepSizeCheck::look_behind_kinks(Integrator& integrator) {
     integrator.restart(kinks_[k].time, kinks_[k].at.q, kinks_[k].at.p, start_.v);
     if (integrator.step(first).ok() && integrator.step(size - first).ok() &&
         integrator.sample(Momentum::projected, parts_).ok())
-      comparison_.add(start_, size, whole_, parts_);
+      comparison_.add(start_, size, whole_, parts_, StepComparison::Place::at_kink);
   }
+  ++looks_at_kinks_;
   kinks_.clear();
   integrator.restore(state);
+}
+
+std::string StepSizeCheck::text() const {
+  if (std::string text = comparison_.text(); !text.empty() || looks_at_kinks_ == 0) return text;
+  const double part = comparison_.sum_at_kinks() / static_cast<double>(looks_at_kinks_);
+  const double all = part * static_cast<double>(over_kinks_);
+  if (!(all > doubted_at_kinks)) return {};
+  std::ostringstream text;
+  text.precision(2);
+  text << "step size check: at kinks of the force two substeps and the whole step differ by "
+       << std::min(1.0, part) << " of the motion, far more than elsewhere, and " << over_kinks_
+       << " steps cross some: what acts behind them, as a contact, is too short for the steps; take shorter "
+          "ones, or ask for an error, --error";
+  return text.str();
 }
 
 }  // namespace diracstep

@@ -11,7 +11,10 @@ namespace diracstep {
 /// rest, each that follows one in which the velocity changed by more than twice as much as ever before, and
 /// what is left of a step behind a kink that it crossed, where a force may be another one, of the first three
 /// such steps, the sixth, the twelfth, …, to say when they are too large: at a step that resolves the motion,
-/// two parts end where the whole does; see StepComparison.
+/// two parts end where the whole does; see StepComparison.  The step behind one at whose kinks is looked is
+/// looked at too.  Where the steps at kinks are far worse than others, and as many as the run took would be
+/// off by more than 2e-4 of the motion, forces act behind kinks that its steps are too long for, as contacts
+/// of a few steps.
 ///
 /// Needs no energy, so that it also sees forced and driven scenes.  The parts are taken between
 /// Integrator::save and restore: the run keeps its bits.  Silence proves nothing: a short event between the
@@ -24,10 +27,14 @@ class StepSizeCheck {
   /// Around each step of the run; for most of them a comparison of numbers.  What the integrator tells of the
   /// last step, its kinks and stages, stays until before(): what is left behind its kinks is looked at there.
   void before(Integrator& integrator) {
-    if (!kinks_.empty()) look_behind_kinks(integrator);
+    const bool behind_kinks = !kinks_.empty();
+    if (behind_kinks) look_behind_kinks(integrator);
     const bool due = integrator.work().steps == next_look_;
     if (due) next_look_ += between_looks_;
-    if (due || fast_) divide(integrator);
+    place_ = behind_kinks ? StepComparison::Place::at_kink
+             : due        ? StepComparison::Place::usual
+                          : StepComparison::Place::fast;
+    if (due || fast_ || behind_kinks) divide(integrator);
   }
   void after(Integrator& integrator) {
     if (divided_) compare(integrator);
@@ -40,7 +47,7 @@ class StepSizeCheck {
   }
 
   /// Empty, or a line that names the worst step so far.
-  std::string text() const { return comparison_.text(); }
+  std::string text() const;
   /// The largest difference of positions so far; NaN before the first.
   double worst() const { return comparison_.worst(); }
   double part_of_motion() const { return comparison_.part_of_motion(); }
@@ -56,9 +63,11 @@ class StepSizeCheck {
   long between_looks_, next_look_;
   bool divided_ = false, fast_;
   long over_kinks_ = 0, next_over_kinks_ = 1;  ///< steps that crossed some
-  std::vector<KinkPassed> kinks_;              ///< of the last step, where they are looked at
-  Sample end_;                                 ///< of that step
-  double largest_change_ = 0.0;                ///< of the velocity in a step
+  long looks_at_kinks_ = 0;
+  StepComparison::Place place_ = StepComparison::Place::usual;  ///< of the step looked at
+  std::vector<KinkPassed> kinks_;  ///< of the last step, where they are looked at
+  Sample end_;                     ///< of that step
+  double largest_change_ = 0.0;    ///< of the velocity in a step
   Vector velocity_;
   Sample start_, whole_, parts_;
 };

@@ -41,7 +41,8 @@ class Kinks {
   /// What each is, for messages: "min(1, max(0, steep*(t - on)))" with its place in the file.
   const std::vector<std::string>& names() const { return names_; }
 
-  /// g(t, q, v), count() values; NaN where a formula is not defined.
+  /// g(t, q, v), count() values; NaN where a formula is not defined.  On a configuration space q are its
+  /// stored numbers, and v is the velocity in the body.
   virtual void evaluate(double t, ConstVectorRef q, ConstVectorRef v, VectorRef g) const = 0;
 
   /// The instants between two times, ascending by time, each kind of change once.  Exact where the argument

@@ -104,7 +104,6 @@ void require_well_formed(const Scene& scene) {
     if (scene.hamiltonian || !scene.lagrangian)
       throw Misuse(prefix + "on " + scene.space->name() +
                    " a scene is given by a Lagrangian, and by that alone");
-    if (scene.kinks) throw Misuse(prefix + "kinks are known in R^n only");
   }
   if (scene.lagrangian)
     require_size(prefix + "the Lagrangian", scene.lagrangian->dimension(), scene.dimension());

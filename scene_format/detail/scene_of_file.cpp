@@ -25,15 +25,33 @@ Vector tolerances_of(const LoadedScene& loaded) {
   return tolerances;
 }
 
-/// The functions of stored numbers as those on the space.  Kinks are looked for along the straight lines of
-/// R^n: of these nothing is known there.
+/// Kinks of functions of stored numbers, with the velocity of a space in place of as many.
+class KinksOnSpace final : public Kinks {
+ public:
+  explicit KinksOnSpace(std::shared_ptr<const Kinks> of_numbers)
+      : Kinks(of_numbers->kinds(), of_numbers->names()), of_numbers_(std::move(of_numbers)) {}
+
+  void evaluate(double t, ConstVectorRef q, ConstVectorRef v, VectorRef g) const override {
+    Vector whole = Vector::Zero(q.size());
+    whole.head(v.size()) = v;
+    of_numbers_->evaluate(t, q, whole, g);
+  }
+  std::vector<Instant> instants(double first, double last) const override {
+    return of_numbers_->instants(first, last);
+  }
+
+ private:
+  std::shared_ptr<const Kinks> of_numbers_;
+};
+
+/// The functions of stored numbers as those on the space.
 void put_functions_on_space(const LoadedScene& loaded, Scene& scene) {
   scene.space = named_space(loaded.program->document.spaces.kinds);
   scene.coordinates = loaded.components();
   scene.lagrangian = on_space(scene.space, scene.lagrangian);
   for (auto& rows : scene.constraints) rows = on_space(scene.space, rows);
   if (scene.force) scene.force = on_space(scene.space, scene.force);
-  scene.kinks = nullptr;
+  if (scene.kinks) scene.kinks = std::make_shared<KinksOnSpace>(scene.kinks);
 }
 
 }  // namespace

@@ -301,5 +301,54 @@ step = 0.2
   EXPECT_TRUE(says(outcome, "points back there from both sides")) << outcome.err;
 }
 
+/// A rotation about one axis: with a moment from R[1,1] < 0.5 on, at the angle π/3, and with one of friction,
+/// which turns around with the velocity.
+TEST_F(KinksOfARun, StepsOnGroupsAreDividedAtThem) {
+  const auto turning = [](const std::string& moment) {
+    return "lagrangian = \"(w_R[1]^2 + w_R[2]^2 + w_R[3]^2)/2\"\n[coordinates]\nR = \"SO3\"\n[force]\nR_3 = "
+           "\"" +
+           moment +
+           "\"\n[start]\nw_R = [0, 0, 1]\n[outputs]\nr11 = \"R[1,1]\"\n[span]\nend = 3\nstep = 0.3\n";
+  };
+  const double pushed = 3.0 - M_PI / 3.0, turned = 1.0 / 1.3, back = 3.0 - turned;
+  struct Case {
+    const char* moment;
+    double angle, rate;
+  };
+  for (const Case& it :
+       {Case{"if(R[1,1] < 0.5, 0.4, 0)", M_PI / 3.0 + pushed + 0.2 * pushed * pushed, 1.0 + 0.4 * pushed},
+        Case{"-1 - 0.3*sign(w_R[3])", 0.5 * turned - 0.35 * back * back, -0.7 * back}}) {
+    const Outcome outcome = run("run " + scene("turning", turning(it.moment)) + " --json");
+    ASSERT_EQ(outcome.status, 0) << it.moment << outcome.err;
+    EXPECT_NEAR(at_end(outcome, "v", "R_3"), it.rate, 1e-9) << it.moment;
+    EXPECT_NEAR(Json::parse(outcome.out)["outputs"]["r11"].get<double>(), std::cos(it.angle), 1e-9)
+        << it.moment;
+  }
+}
+
+/// A body with three moments of inertia whose moment jumps at R[3,3] = 0.5; the reference is that of the
+/// equations of Euler with DOP853 of scipy at 1e-13, ended and begun again at the jump, t = 0.53257918766.
+TEST_F(KinksOfARun, AnErrorIsReachedBehindAJumpOnAGroup) {
+  const Outcome outcome = run("run " + scene("body", R"toml(
+lagrangian = "(1.3*w_R[1]^2 + 0.9*w_R[2]^2 + 0.7*w_R[3]^2)/2 - 3*R[3,3]"
+[coordinates]
+R = "SO3"
+[force]
+R_1 = "-0.2*w_R[1] + 0.3*R[1,2]"
+R_2 = "0.5*sin(t) + if(R[3,3] < 0.5, 0.4, 0)"
+R_3 = "-0.1*w_R[3]"
+[start]
+R = { axis = [1, 2, 3], angle = 0.7 }
+w_R = [0.5, 1, 2]
+[outputs]
+r33 = "R[3,3]"
+[span]
+end = 3
+step = 0.05
+)toml") + " --error 1e-8 --json");
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_NEAR(Json::parse(outcome.out)["outputs"]["r33"].get<double>(), 0.035769249104297, 1e-8);
+}
+
 }  // namespace
 }  // namespace diracstep::testing

@@ -54,6 +54,16 @@ TEST_F(StatedErrors, FixedStepsCanBeAskedFor) {
   expect_misuse("run kepler_e06 --error 1e-5 --fixed --adaptive", {"--fixed", "--adaptive"});
 }
 
+/// A filter of 1 ms behind a ramp, integrated twice: x = (26/3 − 4 lag (2 − lag))/2 but for exp(−1000).  The
+/// run beside the start that tells how errors grow is off the row of the filter by 1e-13/lag.
+TEST_F(StatedErrors, AFastStateLetsTheGrowthOfErrorsBeMeasured) {
+  const double lag = 1e-3;
+  const Outcome outcome = run("run actuator --set lag=1e-3 --error 1e-6 --json");
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_NEAR(nlohmann::json::parse(outcome.out)["end"]["q"]["x"].get<double>(),
+              13.0 / 3.0 - 2.0 * lag * (2.0 - lag), 1e-6 * 4.33);
+}
+
 TEST_F(StatedErrors, TheWorkIsLimitedAndTheBestAnswerShown) {
   const Outcome outcome =
       run("run kepler_e06 --error 1e-9 --method type1/midpoint --fixed --max-solves 20000 --json");

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <diracstep/core/system/kept_momenta.hpp>
+#include <diracstep/core/integrator/kept_momenta.hpp>
 
 #include "group_scenes.hpp"
 #include "group_stepping.hpp"

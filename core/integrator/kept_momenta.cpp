@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <cmath>
+#include <diracstep/core/integrator/kept_momenta.hpp>
 #include <diracstep/core/spaces/space.hpp>
-#include <diracstep/core/system/kept_momenta.hpp>
 
 namespace diracstep {
 

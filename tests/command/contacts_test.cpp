@@ -1,0 +1,68 @@
+/// Runs over contacts that are as short as their steps, against closed forms.
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "run_command.hpp"
+
+namespace diracstep::testing {
+namespace {
+
+class HardContacts : public Command {
+ protected:
+  static double end_of(const Outcome& outcome) {
+    return nlohmann::json::parse(outcome.out)["end"]["q"]["x"].get<double>();
+  }
+};
+
+/// A ball that falls from 1 m with g = 9.81 on what pushes it back with `force` below 0, until t = 3.
+std::string falling_on(const std::string& force) {
+  return "lagrangian = \"v_x^2/2 - 9.81*x\"\n[coordinates]\nx = {}\n[force]\nx = \"" + force +
+         "\"\n[start]\nx = 1\n[span]\nend = 3\nstep = 0.01\n";
+}
+
+/// Forces of contacts of 1 to 48 ms, and x at t = 3 with 40 digits by mpmath: linear springs and the damped
+/// one, which only pushes, by their closed forms; the others by the energy, the time of a contact being
+/// 2 ∫ dy/√(v² + 2gy − 2c y^(p+1)/(p+1)).
+struct FallOnContact {
+  const char* force;
+  double end;
+};
+constexpr FallOnContact falls_on_contacts[] = {
+    {"if(x < 0, -1e5*x, 0)", 0.66606743634570760},
+    {"if(x < 0, -1e6*x, 0)", 0.61153741114979047},
+    {"if(x < 0, -1e7*x, 0)", 0.59350867193903054},
+    {"1e5*max(0, -x)^1.5", 0.76541338846290786},
+    {"if(x < 0, 1000*sqrt(-x), 0)", 0.89558563542177282},
+    {"max(0, -1e5*x - 20*v_x)*if(x < 0, 1, 0)", 0.45084713932053971}};
+
+/// The way to a kink, the contact behind it and the way on are each judged by their own local error.
+TEST_F(HardContacts, AreAsExactAsTheLocalErrorAskedFor) {
+  for (const FallOnContact& it : falls_on_contacts)
+    for (const double eps : {1e-6, 1e-8, 1e-10}) {
+      std::ostringstream how;
+      how << " --json --method damped/radau:3 --adaptive --eps " << eps;
+      const Outcome outcome = run("run " + scene("fall", falling_on(it.force)) + how.str());
+      ASSERT_EQ(outcome.status, 0) << it.force << outcome.err;
+      EXPECT_NEAR(end_of(outcome), it.end, 50.0 * eps) << it.force << how.str();
+    }
+}
+
+/// Fixed steps of about the length of the contacts.
+TEST_F(HardContacts, OfAFewStepsAreRightOrDoubted) {
+  for (const FallOnContact& it : falls_on_contacts)
+    for (const char* how : {"", " --step 0.005", " --step 0.02", " --method type1/midpoint --step 0.001",
+                            " --method damped/radau:3"}) {
+      const Outcome outcome = run("run " + scene("fall", falling_on(it.force)) + " --json" + how);
+      ASSERT_TRUE(outcome.status == 0 || outcome.status == 3) << it.force << how << outcome.err;
+      EXPECT_TRUE(outcome.status == 3 || std::abs(end_of(outcome) - it.end) < 5e-4)
+          << it.force << how << outcome.out;
+    }
+  const Outcome fine =
+      run("run " + scene("fall", falling_on("if(x < 0, -1e5*x, 0)")) + " --json --step 0.001");
+  EXPECT_EQ(fine.status, 0) << fine.err;
+  EXPECT_NEAR(end_of(fine), falls_on_contacts[0].end, 1e-6);
+}
+
+}  // namespace
+}  // namespace diracstep::testing
