@@ -90,12 +90,11 @@ void require_on_levels(const Scene& scene, const FirstOrderMotions& motions) {
   const Vector off = constraints_at_start(scene, equations, scene.start);
   for (Eigen::Index k = 0; k < off.size(); ++k) {
     if (std::abs(off[k]) <= 1e-9 * scale_of(equations.terms())) continue;
-    std::ostringstream message;
-    message << "scene '" << scene.name << "': the start violates "
-            << equations.constraint_name(static_cast<int>(k))
-            << ", which together with the other equations of motion restricts positions and momenta, by "
-            << off[k] << " of terms as large as " << equations.terms();
-    throw InconsistentStart(message.str());
+    std::ostringstream reason;
+    reason << "violates " << equations.constraint_name(static_cast<int>(k))
+           << ", which together with the other equations of motion restricts positions and momenta, by "
+           << off[k] << " of terms as large as " << equations.terms();
+    throw InconsistentStart(scene.name, reason.str(), InconsistentStart::Of::position);
   }
 }
 
