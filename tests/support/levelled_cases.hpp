@@ -7,7 +7,7 @@
 namespace diracstep::testing {
 
 /// A pendulum in canonical coordinates, the rod a row between positions of canonical pairs.
-inline KernelCase canonical_pendulum() {
+inline DegenerateCase canonical_pendulum() {
   Scene scene = scene_of("canonical pendulum", {"x", "y", "p", "r"});
   scene.lagrangian = lagrangian<4>([](const auto& q, const auto& v) {
     return q[2] * v[0] + q[3] * v[1] - 0.5 * (q[2] * q[2] + q[3] * q[3]) - q[1];
@@ -27,7 +27,7 @@ inline KernelCase canonical_pendulum() {
 }
 
 /// A row v_y = x v_x between positions of canonical pairs, damped and driven.
-inline KernelCase canonical_nonholonomic() {
+inline DegenerateCase canonical_nonholonomic() {
   Scene scene = scene_of("canonical, nonholonomic, forced", {"x", "y", "p", "r"});
   scene.lagrangian = lagrangian<4>([](const auto& q, const auto& v) {
     return q[2] * v[0] + q[3] * v[1] - 0.5 * (q[2] * q[2] + q[3] * q[3] + q[0] * q[0] + q[1] * q[1]) -
@@ -59,7 +59,7 @@ inline KernelCase canonical_nonholonomic() {
 }
 
 /// θ·v − H in three coordinates: the kernel of dθ, which turns, tells a constraint.
-inline KernelCase odd_two_form() {
+inline DegenerateCase odd_two_form() {
   Scene scene = scene_of("odd two-form", {"x", "y", "z"});
   scene.lagrangian = lagrangian<3>([](const auto& q, const auto& v) {
     return 0.5 * (1.0 + q[2]) * (q[0] * v[1] - q[1] * v[0]) - 0.5 * (q[0] * q[0] + 1.3 * q[1] * q[1]) -
@@ -85,7 +85,7 @@ inline KernelCase odd_two_form() {
 }
 
 /// Two vortices, L = x1 v_y1 + x2 v_y2 − H, the first on a wall y1 = 0.3 x1² that moves.
-inline KernelCase vortex_on_a_wall() {
+inline DegenerateCase vortex_on_a_wall() {
   Scene scene = scene_of("vortex on a wall", {"x1", "y1", "x2", "y2"});
   scene.lagrangian = lagrangian<4>([](const auto& q, const auto& v) {
     using std::log;
@@ -128,7 +128,7 @@ inline KernelCase vortex_on_a_wall() {
 
 /// A mass that is to be at x = sin t, by a force z with a lag, z + v_z/2: constraints x, then p, then the
 /// velocity of z, which is z' = 2(sin t − z).
-inline KernelCase lagging_servo() {
+inline DegenerateCase lagging_servo() {
   Scene scene = scene_of("lagging servo", {"x", "p", "z"});
   scene.lagrangian =
       lagrangian<3>([]<class T>(const std::array<T, 3>& q, const std::array<T, 3>& v, const T& t) {
@@ -145,9 +145,9 @@ inline KernelCase lagging_servo() {
           Vector{{s, c, (4.0 * s - 2.0 * c) / 5.0 + 0.7 * std::exp(-2.0)}}};
 }
 
-inline const std::vector<KernelCase>& levelled_cases() {
-  static const std::vector<KernelCase> cases{canonical_pendulum(), canonical_nonholonomic(), odd_two_form(),
-                                             vortex_on_a_wall()};
+inline const std::vector<DegenerateCase>& levelled_cases() {
+  static const std::vector<DegenerateCase> cases{canonical_pendulum(), canonical_nonholonomic(),
+                                                 odd_two_form(), vortex_on_a_wall()};
   return cases;
 }
 

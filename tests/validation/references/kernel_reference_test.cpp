@@ -27,7 +27,7 @@ TEST(KernelReference, IdaConvergesToTheReductionsByHand) {
 
 /// The same where the constraint algorithm has levels, and velocities at the start are not given.
 TEST(KernelReference, IdaComesToTheReductionsByHandOfConstraintsOfLevels) {
-  for (const testing::KernelCase& that : testing::levelled_cases()) {
+  for (const testing::DegenerateCase& that : testing::levelled_cases()) {
     ReferenceOptions options;
     options.rtol = 1e-7;
     const ReferenceRun run = integrate_with_ida(*that.scene, 1.0, options);

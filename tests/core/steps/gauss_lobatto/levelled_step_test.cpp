@@ -14,14 +14,14 @@
 namespace diracstep {
 namespace {
 
+using testing::DegenerateCase;
 using testing::distance;
 using testing::expect_misuse;
 using testing::gl;
-using testing::KernelCase;
 using testing::levelled_cases;
 using testing::samples_of;
 
-double levelled_error(const KernelCase& that, int s, long steps) {
+double levelled_error(const DegenerateCase& that, int s, long steps) {
   const Sample end = samples_of(that.scene, {.method = gl(s), .step = 1.0 / static_cast<double>(steps)},
                                 steps, Momentum::projected, Registry::with_built_ins(), steps)
                          .back();
@@ -30,7 +30,7 @@ double levelled_error(const KernelCase& that, int s, long steps) {
 }
 
 TEST(LevelledStep, OrderIsTwiceTheStages) {
-  for (const KernelCase& that : levelled_cases())
+  for (const DegenerateCase& that : levelled_cases())
     for (const auto& [s, steps] : {std::pair{1, 20L}, {2, 5L}, {3, 4L}}) {
       const double first = levelled_error(that, s, steps), second = levelled_error(that, s, 2 * steps);
       EXPECT_GT(second, 3e-12) << that.scene->name << ": at round-off, nothing is measured";
@@ -40,7 +40,7 @@ TEST(LevelledStep, OrderIsTwiceTheStages) {
 }
 
 TEST(LevelledStep, OrderWithConstraintsOfTwoLevels) {
-  const KernelCase that = testing::lagging_servo();
+  const DegenerateCase that = testing::lagging_servo();
   EXPECT_EQ(first_order_motions(*that.scene).levels.size(), 2u);
   for (const auto& [s, steps] : {std::pair{1, 4L}, {2, 2L}}) {
     const double first = levelled_error(that, s, steps), second = levelled_error(that, s, 2 * steps);
@@ -49,7 +49,7 @@ TEST(LevelledStep, OrderWithConstraintsOfTwoLevels) {
 }
 
 TEST(LevelledStep, JacobianAgreesWithDifferences) {
-  for (const KernelCase& that : levelled_cases())
+  for (const DegenerateCase& that : levelled_cases())
     for (const int s : {1, 2}) {
       const auto scene = completed(that.scene);
       const Eigen::Index n = scene->dimension();
@@ -66,7 +66,7 @@ TEST(LevelledStep, JacobianAgreesWithDifferences) {
 }
 
 TEST(LevelledStep, KeepsAllConstraints) {
-  for (const KernelCase& that : levelled_cases()) {
+  for (const DegenerateCase& that : levelled_cases()) {
     const auto samples = samples_of(that.scene, {.method = gl(2), .step = 0.05}, 40);
     const FirstOrderMotions motions = first_order_motions(*that.scene);
     ASSERT_FALSE(motions.levels.empty()) << that.scene->name;
@@ -85,7 +85,7 @@ TEST(LevelledStep, KeepsAllConstraints) {
 /// One step there and one back by the same problem: another start may choose other equations to keep, which
 /// differ off the constraints.
 TEST(LevelledStep, IsSelfAdjoint) {
-  for (const KernelCase& that : levelled_cases())
+  for (const DegenerateCase& that : levelled_cases())
     for (const int s : {1, 2, 3}) {
       const auto scene = completed(that.scene);
       const Eigen::Index n = scene->dimension();
