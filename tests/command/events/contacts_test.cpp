@@ -3,7 +3,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "run_command.hpp"
+#include "../run_command.hpp"
 
 namespace diracstep::testing {
 namespace {

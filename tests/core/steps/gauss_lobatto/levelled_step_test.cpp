@@ -21,18 +21,11 @@ using testing::gl;
 using testing::levelled_cases;
 using testing::samples_of;
 
-double levelled_error(const DegenerateCase& that, int s, long steps) {
-  const Sample end = samples_of(that.scene, {.method = gl(s), .step = 1.0 / static_cast<double>(steps)},
-                                steps, Momentum::projected, Registry::with_built_ins(), steps)
-                         .back();
-  const double error = distance(end.q, that.q);
-  return that.lambda.size() == 0 ? error : std::max(error, distance(end.lambda, that.lambda));
-}
-
 TEST(LevelledStep, OrderIsTwiceTheStages) {
   for (const DegenerateCase& that : levelled_cases())
     for (const auto& [s, steps] : {std::pair{1, 20L}, {2, 5L}, {3, 4L}}) {
-      const double first = levelled_error(that, s, steps), second = levelled_error(that, s, 2 * steps);
+      const double first = testing::error_at_end(that, gl(s), steps),
+                   second = testing::error_at_end(that, gl(s), 2 * steps);
       EXPECT_GT(second, 3e-12) << that.scene->name << ": at round-off, nothing is measured";
       EXPECT_NEAR(std::log2(first / second), 2.0 * s, 0.45)
           << that.scene->name << " s = " << s << " errors " << first << " " << second;
@@ -43,7 +36,8 @@ TEST(LevelledStep, OrderWithConstraintsOfTwoLevels) {
   const DegenerateCase that = testing::lagging_servo();
   EXPECT_EQ(first_order_motions(*that.scene).levels.size(), 2u);
   for (const auto& [s, steps] : {std::pair{1, 4L}, {2, 2L}}) {
-    const double first = levelled_error(that, s, steps), second = levelled_error(that, s, 2 * steps);
+    const double first = testing::error_at_end(that, gl(s), steps),
+                 second = testing::error_at_end(that, gl(s), 2 * steps);
     EXPECT_NEAR(std::log2(first / second), 2.0 * s, 0.45) << s << " errors " << first << " " << second;
   }
 }
