@@ -3,6 +3,7 @@
 #include <diracstep/core/adaptive/end_errors.hpp>
 #include <diracstep/core/adaptive/refinement_search.hpp>
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/runs/frames.hpp>
 #include <diracstep/core/runs/growth_check.hpp>
 #include <diracstep/core/system/kinks.hpp>
 
@@ -188,8 +189,9 @@ std::pair<Sample, Sample> RefinementSearch::run_beside(const Counted& run) {
 /// How much farther apart a run and one from beside its start end than they begin, relative to the sizes of
 /// both; 0 where that is not known.
 double RefinementSearch::amplification(const Counted& run) {
-  const auto [first, end] = run_beside(run);
-  if (end.q.size() == 0) return 0.0;
+  const auto [first, moved] = run_beside(run);
+  if (moved.q.size() == 0) return 0.0;
+  const Sample end = in_frames_of(run.end.q, moved, motion_.scene->space.get());
   double growth = relative_change(end.q, run.end.q, largest_position_) / distance_beside;
   if (largest_momentum_ > 0.0) {
     // The momenta of a heavy coordinate whose way is short are far apart from the first.

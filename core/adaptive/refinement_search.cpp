@@ -4,6 +4,7 @@
 #include <diracstep/core/adaptive/refinement_search.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/numerics/scales.hpp>
+#include <diracstep/core/runs/frames.hpp>
 #include <diracstep/core/runs/growth_check.hpp>
 #include <diracstep/core/runs/run_checks.hpp>
 #include <utility>
@@ -149,7 +150,8 @@ RefinementSearch::Passed RefinementSearch::pass(long refinement, ErrorControlRun
   return passed;
 }
 
-double RefinementSearch::difference(const Sample& fine, const Sample& coarse) const {
+double RefinementSearch::difference(const Sample& fine, const Sample& given) const {
+  const Sample coarse = in_frames_of(fine.q, given, motion_.scene->space.get());
   return std::max({relative_change(fine.q, coarse.q, largest_position_),
                    relative_change(fine.p, coarse.p, largest_momentum_),
                    relative_change(fine.v, coarse.v, largest_velocity_)});

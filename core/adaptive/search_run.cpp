@@ -1,12 +1,25 @@
 #include <cmath>
 #include <diracstep/core/adaptive/search_run.hpp>
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/numerics/scales.hpp>
 
 namespace diracstep::detail {
 
 namespace {
 
 constexpr double rounding_of_time = 1e-12;  // of the time of a node, in parts of the motion
+
+/// Whether a switching function depends on velocities.  Where none does, as in contacts, a motion that
+/// crosses one again and again does not stick: its steps are longer than a contact.
+bool may_stick(const Scene& scene) {
+  if (!scene.kinks) return false;
+  const Vector v = scene.start.v.size() > 0 ? scene.start.v : Vector::Zero(scene.dimension());
+  const Vector other = v.array() + (1.0 + max_norm(v));
+  Vector at_v(scene.kinks->count()), at_other(scene.kinks->count());
+  scene.kinks->evaluate(scene.start.time, scene.start.q, v, at_v);
+  scene.kinks->evaluate(scene.start.time, scene.start.q, other, at_other);
+  return at_v != at_other;
+}
 
 StepsTaken run_fixed(Integrator& integrator, const ErrorControlReport::Steps& steps, double end,
                      const AtNode& at_node) {
@@ -26,7 +39,7 @@ StepsTaken run_fixed(Integrator& integrator, const ErrorControlReport::Steps& st
             [&](Momentum momentum, Sample& sample) { return integrator.sample(kink, momentum, sample); },
             false);
       });
-  taken.sticks = !taken.last.ok() && !integrator.stuck_at_kink().empty();
+  taken.sticks = !taken.last.ok() && !integrator.stuck_at_kink().empty() && may_stick(integrator.scene());
   return taken;
 }
 

@@ -10,6 +10,7 @@ from . import _library as c
 from .arrays import path
 from .arrays import text as checked_text
 from .callbacks import GeneratingFunction
+from .errors import Misuse
 from .opening import checked, source_of
 from .plan import TextTable
 from .scene import Scene
@@ -68,8 +69,14 @@ class Catalogue(Mapping[str, Scene]):
         return "<catalogue: " + ", ".join(self) + ">"
 
     def _repr_html_(self) -> str:
-        described = [(name, dict(self[name].about).get("kind", ""), dict(self[name].about).get("description", "")) for name in self]
-        return TextTable("", ("scene", "kind", "description"), described)._repr_html_()
+        return TextTable("", ("scene", "kind", "description"), [(name, *self._described(name)) for name in self])._repr_html_()
+
+    def _described(self, name: str) -> tuple[str, str]:
+        try:
+            about = dict(self[name].about)
+        except Misuse as misuse:  # a scene on a group, which the command alone runs
+            return "", str(misuse)
+        return about.get("kind", ""), about.get("description", "")
 
 
 catalogue = Catalogue()

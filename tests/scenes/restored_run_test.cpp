@@ -18,7 +18,7 @@ namespace {
 
 using Random = std::mt19937;
 
-constexpr int max_coordinates = 30;
+constexpr int max_coordinates = 20;
 constexpr int calls = 14, ways_to_solve = 3;
 
 template <class T, std::size_t N>

@@ -201,7 +201,6 @@ std::vector<ExplicitCode> explicit_codes(const Scene& given) {
 ReferenceRun integrate_explicitly(const Scene& given, double t_end, const ReferenceOptions& options,
                                   ExplicitCode code) {
   const auto scene = with_hidden_rows(with_lagrangian(given));
-  require_reference(name(code), *scene, t_end, options);
   const FirstOrderMotions motions = first_order_motions(*scene);
   const bool alone = motions.u.cols() == 0 && scene->rows() == 0 && !scene->force;
   if (motions.exist() && !motions.by_force && (motions.hide_equations() || !alone)) {
@@ -209,6 +208,7 @@ ReferenceRun integrate_explicitly(const Scene& given, double t_end, const Refere
     run.failure = "not explicit: " + why_no_accelerations(*scene);
     return run;
   }
+  require_reference(name(code), *scene, t_end, options);
   ExplicitIntegration integration(*scene, options);
   return code == ExplicitCode::arkode ? integration.run_arkode(t_end) : integration.run_odeint(code, t_end);
 }

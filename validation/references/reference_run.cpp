@@ -49,24 +49,6 @@ void put_on_space(const Scene& scene, ReferenceRun& run) {
   run.off_space = (run.end.q - numbers).lpNorm<Eigen::Infinity>();
 }
 
-Sample in_frames_of(ConstVectorRef q, const Sample& end, const Space* space) {
-  if (space == nullptr || space->turns().empty()) return end;
-  const Vector between = space->difference(q, end.q);
-  if (!between.allFinite()) return end;
-  const Eigen::Index d = space->group_dimension();
-  Vector back = Vector::Zero(d), column(d);
-  for (const int turn : space->turns()) back[turn] = -between[turn];
-  Columns adjoint(d, d), adjoint_back(d, d), dtau(d, d), dtau_back(d, d);
-  space->maps(back, adjoint, adjoint_back, dtau, dtau_back);
-  Sample turned = end;
-  turned.q = space->moved(end.q, back);
-  space->embed(end.v, column);
-  space->restrict(adjoint_back * column, turned.v);
-  space->embed(end.p, column);
-  space->restrict(adjoint.transpose() * column, turned.p);
-  return turned;
-}
-
 int largest_full_system() {
 #ifdef DIRACSTEP_WITH_KLU
   return 40;

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <diracstep/core/integrator/integrator.hpp>
+#include <diracstep/core/runs/frames.hpp>
 #include <functional>
 #include <string>
 
@@ -57,11 +58,6 @@ void require_reference(const char* integrator, const Scene& scene, double t_end,
 /// Puts the stored numbers at the end onto the space and tells in `off_space` how far off they were; nothing
 /// in R^n.
 void put_on_space(const Scene& scene, ReferenceRun& run);
-
-/// The end of a motion with the frames of spheres turned to those of `q`.  A frame turns about its point by
-/// what depends on the steps and is never seen; without that turn, configurations and momenta are to be
-/// compared. What is given where no factor is a sphere, or where the ends are too far apart to tell.
-Sample in_frames_of(ConstVectorRef q, const Sample& end, const Space* space);
 
 /// CPU time of the calling thread.
 double thread_seconds();

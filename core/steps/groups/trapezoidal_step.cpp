@@ -42,6 +42,7 @@ class GroupTrapezoidalStep final : public StepProblem {
     q0_ = start.q;
     p0_.resize(space_.group_dimension());
     space_.embed(start.p, p0_);
+    v_.setZero(space_.group_dimension());  // what a step before has left would scale the rows
     force_size_ = memory.known ? memory.scales[0] : 0.0;
     impulse_size_ = memory.known ? memory.scales[1] : 0.0;
     if (m_ > 0) first_rows_.evaluate(step.start, q0_);

@@ -118,7 +118,7 @@ TEST(BestFormulations, ReachAnErrorThatTheUsualOneDoesNotOnAStiffMechanism) {
   EXPECT_GT(reached(DaeFormulation::rates), 1e-6);
   int looks = 0;
   const auto chosen = best_formulations(*entry.scene, entry.t_end, rtols, reference, 1.0, [&] { ++looks; });
-  EXPECT_EQ(looks, static_cast<int>(rtols.size() * all_formulations.size()));
+  EXPECT_GE(looks, static_cast<int>(rtols.size() * all_formulations.size()));
   ASSERT_FALSE(chosen.empty());
   EXPECT_LT(reached(chosen.front()), 1e-6) << name(chosen.front());
 }
