@@ -54,7 +54,7 @@ Vector balance(SparseMatrix& matrix, bool of_rows) {
       double& size = largest[of_rows ? at.row() : at.col()];
       size = std::max(size, std::abs(at.value()));
     }
-  const Vector scales = largest.unaryExpr([](double size) { return size > 0.0 ? 1.0 / size : 1.0; });
+  Vector scales = largest.unaryExpr([](double size) { return size > 0.0 ? 1.0 / size : 1.0; });
   matrix = of_rows ? SparseMatrix(scales.asDiagonal() * matrix) : SparseMatrix(matrix * scales.asDiagonal());
   return scales;
 }

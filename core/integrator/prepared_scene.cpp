@@ -47,7 +47,7 @@ std::vector<std::string> dependent_rows(const Scene& scene, bool may_be_left_out
   const std::vector<std::string> nearly = redundant_rows(scene, scene.start, nearly_dependent);
   if (nearly.empty()) return {};
   const std::string of_scene = "scene '" + scene.name + "': ";
-  const std::vector<std::string> dependent = redundant_rows(scene, scene.start);
+  std::vector<std::string> dependent = redundant_rows(scene, scene.start);
   if (dependent.empty()) {
     // Beside a singular pose steps lead away from it.
     if (row_dependence(scene, scene.start, nearly, nearly_dependent) == RowDependence::at_start_only)

@@ -21,7 +21,7 @@ auto size_of(const Integrator& integrator) {
 
 RunReport run_steps(Integrator& integrator, long steps, Momentum momentum, long every,
                     const Observer& observer, RunChecks* checks) {
-  const RunReport report = run_of(integrator, momentum, every, observer, checks).steps(steps);
+  RunReport report = run_of(integrator, momentum, every, observer, checks).steps(steps);
   if (checks != nullptr && report.last.ok()) checks->finish(integrator);
   return report;
 }

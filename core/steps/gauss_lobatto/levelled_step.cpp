@@ -162,7 +162,7 @@ class LevelledStep final : public StepProblem {
     for (int i = 0; i < s_; ++i) d.col(i) << x.segment(place(i), n_), x.segment(rate_place(i), inert_);
     const Vector shift = x.segment(shift_place(), z0_.size());
     directions_.setZero(z0_.size(), constraints_);
-    nodes_.resize(static_cast<std::size_t>(s_ + 1));
+    nodes_.resize(static_cast<std::size_t>(s_) + 1);
     double terms = 0.0, rate = 0.0;
     for (int i = 0; i <= s_; ++i) {
       Node& node = at_node(i);
