@@ -129,9 +129,13 @@ bool RefinementSearch::survey(bool accepted) {
   if (local_) return true;                // such steps are short where the forces change fast
   if (motion_.scene->space) return true;  // the paths between points are those of R^n
   // A coarse run with fixed steps shows the way; the last one after a division, for the place of a kink
-  // depends on the motion, and with variable steps, which may be far longer than what they follow.
-  const long way = divisions_ == 0 && !report_.adaptive ? coarsest_.refinement : refinement_;
-  const std::vector<PathPoint> path = divisions_ == 0 ? path_ : path_of(way);
+  // depends on the motion, and with variable steps, which may be far longer than what they follow.  Where the
+  // motion crosses kinks a coarse run may take another way.
+  const bool follows = divisions_ == 0 && !(accepted && kinks_on_the_way());
+  const long way = report_.adaptive || divisions_ > 0 ? refinement_
+                   : follows                          ? coarsest_.refinement
+                                                      : last_.front().refinement;
+  const std::vector<PathPoint> path = follows ? path_ : path_of(way);
   if (path.size() < 2 || !reached_end(path.back().time))
     return refuse("the time was used up before the forces along the motion were surveyed (--max-time)");
   ForceSurvey forces(*motion_.scene, motion_.options.error);
