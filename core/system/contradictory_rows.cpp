@@ -6,6 +6,7 @@
 #include <diracstep/core/system/redundant_rows.hpp>
 #include <iterator>
 #include <sstream>
+#include <unordered_set>
 
 namespace diracstep {
 
@@ -25,8 +26,9 @@ class RowsBesideOthers {
         rows_(scene.constraints, n_),
         others_(only_holonomic(without_rows(scene, dependent)->constraints)),
         all_(only_holonomic(scene.constraints)) {
+    const std::unordered_set<std::string> left_out(dependent.begin(), dependent.end());
     for (std::size_t r = 0; r < names_.size(); ++r) {
-      const bool is_dependent = std::ranges::find(dependent, names_[r]) != dependent.end();
+      const bool is_dependent = left_out.contains(names_[r]);
       (is_dependent ? these_ : those_).push_back(static_cast<int>(r));
       if (!is_dependent) kept_.push_back(names_[r]);
     }
@@ -176,9 +178,10 @@ std::shared_ptr<const Scene> with_rows_left_out(const std::shared_ptr<const Scen
 }
 
 std::vector<std::string> rows_left_out(const Scene& scene) {
-  const std::vector<std::string> kept = scene.row_names();
+  const std::vector<std::string> all = scene.row_names();
+  const std::unordered_set<std::string> kept(all.begin(), all.end());
   std::vector<std::string> names = scene.whole->row_names();
-  std::erase_if(names, [&](const std::string& name) { return std::ranges::find(kept, name) != kept.end(); });
+  std::erase_if(names, [&](const std::string& name) { return kept.contains(name); });
   return names;
 }
 

@@ -1,10 +1,8 @@
 #include <Eigen/QR>
 #include <Eigen/SVD>
-#include <Eigen/SparseCholesky>
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/system/detail/sparse_dependence.hpp>
 #include <diracstep/core/system/redundant_rows.hpp>
 #include <optional>
 
@@ -13,73 +11,6 @@ namespace diracstep {
 namespace {
 
 constexpr int max_rows_in_full = 100;  // up to so many full matrices take less time
-
-Eigen::SparseMatrix<double> sparse_one_forms(const ConstraintsAtPoint& rows) {
-  const SparsityPattern& pattern = rows.pattern();
-  Eigen::SparseMatrix<double> one_forms =
-      Eigen::Map<const Eigen::SparseMatrix<double>>(pattern.rows(), pattern.columns(), pattern.nonzeros(),
-                                                    pattern.column_starts().data(),
-                                                    pattern.row_indices().data(), rows.coefficients().data())
-          .transpose();
-  for (int r = 0; r < pattern.rows(); ++r)
-    if (const double size = one_forms.col(r).norm(); size > 0.0) one_forms.col(r) /= size;
-  return one_forms;
-}
-
-/// Throws Misuse before memory is taken where the Gram matrix would be too large: each coordinate fills the
-/// products of all rows that it is in.
-void require_few_products(const Eigen::SparseMatrix<double>& one_forms) {
-  constexpr double most = 5e7;
-  Vector rows = Vector::Zero(one_forms.rows());
-  for (Eigen::Index c = 0; c < one_forms.outerSize(); ++c)
-    for (Eigen::SparseMatrix<double>::InnerIterator entry(one_forms, c); entry; ++entry)
-      rows[entry.row()] += 1.0;
-  if (rows.squaredNorm() > most)
-    throw Misuse("too many rows share a coordinate, " + std::to_string(std::lround(rows.maxCoeff())) +
-                 " of them: whether some are redundant cannot be decided");
-}
-
-/// The pivots of the Gram matrix are squared distances from the columns before.  The shift keeps those that
-/// vanish from dividing, and 1e-12 is what round-off leaves to be told from zero.
-std::vector<int> dependent_sparse_columns(const Eigen::SparseMatrix<double>& one_forms, double tolerance) {
-  require_few_products(one_forms);
-  const Eigen::SparseMatrix<double> products = one_forms.transpose() * one_forms;
-  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factors;
-  factors.setShift(1e-14);
-  factors.compute(products);
-  const Vector pivots = factors.vectorD();
-  const auto& order = factors.permutationPinv().indices();
-  std::vector<int> dependent;
-  for (Eigen::Index k = 0; k < pivots.size(); ++k)
-    if (!(pivots[k] > std::max(tolerance * tolerance, 1e-12))) dependent.push_back(order[k]);
-  return dependent;
-}
-
-/// The same, with a part of the columns at a time beside those found independent before: where there are more
-/// than coordinates, most of them depend on others.
-std::vector<int> dependent_in_parts(const Eigen::SparseMatrix<double>& one_forms, double tolerance) {
-  const int part = std::max(static_cast<int>(one_forms.rows()), max_rows_in_full);
-  const int count = static_cast<int>(one_forms.cols());
-  std::vector<int> independent, dependent;
-  for (int first = 0; first < count; first += part) {
-    std::vector<int> columns = independent;
-    for (int c = first; c < std::min(first + part, count); ++c) columns.push_back(c);
-    Eigen::SparseMatrix<double> chosen(one_forms.rows(), static_cast<Eigen::Index>(columns.size()));
-    for (std::size_t k = 0; k < columns.size(); ++k)
-      chosen.col(static_cast<Eigen::Index>(k)) = one_forms.col(columns[k]);
-    std::vector<bool> left_out(columns.size(), false);
-    for (const int k : dependent_sparse_columns(chosen, tolerance)) {
-      left_out[static_cast<std::size_t>(k)] = true;
-      dependent.push_back(columns[static_cast<std::size_t>(k)]);
-    }
-    independent.clear();
-    for (std::size_t k = 0; k < columns.size(); ++k)
-      if (!left_out[k]) independent.push_back(columns[k]);
-  }
-  return dependent;
-}
-
-using RowKinds = std::array<std::vector<int>, 2>;  ///< numbers of the holonomic rows, and of the others
 
 RowKinds kinds_of(const ConstraintBlocks& blocks) {
   RowKinds kinds;
@@ -259,7 +190,7 @@ std::vector<std::string> redundant_rows(const Scene& scene, const Start& start, 
   const bool full = scene.rows() <= max_rows_in_full;
   const RowKinds kinds = kinds_of(scene.constraints);
   std::vector<int> numbers = full ? dependent_by_kind(full_one_forms(rows), kinds, tolerance)
-                                  : dependent_in_parts(sparse_one_forms(rows), tolerance);
+                                  : dependent_sparse_rows(rows, kinds, tolerance);
   if (numbers.empty()) return {};
   if (full) numbers = best_choice(std::move(numbers), one_forms_around(scene, start), kinds, tolerance);
   const std::vector<std::string> names = scene.row_names();

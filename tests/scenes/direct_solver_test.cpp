@@ -90,7 +90,8 @@ class StagesOfFixedSize : public ::testing::TestWithParam<std::string> {};
 TEST_P(StagesOfFixedSize, HaveTheSystemOfThoseOfAnySize) {
   const CatalogueScene entry = make_scene(GetParam());
   const Scene& scene = *entry.scene;
-  if (scene.space || !is_small(scene)) return;  // loading every scene to name these takes a second in each process
+  if (scene.space || !is_small(scene))
+    return;  // loading every scene to name these takes a second in each process
   std::mt19937 random(7);
   std::uniform_real_distribution<double> part(-0.1, 0.1);
   const Start& start = scene.start;

@@ -61,6 +61,18 @@ TEST_P(OnGroups, RunsPassTheirChecks) {
   EXPECT_EQ(checks.text(), "");
 }
 
+/// Errors near round-off are looked for without compensated sums, which steps on groups do not have.
+TEST(OnGroupsToo, ErrorsNearRoundOffAreReached) {
+  const auto top = group_scenes::heavy_top();
+  ErrorControlOptions asked;
+  asked.error = 1e-12;
+  const ErrorControlReport report =
+      solve_to_error(top.scene, Registry::with_built_ins(), kinsol(), 0.5, asked);
+  ASSERT_TRUE(report.ok()) << report.refusal;
+  EXPECT_FALSE(report.compensated_sums);
+  EXPECT_LT(report.estimate, asked.error);
+}
+
 /// A step far too large is told, as in R^n.
 TEST(OnGroupsToo, LargeStepsAreDoubted) {
   Integrator integrator(group_scenes::heavy_top().scene, Registry::with_built_ins(), kinsol(),

@@ -286,6 +286,43 @@ step = 0.1
             RowDependence::at_start_only);
 }
 
+/// A chain whose links stand beside their rates, by full matrices and by sparse products: what holds the
+/// places stays.
+TEST(RedundantRows, RatesGoBeforeThePlacesTheyFollowFrom) {
+  const auto chain = [](const std::string& links) {
+    return scene_from_text("chain.toml", R"toml(
+name = "chain"
+redundant = "refuse"
+lagrangian = "sum(j = 1..N, (v_x[j]^2 + v_y[j]^2)/2 - y[j])"
+[sizes]
+N = )toml" + links + R"toml(
+[coordinates]
+x = { for = "j = 1..N" }
+y = { for = "j = 1..N" }
+[[rows]]
+name = "rate"
+for = "j = 2..N"
+equation = "(x[j] - x[j-1])*(v_x[j] - v_x[j-1]) + (y[j] - y[j-1])*(v_y[j] - v_y[j-1]) = 0"
+[[rows]]
+name = "link"
+for = "j = 2..N"
+equation = "(x[j] - x[j-1])^2 + (y[j] - y[j-1])^2 = 1"
+[start]
+x = "0.6*j"
+y = "-0.8*j"
+[span]
+end = 1
+step = 0.1
+)toml");
+  };
+  for (const int links : {10, 60}) {
+    const CatalogueScene entry = chain(std::to_string(links));
+    const std::vector<std::string> names = redundant_rows(*entry.scene, entry.scene->start);
+    EXPECT_EQ(names.size(), static_cast<std::size_t>(links - 1));
+    for (const std::string& name : names) EXPECT_EQ(name.rfind("rate", 0), 0U) << name;
+  }
+}
+
 /// Three bars on a line, from the origin to a, from a to b, and from the origin to b: the third one-form
 /// depends on the others at every pose, and without the row the bars would fold.
 TEST(RedundantRows, RowsThatTouchAreNeitherLeftOutNorASingularStart) {
