@@ -136,13 +136,12 @@ TEST_F(Circuits, ABuckConverterWithADiodeWithoutCapacitance) {
     i += h * rate_i(mid_i, mid_v);
     v += h * rate_v(mid_i, mid_v);
   }
-  const Json found =
-      json(netlist("buck converter\nV1 in 0 12\nS1 in sw gate 0 SWM\nVG gate 0 PULSE(0 1 0 10n 10n 5u 10u)\n"
-                   "D1 0 sw DM\nL1 sw out 100u\nC1 out 0 10u\nR1 out 0 10\n"
-                   ".model SWM SW(VT=0.5 RON=0.01 ROFF=1e6)\n.model DM D(IS=1e-14 CJO=0)\n"
-                   ".tran 1u 60u\n.print V(out) I(L1)\n"))["outputs"];
-  EXPECT_NEAR(value(found, "V(out)"), v, 1e-4 * v);
-  EXPECT_NEAR(value(found, "I(L1)"), i, 1e-4 * i);
+  const std::string file = netlist(
+      "buck converter\nV1 in 0 12\nS1 in sw gate 0 SWM\nVG gate 0 PULSE(0 1 0 10n 10n 5u 10u)\n"
+      "D1 0 sw DM\nL1 sw out 100u\nC1 out 0 10u\nR1 out 0 10\n.model SWM SW(VT=0.5 RON=0.01 ROFF=1e6)\n"
+      ".model DM D(IS=1e-14 CJO=0)\n.tran 1u 60u\n.print V(out)\n");
+  for (const char* solver : {"newton", "direct"})  // direct: the scales of a step overflowed
+    EXPECT_NEAR(value(json(file, std::string("--solver ") + solver)["outputs"], "V(out)"), v, 1e-4 * v);
 }
 
 TEST_F(Circuits, ACapacitorBetweenVeryUnequalResistances) {
