@@ -24,6 +24,9 @@ constexpr double no_limit = 1e100;
 /// The row that a norm is of is no larger than that norm times its scale, but for rounding.
 constexpr double at_rounding = 1e-12;
 
+/// A line search squares the residual, which overflows beyond.
+constexpr double largest_squared = 1e150;
+
 /// A fixed-point iteration of so many iterations costs what Newton's method does.  It is judged by its first
 /// solves, once there is a history to guess from.
 constexpr int quick = 6;
@@ -77,6 +80,7 @@ class KinsolSolver final : public NonlinearSolver {
       ++report_.line_searches;
       attempt(KIN_LINESEARCH);
     }
+    if (report_.status == SolveStatus::not_finite) attempt_by_short_steps();
     return report_;
   }
 
@@ -129,6 +133,25 @@ class KinsolSolver final : public NonlinearSolver {
     if (report_.ok()) solve_small_rows(norm);
     const bool quadratic = factors_.exact() || factors_.current();
     if (report_.ok() && strategy != KIN_FP && !quadratic && report_.iterations > 0) correct_again();
+  }
+
+  /// Where the Jacobian is next to nothing, as that of a diode that blocks, a Newton step may be 1e11 times
+  /// the unknowns and end where exponentials overflow.  KINSOL halves such a step five times only, so that
+  /// steps are held to the size of the guess, and from where these end to parts of it.
+  void attempt_by_short_steps() {
+    ++report_.line_searches;
+    require(KINSetNumMaxIters(memory(), 5 * options_.max_iterations), "KINSetNumMaxIters");
+    require(KINSetMaxNewtonStep(memory(), 1.0), "KINSetMaxNewtonStep");  // the least that KINSOL takes
+    short_steps_ = true;
+    for (const double parts : {1.0, 16.0, 256.0}) {
+      set_unit_of_unknowns(parts);
+      attempt(KIN_LINESEARCH);
+      if (report_.status != SolveStatus::not_finite) break;
+      guess_ = unknowns();
+    }
+    short_steps_ = false;
+    require(KINSetMaxNewtonStep(memory(), no_limit), "KINSetMaxNewtonStep");
+    require(KINSetNumMaxIters(memory(), options_.max_iterations), "KINSetNumMaxIters");
   }
 
   /// From where the unknowns are, for as long as the residual falls; whether it is solved.
@@ -244,8 +267,8 @@ class KinsolSolver final : public NonlinearSolver {
   void set_scales() {
     row_scales_ = nullptr;
     const double size = largest_entry(guess_.data(), guess_.size());
-    const double unit = size > 0.0 && std::isfinite(size) ? 1.0 / size : 1.0;
-    detail::set_weights(unknown_scale_.get(), std::array{detail::Run{guess_.size(), unit}});
+    unit_ = size > 0.0 && std::isfinite(size) ? 1.0 / size : 1.0;
+    set_unit_of_unknowns(1.0);
     std::array<detail::Run, 4> runs{};
     std::size_t b = 0;
     for (const ResidualBlock& block : problem_.blocks()) {
@@ -254,6 +277,11 @@ class KinsolSolver final : public NonlinearSolver {
       ++b;
     }
     detail::set_weights(residual_scale_.get(), std::span(runs).first(b));
+  }
+
+  /// The size of the guess, or one of so many parts of it.
+  void set_unit_of_unknowns(double parts) {
+    detail::set_weights(unknown_scale_.get(), std::array{detail::Run{guess_.size(), parts * unit_}});
   }
 
   static KinsolSolver& self(void* data) { return *static_cast<KinsolSolver*>(data); }
@@ -269,7 +297,8 @@ class KinsolSolver final : public NonlinearSolver {
       solver.problem_.residual(solver.map(x), Eigen::Map<Vector>(solver.residual_, solver.guess_.size()));
       solver.measure_blocks();
       if (fixed_point) return solver.contract(solver.map(x), solver.map(f));
-      return solver.not_finite_ ? 1 : 0;  // KINSOL then tries a shorter step
+      const bool overflows = solver.short_steps_ && !(solver.scaled_norm() < largest_squared);
+      return solver.not_finite_ || overflows ? 1 : 0;  // KINSOL then tries a shorter step
     });
   }
 
@@ -341,15 +370,17 @@ class KinsolSolver final : public NonlinearSolver {
   double* residual_ = nullptr;                        ///< the last one
   const double* row_scales_ = nullptr;                ///< where rows are judged one by one
   std::array<double, 4> norms_{}, inverse_scales_{};  ///< of its blocks
+  double unit_ = 1.0;                                 ///< one over the size of the guess of this solve
   SolveReport report_;
   detail::ExceptionKeeper callbacks_;
   int strategy_ = KIN_NONE;
   detail::FixedPointTrial trial_;
   double smallest_norm_ = HUGE_VAL;  ///< of the fixed-point iteration so far
   bool singular_ = false;
-  bool not_finite_ = false;  ///< the last residual or Jacobian
-  bool small_step_ = false;  ///< the iteration ended by one
-  bool went_back_ = false;   ///< the unknowns are those before the last residual
+  bool not_finite_ = false;   ///< the last residual or Jacobian
+  bool small_step_ = false;   ///< the iteration ended by one
+  bool short_steps_ = false;  ///< of attempt_by_short_steps()
+  bool went_back_ = false;    ///< the unknowns are those before the last residual
 };
 
 template <class Enum, std::size_t N>

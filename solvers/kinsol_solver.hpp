@@ -46,10 +46,10 @@ const char* name(Iteration iteration);
 /// The iteration of that name; throws Misuse for any other.
 Iteration iteration(const std::string& name);
 
-/// Solves nonlinear problems with SUNDIALS KINSOL: Newton's method with exact Jacobians, and once more with a
-/// line search where that fails.  Full patterns are factored densely, others with KLU, or with full matrices
-/// and Eigen's sparse LU where the library was built without it.  The factory throws Error where
-/// SUNDIALS cannot set itself up.
+/// Solves nonlinear problems with SUNDIALS KINSOL: Newton's method with exact Jacobians, once more with a
+/// line search where that fails, and by short steps where that meets values that are not finite.  Full
+/// patterns are factored densely, others with KLU, or with full matrices and Eigen's sparse LU where the
+/// library was built without it.  The factory throws Error where SUNDIALS cannot set itself up.
 SolverFactory kinsol(KinsolOptions options = {});
 
 }  // namespace diracstep

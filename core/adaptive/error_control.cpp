@@ -121,13 +121,8 @@ Choice choose_method(const std::shared_ptr<const Scene>& scene, const Registry& 
                                 .rule = options.integrator.constraint_rule,
                                 .large = large_from(options.integrator.dense_limit)});
   const MethodInfo info = registry.method(choice.method).info;
-<<<<<<< HEAD
-  const bool may_compensate =
-      !options.compensated_sums && info.stages > 0 && !scene->space && has_accelerations(*scene);
-=======
   const bool may_compensate = !options.compensated_sums && info.stages > 0 && has_accelerations(*scene) &&
                               !scene->space;  // steps on groups have no compensated sums
->>>>>>> dfa0c55d6a86e65e94014413c26b33e0cc14af65
   report.method = choice.method;
   report.order = choice.order == 0 ? info.order : choice.order;
   report.method_reason = choice.reason;

@@ -53,17 +53,18 @@ struct AtTwoPoints {
 };
 
 /// Whether the force on coordinates that move along the columns of `free` is anything but linear in v, near
-/// the start: each component in its own units, and to both sides, since a diode blocks on one.
+/// the start: each component in its own units, and to both sides, since a diode blocks on one.  By unit
+/// velocities as well, since at the small ones of a start a diode is a resistor to round-off.
 bool non_linear_in_velocity(const Scene& scene, const Columns& free) {
   constexpr double linear_to = 1e-9;
   const Start& start = scene.start;
   const Eigen::Index n = start.v.size();
   Vector once(n), twice(n), none(n);
   scene.force->value(start.time, start.q, Vector::Zero(n), none);
-  for (const double side : {1.0, -1.0}) {
+  const double size = size_or_one(max_norm(start.v));
+  for (const double step : {size, -size, 1.0, -1.0}) {
     Vector v = start.v;
-    for (Eigen::Index i = 0; i < n; ++i)
-      v[i] += side * size_or_one(max_norm(start.v)) * std::cos(0.3 + 2.3 * static_cast<double>(i));
+    for (Eigen::Index i = 0; i < n; ++i) v[i] += step * std::cos(0.3 + 2.3 * static_cast<double>(i));
     scene.force->value(start.time, start.q, v, once);
     scene.force->value(start.time, start.q, 2.0 * v, twice);
     for (Eigen::Index i = 0; i < n; ++i) {

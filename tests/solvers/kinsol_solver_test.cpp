@@ -161,6 +161,17 @@ TEST(Kinsol, ResidualThatIsNotFiniteAtTheStartIsReported) {
   }
 }
 
+TEST(Kinsol, ADiodeThatBlocksAtTheGuessIsMadeToConduct) {
+  static constexpr double saturation = 1e-14, thermal = 0.02585, leak = 1e-12, current = 0.6;
+  FunctionProblem problem([](double u) { return saturation * std::expm1(u / thermal) + leak * u - current; },
+                          [](double u) { return saturation / thermal * std::exp(u / thermal) + leak; });
+  for (const double guess : {-12.0, -1.0, -300.0}) {  // the first Newton step is to 6e11
+    const Solved solved = solve(problem, guess);
+    EXPECT_TRUE(solved.report.ok()) << guess << ": " << describe(solved.report.status);
+    EXPECT_NEAR(solved.x, thermal * std::log1p(current / saturation), 1e-9) << guess;
+  }
+}
+
 TEST(Kinsol, JacobianThatIsNotFiniteIsReported) {
   FunctionProblem problem([](double x) { return std::cbrt(x) - 1.0; },
                           [](double x) { return 1.0 / (x * x); });

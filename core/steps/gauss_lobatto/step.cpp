@@ -199,7 +199,8 @@ class GaussLobattoStep final : public StepProblem {
     const double mass = m_ > 0 ? largest_entry(momentum_.mass(0).data(), momentum_.mass(0).size()) : 0.0,
                  speed = m_ > 0 ? largest_entry(x.data(), n_ * s_) : 0.0;
     if (known_[0] <= at_rest * mass * speed) terms = std::max(terms, mass * speed);  // rows hold it at rest
-    blocks_[0].scale = std::max(known_[0], part() * std::max(terms, m_ > 0 ? impulse_scale(impulse) : 0.0));
+    terms = std::max(terms, m_ > 0 ? impulse_scale(impulse) : 0.0);
+    if (std::isfinite(terms)) blocks_[0].scale = std::max(known_[0], part() * terms);
     if (m_ == 0) return;
     const double velocity = std::max(speed, mass > 0.0 ? terms / mass : 0.0);
     blocks_[1].scale = std::max(known_[1], scale_of(part() * form_size(rows_) * velocity));
