@@ -95,14 +95,15 @@ class IdaIntegration {
     return kinsol()(problem)->solve(v);
   }
 
-  /// The same for other motions of first order, and the forces of the rows.
-  SolveReport solve_first_order_velocity(const FirstOrderMotions& motions, VectorRef v) {
+  /// The same for other motions of first order at any point, and the forces of the rows.
+  SolveReport solve_first_order_velocity(const FirstOrderMotions& motions, double t, ConstVectorRef q,
+                                         VectorRef v) {
     const Eigen::Index n = scene_.dimension(), m = scene_.rows();
     FirstOrderVelocityProblem problem(scene_, motions);
     Vector lq(n), p(n), x = Vector::Zero(n + m);
-    scene_.lagrangian->gradient(scene_.start.time, scene_.start.q, scene_.start.v, lq, p);
-    problem.begin(scene_.start.time, scene_.start.q, p);
-    x.head(n) = scene_.start.v;
+    scene_.lagrangian->gradient(t, q, v, lq, p);
+    problem.begin(t, q, p);
+    x.head(n) = v;
     const SolveReport report = kinsol()(problem)->solve(x);
     v = x.head(n);
     acceleration_.setZero();
@@ -122,9 +123,10 @@ class IdaIntegration {
     y.segment(numbers_, n) = start.v;
     const FirstOrderMotions motions = first_order_motions(scene_);
     const bool linear_in_v = motions.exist(), alone = motions.u.cols() == 0 && m == 0 && !scene_.force;
-    const SolveReport report = !linear_in_v ? solve_acceleration(start.time, start.q, start.v)
-                               : alone      ? solve_phase_space_velocity(y.segment(n, n))
-                                            : solve_first_order_velocity(motions, y.segment(n, n));
+    const SolveReport report =
+        !linear_in_v ? solve_acceleration(start.time, start.q, start.v)
+        : alone      ? solve_phase_space_velocity(y.segment(n, n))
+                     : solve_first_order_velocity(motions, start.time, start.q, y.segment(n, n));
     if (!report.ok())
       return std::string(linear_in_v ? "start: velocity: " : "start: acceleration and forces: ") +
              describe(report.status);
@@ -227,7 +229,12 @@ class IdaIntegration {
     scene_.lagrangian->gradient(t, end.q, end.v, force, end.p);
     end.energy = scene_.energy(t, end.q, end.v);
     if (scene_.rows() == 0) return;
-    const SolveReport report = solve_acceleration(t, end.q, end.v);
+    SolveReport report = solve_acceleration(t, end.q, end.v);
+    if (!report.ok())  // motions of first order have no accelerations
+      if (const FirstOrderMotions motions = first_order_motions(scene_); motions.exist()) {
+        Vector v = end.v;
+        report = solve_first_order_velocity(motions, t, end.q, v);
+      }
     end.lambda = acceleration_.tail(scene_.rows());
     show_multipliers(scene_, end.lambda, end.q);
     if (run.ok() && !report.ok()) run.failure = std::string("forces at the end: ") + describe(report.status);
