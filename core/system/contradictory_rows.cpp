@@ -144,7 +144,7 @@ class RowsBesideOthers {
   }
 
   std::vector<std::string> names_, kept_;
-  Eigen::Index n_;
+  int n_;
   ConstraintsAtPoint rows_;
   ConstraintBlocks others_, all_, holonomic_these_;
   std::vector<int> these_, those_;

@@ -201,7 +201,7 @@ std::shared_ptr<const Lagrangian> lagrangian_of(const Scene& scene) {
 }
 
 std::shared_ptr<const Scene> with_lagrangian(const Scene& scene) {
-  const auto complete = completed(std::make_shared<const Scene>(scene));
+  auto complete = completed(std::make_shared<const Scene>(scene));
   if (!complete->by_hamiltonian()) return complete;
   auto copy = std::make_shared<Scene>(*complete);
   copy->lagrangian = lagrangian_of(*complete);
