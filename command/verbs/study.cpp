@@ -23,6 +23,7 @@
 #include <diracstep/reports/study_plot.hpp>
 #include <diracstep/scene_format/scene_file.hpp>
 #include <diracstep/solvers/sundials_build.hpp>
+#include <diracstep/validation/references/explicit_reference.hpp>
 #include <exception>
 #include <filesystem>
 #include <functional>
@@ -70,8 +71,10 @@ std::string label(const StudyRow& row) {
 }
 
 /// Whether a failed row is a failure of the study.  It is where the user chose the step or the tolerance; on
-/// a ladder, which looks for the largest possible step, only where no other row of the same kind succeeded.
+/// a ladder, which looks for the largest possible step, only where no other row of the same kind succeeded. A
+/// baseline that the scene has no equations for has not failed.
 bool counts(const StudyRow& failed_row, const Study& study, const StudyArguments& options) {
+  if (failed_row.status.starts_with(not_explicit)) return false;
   const bool chosen = (failed_row.is_baseline() ? options.rtols : options.steps).has_value();
   if (chosen && failed_row.fits()) return true;
   return std::ranges::none_of(study.rows, [&](const StudyRow& row) {

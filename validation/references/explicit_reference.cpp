@@ -205,7 +205,7 @@ ReferenceRun integrate_explicitly(const Scene& given, double t_end, const Refere
   const bool alone = motions.u.cols() == 0 && scene->rows() == 0 && !scene->force;
   if (motions.exist() && !motions.by_force && (motions.hide_equations() || !alone)) {
     ReferenceRun run;
-    run.failure = "not explicit: " + why_no_accelerations(*scene);
+    run.failure = not_explicit + why_no_accelerations(*scene);
     return run;
   }
   require_reference(name(code), *scene, t_end, options);

@@ -56,6 +56,9 @@ const char* name(ExplicitCode code);
 /// sized_equations() takes.
 std::vector<ExplicitCode> explicit_codes(const Scene& scene);
 
+/// What the failure begins with where a scene has no accelerations, so that there is nothing to run.
+inline constexpr const char* not_explicit = "not explicit: ";
+
 /// Integrates the equations above from the scene's start to `t_end`: ARKODE those of ReducedEquations,
 /// Boost.odeint those of SizedEquations, with the number of unknowns known when it is compiled.  Counts: one
 /// residual evaluation is one right-hand side.  Throws Misuse for a bad scene, start, end or option, and for
