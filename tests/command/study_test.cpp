@@ -51,11 +51,11 @@ TEST_F(StudyCommand, ScenesSideBySideHaveTheRowsOfScenesInTurn) {
   for (std::size_t k = 0; k < 3; ++k) {
     EXPECT_EQ(found[k]["scene"], expected[k]["scene"]);
     for (const Json& row : expected[k]["rows"]) {
-      if (row["method"] == "ida") continue;  // the formulations that have rows are chosen by their times
+      if (row.contains("rtol"))
+        continue;  // which formulations of a baseline have rows is chosen by their times
       const auto same = [&](const Json& other) {
         return other["method"] == row["method"] && other.value("order", 0) == row.value("order", 0) &&
-               other.value("step", 0.0) == row.value("step", 0.0) &&
-               other.value("rtol", 0.0) == row.value("rtol", 0.0) && other["error_q"] == row["error_q"] &&
+               other["step"] == row["step"] && other["error_q"] == row["error_q"] &&
                other["steps"] == row["steps"];
       };
       EXPECT_TRUE(std::ranges::any_of(found[k]["rows"], same)) << row;
