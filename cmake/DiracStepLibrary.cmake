@@ -24,7 +24,9 @@ set(diracstep_headers_library <Eigen/Core> <algorithm> <array> <cmath> <function
 set(diracstep_headers_command ${diracstep_headers_library} <CLI/App.hpp> <CLI/Config.hpp> <CLI/Formatter.hpp>
   <fmt/format.h>)
 set(diracstep_headers_test ${diracstep_headers_library} <gtest/gtest.h>)
-set(diracstep_headers_unoptimised_test ${diracstep_headers_test})  # they are read with the flags of their sources
+# They are read with the flags of their sources.
+set(diracstep_headers_unoptimised_command ${diracstep_headers_command})
+set(diracstep_headers_unoptimised_test ${diracstep_headers_test})
 
 # Where DIRACSTEP_UNOPTIMISED_TESTS says so, the target is compiled without optimisation, which takes half the time.
 function(diracstep_leave_unoptimised target)

@@ -101,7 +101,7 @@ TEST_F(GeneralCommand, ListAsJson) {
   EXPECT_FALSE(Json::parse(run("list plugins --json").out).contains("scenes"));
 }
 
-TEST_F(GeneralCommand, ListMeasuresTheStatedOrder) {
+TEST_F(GeneralCommand, ListMeasuresTheStatedOrder_slow) {
   const Json all = Json::parse(run("list methods --measure --json").out);
   for (const Json& method : all["methods"]) {
     if (method["name"] != "type1/midpoint") continue;
