@@ -160,7 +160,7 @@ TEST(PlantedFault, OrderClaimedTooHigh) {
             Names{"order, unconstrained"});
 }
 
-TEST(PlantedFault, FalseSelfAdjointness) {
+TEST(PlantedFault, FalseSelfAdjointness_slow) {
   const auto one_sided = [](diracstep_method& method) {
     method.order = 1;
     method.constraint_rule = "left";
@@ -214,7 +214,7 @@ TEST(PlantedFault, NaNThatIsSwallowed) {
   EXPECT_TRUE(failing(Fault::swallows_nan, "not a number").contains("not a number"));
 }
 
-TEST(Fallback, EveryAmountOfDerivativesPasses) {
+TEST(Fallback, EveryAmountOfDerivativesPasses_slow) {
   EXPECT_EQ(failing(Fault::none, [](diracstep_method& m) { m.gradient = nullptr; }), Names{});
   EXPECT_EQ(failing(Fault::none, [](diracstep_method& m) { m.value = nullptr; }), Names{});
 }
