@@ -133,19 +133,22 @@ class Course {
   void run(int threads, const std::function<void(std::size_t, Study)>& finished) {
     std::vector<std::promise<std::optional<Study>>> results(stages_.size());
     std::atomic<std::size_t> next = 0;
+    const auto work_on = [&](std::size_t i) {
+      try {
+        results[i].set_value(interrupted() ? std::nullopt : std::optional(study(i)));
+      } catch (...) {
+        results[i].set_exception(std::current_exception());
+      }
+    };
     const auto work = [&] {
-      for (std::size_t i = next++; i < stages_.size(); i = next++) try {
-          results[i].set_value(interrupted() ? std::nullopt : std::optional(study(i)));
-        } catch (...) {
-          results[i].set_exception(std::current_exception());
-        }
+      for (std::size_t i = next++; i < stages_.size(); i = next++) work_on(i);
     };
     std::vector<std::jthread> others;
     if (threads > 1)
       for (int k = 0; k < threads; ++k) others.emplace_back(work);
     try {
       for (std::size_t i = 0; i < stages_.size(); ++i) {
-        if (threads == 1) results[i].set_value(interrupted() ? std::nullopt : std::optional(study(i)));
+        if (threads == 1) work_on(i);
         std::optional<Study> result = results[i].get_future().get();
         wipe();
         if (result) finished(i, std::move(*result));

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <diracstep/core/equilibrium/force_balance.hpp>
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/numerics/sparse_columns.hpp>
 #include <diracstep/core/system/hidden_rows.hpp>
 #include <diracstep/core/system/lagrangian_derivatives.hpp>
 #include <diracstep/core/system/row_subset.hpp>
@@ -12,12 +13,6 @@ namespace {
 
 constexpr int most_full = 2000;  // coordinates, and rows
 constexpr double dependent_row = 1e-10;
-
-SparseMatrix with_values(const SparsityPattern& pattern, const Vector& values) {
-  return Eigen::Map<const SparseMatrix>(pattern.rows(), pattern.columns(), pattern.nonzeros(),
-                                        pattern.column_starts().data(), pattern.row_indices().data(),
-                                        values.data());
-}
 
 /// Which rows of a nonholonomic block have constant coefficients though others of it have not, as states
 /// without a rate beside states with one: by comparing them and their derivatives at generic points.
@@ -126,21 +121,21 @@ void ForceBalance::evaluate(double t, const Vector& q, const Vector& v) {
   const Eigen::Index n = v.size();
   LagrangianDerivatives l(lagrangian);
   l.take_second(lagrangian, t, q, v);
-  const SparseMatrix lqv = with_values(pattern, l.qv);
+  const SparseMatrix lqv = sparse_map(pattern, l.qv.data());
   Vector lq(n), lv(n), rate(n), f = Vector::Zero(n);
   lagrangian.gradient(t, q, v, lq, lv);
   lagrangian.gradient_rate(t, q, v, rate);
   const Vector convective = lqv.transpose() * v;
-  mass = with_values(pattern, l.vv);
+  mass = sparse_map(pattern, l.vv.data());
   damping = SparseMatrix(lqv.transpose()) - lqv;
-  free_stiffness_ = -with_values(pattern, l.qq);
+  free_stiffness_ = -sparse_map(pattern, l.qq.data());
   if (scene_.force) {
     const SparsityPattern& of_force = scene_.force->pattern();
     Vector by_q(of_force.nonzeros()), by_v = by_q;
     scene_.force->value(t, q, v, f);
     scene_.force->derivatives(t, q, v, by_q, by_v);
-    damping -= with_values(of_force, by_v);
-    free_stiffness_ -= with_values(of_force, by_q);
+    damping -= sparse_map(of_force, by_v.data());
+    free_stiffness_ -= sparse_map(of_force, by_q.data());
   }
   forces = convective + rate - lq - f;
   free_sizes_ = convective.cwiseAbs() + rate.cwiseAbs() + lq.cwiseAbs() + f.cwiseAbs();
@@ -154,7 +149,7 @@ void ForceBalance::evaluate_rows() {
   one_forms = row_derivative = SparseMatrix(m, v_.size());
   if (m == 0) return;
   rows_.evaluate(t_, q_);
-  one_forms = with_values(rows_.pattern(), rows_.coefficients());
+  one_forms = sparse_map(rows_.pattern(), rows_.coefficients().data());
   velocity = rows_.offsets();
   // At rest the time stands still, and rows on positions that it moves ask for no velocity.
   const double passing = v_.lpNorm<Eigen::Infinity>() > 0.0 ? 1.0 : 0.0;
@@ -166,7 +161,7 @@ void ForceBalance::evaluate_rows() {
   rows_.pattern().for_each([&](Eigen::Index k, int row, int) {
     if (row < on_positions) derivative[k] = of_positions[k];
   });
-  row_derivative = with_values(rows_.pattern(), derivative);
+  row_derivative = sparse_map(rows_.pattern(), derivative.data());
   const Vector kept = one_forms * (q_ - scene_.start.q) + (t_ - scene_.start.time) * rows_.offsets();
   int row = 0;
   for (const auto& block : blocks_) {
@@ -185,7 +180,7 @@ void ForceBalance::set_multipliers(const Vector& lambda) {
   for (const auto& block : blocks_) {
     Vector curvature(block->curvature_pattern().nonzeros());
     block->annihilator_derivative(t_, q_, lambda.segment(row, block->rows()), curvature);
-    stiffness -= with_values(block->curvature_pattern(), curvature);
+    stiffness -= sparse_map(block->curvature_pattern(), curvature.data());
     row += block->rows();
   }
   sizes = free_sizes_ + stiffness.cwiseAbs() * q_.cwiseAbs();

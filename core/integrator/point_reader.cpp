@@ -20,8 +20,7 @@ PointReader::PointReader(std::shared_ptr<const Scene> scene, SolverFactory solve
     hamiltonian_velocity_ = std::make_unique<HamiltonianVelocityProblem>(*scene_, full);
     velocity_solver_ = solvers_(*hamiltonian_velocity_);
   } else if (const FirstOrderMotions motions = first_order_motions(*scene_);
-             motions.exist() &&
-             (motions.hide_equations() || motions.u.cols() > 0 || scene_->rows() > 0 || scene_->force)) {
+             motions.exist() && !by_two_form_alone(*scene_, motions)) {
     first_order_velocity_ = velocity_problem(*scene_, motions);
     velocity_solver_ = solvers_(*first_order_velocity_);
   } else if (motions.exist()) {

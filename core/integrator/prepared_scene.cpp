@@ -98,8 +98,7 @@ PreparedScene prepared(std::shared_ptr<const Scene> given, const IntegratorOptio
         {"hidden rows", joined(names), "motions without momentum; these rows determine them"});
   }
   if (const FirstOrderMotions motions = first_order_motions(*scene);
-      motions.exist() && scene->start.v.size() == scene->dimension() &&
-      (motions.hide_equations() || motions.u.cols() > 0 || scene->rows() > 0 || scene->force)) {
+      motions.exist() && scene->start.v.size() == scene->dimension() && !by_two_form_alone(*scene, motions)) {
     if (motions.hide_equations() && options.project_start) {
       auto moved = std::make_shared<Scene>(*scene);
       moved->start = project_start(*scene, scene->start, solvers).start;

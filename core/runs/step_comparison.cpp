@@ -64,7 +64,7 @@ void StepComparison::add(const Sample& start, double h, const Sample& whole, con
   position_.add(start.q, whole.q, parts.q, start.time);
   velocity_.add(start.v, whole.v, parts.v, start.time);
   momentum_.add(start.p, whole.p, parts.p, start.time);
-  const Worst here{max_norm(whole.q - parts.q), max_norm(whole.p - parts.p)};
+  const Worst here{apart, max_norm(whole.p - parts.p)};
   if (place == Place::fast) return;
   Worst& worst = place == Place::at_kink ? at_kinks_ : usual_;
   worst = {std::max(worst.position, here.position), std::max(worst.momentum, here.momentum)};

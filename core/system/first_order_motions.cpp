@@ -6,6 +6,7 @@
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/numerics/kernel_basis.hpp>
 #include <diracstep/core/numerics/scales.hpp>
+#include <diracstep/core/numerics/sparse_columns.hpp>
 #include <diracstep/core/system/detail/constraint_levels.hpp>
 #include <diracstep/core/system/first_order_motions.hpp>
 #include <diracstep/core/system/kernel_motions.hpp>
@@ -89,8 +90,7 @@ bool positive_definite(const Lagrangian& lagrangian, const Start& start) {
   LagrangianDerivatives l(lagrangian);
   l.take_second(lagrangian, start.time, start.q, start.v);
   const int n = pattern.rows();
-  const Eigen::Map<const Eigen::SparseMatrix<double>> mass(
-      n, n, pattern.nonzeros(), pattern.column_starts().data(), pattern.row_indices().data(), l.vv.data());
+  const auto mass = sparse_map(pattern, l.vv.data());
   Vector size(n);
   for (int i = 0; i < n; ++i) size[i] = mass.coeff(i, i);
   if (!(size.minCoeff() > 0.0)) return false;
@@ -130,6 +130,10 @@ FirstOrderMotions motions_of_one_level(const Scene& scene) {
 }
 
 }  // namespace
+
+bool by_two_form_alone(const Scene& scene, const FirstOrderMotions& motions) {
+  return !motions.hide_equations() && motions.u.cols() == 0 && scene.rows() == 0 && !scene.force;
+}
 
 FirstOrderMotions first_order_motions(const Scene& scene) {
   FirstOrderMotions motions = motions_of_one_level(scene);

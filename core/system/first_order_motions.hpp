@@ -55,6 +55,10 @@ bool positive_definite(const Lagrangian& lagrangian, const Start& start);
 /// as in circuits, and no force along them is non-linear in v: these hidden_rows.hpp deals with.
 FirstOrderMotions first_order_motions(const Scene& scene);
 
+/// Whether these are the motions of a Lagrangian linear in v alone, without rows and force: the two-form then
+/// gives the velocity (PhaseSpaceVelocityProblem).
+bool by_two_form_alone(const Scene& scene, const FirstOrderMotions& motions);
+
 /// A scene with motions of first order at one point: the derivatives of L, f and the rows there, as full
 /// matrices, and the equations that determine velocities and forces of rows,
 ///

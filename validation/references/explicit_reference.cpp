@@ -202,8 +202,7 @@ ReferenceRun integrate_explicitly(const Scene& given, double t_end, const Refere
                                   ExplicitCode code) {
   const auto scene = with_hidden_rows(with_lagrangian(given));
   const FirstOrderMotions motions = first_order_motions(*scene);
-  const bool alone = motions.u.cols() == 0 && scene->rows() == 0 && !scene->force;
-  if (motions.exist() && !motions.by_force && (motions.hide_equations() || !alone)) {
+  if (motions.exist() && !motions.by_force && !by_two_form_alone(*scene, motions)) {
     ReferenceRun run;
     run.failure = not_explicit + why_no_accelerations(*scene);
     return run;

@@ -122,7 +122,7 @@ class IdaIntegration {
     y.head(numbers_) = start.q;
     y.segment(numbers_, n) = start.v;
     const FirstOrderMotions motions = first_order_motions(scene_);
-    const bool linear_in_v = motions.exist(), alone = motions.u.cols() == 0 && m == 0 && !scene_.force;
+    const bool linear_in_v = motions.exist(), alone = by_two_form_alone(scene_, motions);
     const SolveReport report =
         !linear_in_v ? solve_acceleration(start.time, start.q, start.v)
         : alone      ? solve_phase_space_velocity(y.segment(n, n))

@@ -1,10 +1,10 @@
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/core/steps/gauss_lobatto/levelled_step.hpp>
 #include <diracstep/core/steps/gauss_lobatto/tableau.hpp>
 #include <diracstep/core/system/detail/constraint_levels.hpp>
+#include <diracstep/core/system/detail/differenced.hpp>
 
 namespace diracstep {
 
@@ -45,7 +45,6 @@ class LevelledStep final : public StepProblem {
   void begin(Interval step, const State& start, const StepMemory&) override {
     step_ = step;
     z0_ = equations_.state(start.q, start.p);
-    p0_ = start.p;
     evaluated_ = false;
     for (ResidualBlock& block : blocks_) block.scale = smallest_scale;
   }
@@ -132,25 +131,19 @@ class LevelledStep final : public StepProblem {
   /// K, and g's part of momenta or at the end C, by (z,w) at a node.
   Columns differences(int i, const Vector& w, bool end) {
     const double t = node_time(i);
-    const Vector& z = at_node(i).z;
-    const auto all = [&](const Vector& there_z, const Vector& there_w) {
-      const Vector k = equations_.evaluate(t, there_z, there_w);
+    const Eigen::Index states = z0_.size();
+    const auto all = [&](const Vector& there) {
+      const auto z = there.head(states), unknowns = there.tail(there.size() - states);
+      const Vector k = equations_.evaluate(t, z, unknowns);
       const Vector rest =
-          end ? equations_.constraints(t, there_z, there_w) : Vector(equations_.rate().tail(inert_));
+          end ? equations_.constraints(t, z, unknowns) : Vector(equations_.rate().tail(inert_));
       Vector both(k.size() + rest.size());
       both << k, rest;
       return both;
     };
-    Columns by(n_ + m_ + (end ? constraints_ : inert_), z.size() + w.size());
-    for (Eigen::Index c = 0; c < by.cols(); ++c) {
-      const bool of_z = c < z.size();
-      const double d = levelled_difference * size_or_one(max_norm(of_z ? z : w));
-      Vector ahead_z = z, behind_z = z, ahead_w = w, behind_w = w;
-      (of_z ? ahead_z[c] : ahead_w[c - z.size()]) += d;
-      (of_z ? behind_z[c] : behind_w[c - z.size()]) -= d;
-      by.col(c) = (all(ahead_z, ahead_w) - all(behind_z, behind_w)) / (2.0 * d);
-    }
-    return by;
+    Vector at(states + w.size());
+    at << at_node(i).z, w;
+    return differenced(all, at, states, levelled_difference, false);
   }
 
   void evaluate(ConstVectorRef x) {
@@ -203,7 +196,7 @@ class LevelledStep final : public StepProblem {
   SparsityPattern pattern_;
   std::vector<ResidualBlock> blocks_;
   Interval step_{0.0, 1.0};
-  Vector z0_, p0_, last_x_, moved_, off_;
+  Vector z0_, last_x_, moved_, off_;
   Columns directions_;  ///< G, in the Jacobian with what depends on Z_i left out
   std::vector<Node> nodes_;
   bool evaluated_ = false;

@@ -1,39 +1,23 @@
 #include <algorithm>
+#include <diracstep/core/numerics/sparse_columns.hpp>
 #include <diracstep/core/system/constraint_distribution.hpp>
 #include <diracstep/core/system/contradictory_rows.hpp>
 #include <diracstep/core/system/detail/combined_rows.hpp>
 
 namespace diracstep {
 
-namespace {
-
-Eigen::SparseMatrix<double> columns_of(const Eigen::SparseMatrix<double>& all,
-                                       const std::vector<Eigen::Index>& numbers) {
-  Eigen::SparseMatrix<double> some(all.rows(), std::ssize(numbers));
-  for (std::size_t k = 0; k < numbers.size(); ++k)
-    some.col(static_cast<Eigen::Index>(k)) = all.col(numbers[k]);
-  return some;
-}
-
-}  // namespace
-
 CombinedRows::CombinedRows(const Scene& scene, double t, const Vector& q, std::size_t known) {
   const std::vector<std::string> own = scene.row_names(), all = scene.whole->row_names();
   for (std::size_t r = 0; r < all.size(); ++r) {
     const bool kept = kept_.size() < known && all[r] == own[kept_.size()];
-    (kept ? kept_ : left_).push_back(static_cast<Eigen::Index>(r));
+    (kept ? kept_ : left_).push_back(static_cast<int>(r));
   }
   ConstraintsAtPoint rows(scene.whole->constraints, scene.whole->dimension());
   rows.evaluate(t, q);
-  const SparsityPattern& pattern = rows.pattern();
   const Eigen::SparseMatrix<double> one_forms =
-      Eigen::SparseMatrix<double>(Eigen::Map<const Eigen::SparseMatrix<double>>(
-                                      pattern.rows(), pattern.columns(), pattern.nonzeros(),
-                                      pattern.column_starts().data(), pattern.row_indices().data(),
-                                      rows.coefficients().data()))
-          .transpose();
-  of_kept_ = columns_of(one_forms, kept_);
-  of_left_ = columns_of(one_forms, left_);
+      sparse_map(rows.pattern(), rows.coefficients().data()).transpose();
+  of_kept_ = columns_at(one_forms, kept_);
+  of_left_ = columns_at(one_forms, left_);
   size_ = Vector::Ones(of_kept_.cols());
   for (Eigen::Index k = 0; k < of_kept_.cols(); ++k)
     if (const double size = of_kept_.col(k).norm(); size > 0.0) {

@@ -14,8 +14,8 @@ class CombinedRows {
  public:
   CombinedRows(const Scene& scene, double t, const Vector& q, std::size_t known);
 
-  const std::vector<Eigen::Index>& kept() const { return kept_; }  ///< numbers among all rows
-  const std::vector<Eigen::Index>& left() const { return left_; }
+  const std::vector<int>& kept() const { return kept_; }  ///< numbers among all rows
+  const std::vector<int>& left() const { return left_; }
 
   /// D x.
   Vector times(const Vector& x) const;
@@ -27,7 +27,7 @@ class CombinedRows {
  private:
   Vector solved(const Vector& right) const;
 
-  std::vector<Eigen::Index> kept_, left_;
+  std::vector<int> kept_, left_;
   Eigen::SparseMatrix<double> of_kept_, of_left_;  ///< with a row in each column
   Vector size_;
   Eigen::SparseMatrix<double> products_;

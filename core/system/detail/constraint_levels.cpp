@@ -76,8 +76,7 @@ Vector LevelledEquations::at(std::size_t level, double t, ConstVectorRef z, Cons
 
 Vector LevelledEquations::evaluate(double t, ConstVectorRef z, ConstVectorRef w) {
   resolved_ = 1.0;
-  const Vector all = motions_.levels.empty() ? Vector() : at(motions_.levels.size(), t, z, w);
-  constraints(t, z, w);
+  const Vector all = at(motions_.levels.size(), t, z, w);
   equations(t, z, w);
   Vector ordered(n_ + m_);
   ordered << all(motions_.levels.front().kept), all(motions_.levels.front().left);

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/numerics/sparse_columns.hpp>
 #include <diracstep/core/system/detail/sparse_dependence.hpp>
 #include <string>
 
@@ -12,13 +13,8 @@ namespace {
 constexpr int smallest_part = 100;
 
 Eigen::SparseMatrix<double> sparse_one_forms(const ConstraintsAtPoint& rows) {
-  const SparsityPattern& pattern = rows.pattern();
-  Eigen::SparseMatrix<double> one_forms =
-      Eigen::Map<const Eigen::SparseMatrix<double>>(pattern.rows(), pattern.columns(), pattern.nonzeros(),
-                                                    pattern.column_starts().data(),
-                                                    pattern.row_indices().data(), rows.coefficients().data())
-          .transpose();
-  for (int r = 0; r < pattern.rows(); ++r)
+  Eigen::SparseMatrix<double> one_forms = sparse_map(rows.pattern(), rows.coefficients().data()).transpose();
+  for (Eigen::Index r = 0; r < one_forms.cols(); ++r)
     if (const double size = one_forms.col(r).norm(); size > 0.0) one_forms.col(r) /= size;
   return one_forms;
 }
@@ -52,14 +48,6 @@ std::vector<int> dependent_sparse_columns(const Eigen::SparseMatrix<double>& one
     if (!(pivots[k] > std::max(tolerance * tolerance, 1e-12)))
       dependent.push_back(inverse.size() > 0 ? inverse[k] : static_cast<int>(k));
   return dependent;
-}
-
-Eigen::SparseMatrix<double> columns_at(const Eigen::SparseMatrix<double>& all,
-                                       const std::vector<int>& numbers) {
-  Eigen::SparseMatrix<double> chosen(all.rows(), static_cast<Eigen::Index>(numbers.size()));
-  for (std::size_t k = 0; k < numbers.size(); ++k)
-    chosen.col(static_cast<Eigen::Index>(k)) = all.col(numbers[k]);
-  return chosen;
 }
 
 /// The same, with a part of the columns at a time beside those found independent before: where there are more
