@@ -96,8 +96,8 @@ std::vector<int> dependent_beside(const Eigen::SparseMatrix<double>& one_forms, 
 std::vector<int> dependent_sparse_rows(const ConstraintsAtPoint& rows, const RowKinds& kinds,
                                        double tolerance) {
   const Eigen::SparseMatrix<double> one_forms = sparse_one_forms(rows);
-  const auto& [holonomic, others] = kinds;
-  const std::vector<int> all = dependent_in_parts(one_forms, tolerance);
+  const std::vector<int>&holonomic = kinds[0], &others = kinds[1];
+  std::vector<int> all = dependent_in_parts(one_forms, tolerance);
   const auto is_holonomic = [&](int row) { return std::ranges::binary_search(holonomic, row); };
   if (others.empty() || std::ranges::none_of(all, is_holonomic)) return all;
   std::vector<int> dependent, kept = holonomic;
