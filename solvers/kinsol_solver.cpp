@@ -10,7 +10,6 @@
 #include <diracstep/solvers/detail/vector.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
 #include <string>
-#include <utility>
 
 namespace diracstep {
 
@@ -383,36 +382,7 @@ class KinsolSolver final : public NonlinearSolver {
   bool went_back_ = false;    ///< the unknowns are those before the last residual
 };
 
-template <class Enum, std::size_t N>
-Enum find_name(const char* what, const std::array<std::pair<const char*, Enum>, N>& names,
-               const std::string& name) {
-  std::string allowed;
-  for (const auto& [text, value] : names) {
-    if (name == text) return value;
-    allowed += (allowed.empty() ? "" : ", ") + std::string(text);
-  }
-  throw Misuse(std::string(what) + " '" + name + "'; there are " + allowed);
-}
-
-constexpr std::array<std::pair<const char*, JacobianPolicy>, 4> policies{
-    {{"automatic", JacobianPolicy::automatic},
-     {"fresh", JacobianPolicy::fresh},
-     {"per-step", JacobianPolicy::per_step},
-     {"kept", JacobianPolicy::kept}}};
-constexpr std::array<std::pair<const char*, Iteration>, 3> iterations{
-    {{"newton", Iteration::newton},
-     {"fixed-point", Iteration::fixed_point},
-     {"automatic", Iteration::automatic}}};
-
 }  // namespace
-
-const char* name(JacobianPolicy policy) { return policies.at(static_cast<std::size_t>(policy)).first; }
-const char* name(Iteration iteration) { return iterations.at(static_cast<std::size_t>(iteration)).first; }
-
-JacobianPolicy jacobian_policy(const std::string& name) {
-  return find_name("Jacobian policy", policies, name);
-}
-Iteration iteration(const std::string& name) { return find_name("iteration", iterations, name); }
 
 SolverFactory kinsol(KinsolOptions options) {
   return [options](NonlinearProblem& problem) -> std::unique_ptr<NonlinearSolver> {

@@ -9,6 +9,7 @@
 #include <klu.h>
 #else
 #include <Eigen/SparseLU>
+#include <diracstep/core/numerics/sparse_columns.hpp>
 #endif
 
 namespace diracstep::detail {
@@ -192,11 +193,11 @@ class EigenLu final : public LinearSolver {
  public:
   explicit EigenLu(const SparsityPattern& pattern) : pattern_(pattern) {
     const Vector any = Vector::Ones(pattern.nonzeros());
-    lu_.analyzePattern(map(any.data()));
+    lu_.analyzePattern(matrix(any.data()));
   }
 
   bool factor(const double* values) override {
-    lu_.factorize(map(values));
+    lu_.factorize(matrix(values));
     return lu_.info() == Eigen::Success;
   }
   void solve(double* b) override {
@@ -207,10 +208,7 @@ class EigenLu final : public LinearSolver {
 
  private:
   using Matrix = Eigen::SparseMatrix<double>;
-  Matrix map(const double* values) const {
-    return Eigen::Map<const Matrix>(pattern_.rows(), pattern_.rows(), pattern_.nonzeros(),
-                                    pattern_.column_starts().data(), pattern_.row_indices().data(), values);
-  }
+  Matrix matrix(const double* values) const { return sparse_map(pattern_, values); }
 
   const SparsityPattern& pattern_;
   Eigen::SparseLU<Matrix, Eigen::COLAMDOrdering<int>> lu_;
