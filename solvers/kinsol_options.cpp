@@ -18,24 +18,26 @@ Enum find_name(const char* what, const std::array<std::pair<const char*, Enum>, 
   throw Misuse(std::string(what) + " '" + name + "'; there are " + allowed);
 }
 
-constexpr std::array<std::pair<const char*, JacobianPolicy>, 4> policies{
+constexpr std::array<std::pair<const char*, JacobianPolicy>, 4> policy_names{
     {{"automatic", JacobianPolicy::automatic},
      {"fresh", JacobianPolicy::fresh},
      {"per-step", JacobianPolicy::per_step},
      {"kept", JacobianPolicy::kept}}};
-constexpr std::array<std::pair<const char*, Iteration>, 3> iterations{
+constexpr std::array<std::pair<const char*, Iteration>, 3> iteration_names{
     {{"newton", Iteration::newton},
      {"fixed-point", Iteration::fixed_point},
      {"automatic", Iteration::automatic}}};
 
 }  // namespace
 
-const char* name(JacobianPolicy policy) { return policies.at(static_cast<std::size_t>(policy)).first; }
-const char* name(Iteration iteration) { return iterations.at(static_cast<std::size_t>(iteration)).first; }
+const char* name(JacobianPolicy policy) { return policy_names.at(static_cast<std::size_t>(policy)).first; }
+const char* name(Iteration iteration) {
+  return iteration_names.at(static_cast<std::size_t>(iteration)).first;
+}
 
 JacobianPolicy jacobian_policy(const std::string& name) {
-  return find_name("Jacobian policy", policies, name);
+  return find_name("Jacobian policy", policy_names, name);
 }
-Iteration iteration(const std::string& name) { return find_name("iteration", iterations, name); }
+Iteration iteration(const std::string& name) { return find_name("iteration", iteration_names, name); }
 
 }  // namespace diracstep
