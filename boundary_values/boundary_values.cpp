@@ -256,7 +256,10 @@ BoundaryReport solve_boundary_values(const BoundaryProblem& problem) {
   report.iterations = search.iterations;
   report.correction = search.correction;
   report.residual = equations.residual(u).ends.lpNorm<Eigen::Infinity>();
-  const double size = boundary::sizes_by_kind(equations, u).head(3).maxCoeff();
+  const auto size_of = [&](const Vector& at) {
+    return boundary::sizes_by_kind(equations, at).head(3).maxCoeff();
+  };
+  const double size = std::max(size_of(u), size_of(at_guess));  // a rest in the origin has none
   report.converged = search.converged && report.residual <= 1e-8 * size;
   report.interrupted = search.interrupted;
   if (search.interrupted)
