@@ -3,6 +3,7 @@
 #include <diracstep/boundary_values/boundary_values.hpp>
 #include <diracstep/boundary_values/detail/newton.hpp>
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/core/runs/energy_check.hpp>
 
 namespace diracstep {
@@ -24,12 +25,16 @@ void require_conditions(const BoundaryConditions& conditions, int n) {
 /// A place that is held must be on the rows; a velocity cannot be asked for where none is a datum.
 void require_on_rows(const Scene& scene, double t, const Vector& q, const char* which) {
   int row = 0;
+  const double largest = max_norm(q);
+  const Vector sizes = q.unaryExpr([largest](double x) { return size_beside(x, largest); });
   for (const auto& block : only_holonomic(scene.constraints)) {
-    Vector phi(block->rows());
+    Vector phi(block->rows()), a(block->pattern().nonzeros()), terms(block->rows());
     block->position(t, q, phi);
+    block->coefficients(t, q, a, terms);
+    terms = std::abs(t) * terms.cwiseAbs();
+    block->pattern().multiply_add(a.cwiseAbs().eval().data(), sizes.data(), terms.data());
     for (int i = 0; i < block->rows(); ++i, ++row)
-      if (const double tolerance = 1e-9 * std::max(1.0, q.lpNorm<Eigen::Infinity>());
-          !(std::abs(phi[i]) <= tolerance))
+      if (!(std::abs(phi[i]) <= 1e-9 * terms[i]))
         throw Misuse(std::string("the place at the ") + which + " is off " +
                      row_label(only_holonomic(scene.constraints), row) + ": " + to_text(phi[i]));
   }
@@ -251,7 +256,10 @@ BoundaryReport solve_boundary_values(const BoundaryProblem& problem) {
   report.iterations = search.iterations;
   report.correction = search.correction;
   report.residual = equations.residual(u).ends.lpNorm<Eigen::Infinity>();
-  const double size = std::max(1.0, boundary::sizes_by_kind(equations, u).head(3).maxCoeff());
+  const auto size_of = [&](const Vector& at) {
+    return boundary::sizes_by_kind(equations, at).head(3).maxCoeff();
+  };
+  const double size = std::max(size_of(u), size_of(at_guess));  // a rest in the origin has none
   report.converged = search.converged && report.residual <= 1e-8 * size;
   report.interrupted = search.interrupted;
   if (search.interrupted)

@@ -42,8 +42,9 @@ GuessedMotion through_points(Vector times, Columns q, Columns v) {
     const Eigen::Index last = times.size() - 1;
     if (last == 0) return GuessedPoint{q.col(0), v.col(0)};
     const double sign = times[last] > times[0] ? 1.0 : -1.0;
-    Eigen::Index k = 0;
-    while (k < last - 1 && sign * (times[k + 1] - t) < 0.0) ++k;
+    const auto next = std::partition_point(times.begin() + 1, times.begin() + last,
+                                           [&](double time) { return sign * (time - t) < 0.0; });
+    const Eigen::Index k = next - times.begin() - 1;
     const double part = std::clamp((t - times[k]) / (times[k + 1] - times[k]), 0.0, 1.0);
     return GuessedPoint{q.col(k) + part * (q.col(k + 1) - q.col(k)),
                         v.col(k) + part * (v.col(k + 1) - v.col(k))};

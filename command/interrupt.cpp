@@ -16,10 +16,11 @@ namespace {
 // A signal handler can reach nothing but globals, and call only what is safe there: write, _exit, clocks.
 volatile std::sig_atomic_t flag = 0;
 volatile std::sig_atomic_t out_of_time = 0;  ///< the flag was set by the clock
+volatile std::sig_atomic_t nothing_kept = 0;
 double first_time = 0.0;
 
 constexpr double same_signal = 0.1;  ///< seconds
-constexpr double patience = 3.0;
+constexpr double patience = 0.8;
 
 double now() {
   std::timespec time{};
@@ -57,6 +58,9 @@ void on_timer(int) {
     out_of_time = 1;
     flag = 1;
     set_timer(grace_seconds);
+  } else if (nothing_kept != 0) {
+    tell("\ndiracstep: interrupted in the middle of a computation, of which nothing can be kept\n");
+    _exit(1);
   } else if (out_of_time == 0) {
     tell(
         "\ndiracstep: the step or phase under way has not ended yet; a second signal ends the run at once\n");
@@ -100,6 +104,9 @@ void catch_interrupts() {
 }
 
 void limit_time(double seconds) { set_timer(seconds); }
+
+NothingKept::NothingKept() { nothing_kept = 1; }
+NothingKept::~NothingKept() { nothing_kept = 0; }
 
 bool interrupted() { return flag != 0; }
 

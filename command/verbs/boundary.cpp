@@ -15,6 +15,8 @@
 #include <diracstep/reports/json.hpp>
 #include <diracstep/reports/report.hpp>
 #include <memory>
+#include <optional>
+#include <utility>
 
 namespace diracstep::command {
 
@@ -132,14 +134,17 @@ void run_boundary(BoundaryArguments arguments, Session& session) {
   problem.guess =
       arguments.guess.empty() ? usual_guess(problem) : guess_from_file(arguments.guess, *problem.scene);
   catch_interrupts();
+  std::optional<NothingKept> searching(std::in_place);
   BoundaryReport report = solve_boundary_values(problem);
   const bool places = report.converged && problem.conditions.start_held && problem.conditions.end_held;
   if (places && report.doubt.empty() && !interrupted()) report.doubt = doubt_of_steps(problem, report);
+  searching.reset();
   if (!arguments.out.empty())
     write_motion(arguments.out, *entry.scene, {report.times, report.q, report.v, report.p});
   const std::string method =
       Integrator(entry.scene, session.registry, session.solvers, problem.options).method().name;
   print(arguments.json ? boundary_json(report, problem, method) : boundary_text(report, problem, method));
+  searching.emplace();
   if (places && arguments.guess.empty() && !interrupted())
     if (const std::string other = other_motion(problem, report); !other.empty()) say(other);
   if (report.converged && !report.doubt.empty()) {

@@ -141,7 +141,10 @@ ControlProblem control_problem(ControlArguments& arguments, Session& session) {
 void run_control(ControlArguments arguments, Session& session) {
   const ControlProblem problem = control_problem(arguments, session);
   catch_interrupts();
-  const OptimalControlReport report = solve_optimal_control(problem);
+  const OptimalControlReport report = [&] {
+    const NothingKept searching;
+    return solve_optimal_control(problem);
+  }();
   if (!arguments.out.empty()) write_controlled(arguments.out, report, problem);
   const std::string method =
       Integrator(problem.controlled.scene, session.registry, session.solvers, problem.options).method().name;

@@ -200,8 +200,9 @@ Columns DiscreteDiracStructure::start_derivative(Interval step, const Vector& q0
     return reversed_constraint_.pattern().full(d);
   }
   Columns derivative(rows(), q0.size());
+  const double size = max_norm(q0);
   for (Eigen::Index i = 0; i < q0.size(); ++i) {
-    const Vector change = Vector::Unit(q0.size(), i) * 1e-5 * std::max(1.0, std::abs(q0[i]));
+    const Vector change = Vector::Unit(q0.size(), i) * 1e-5 * size_beside(q0[i], size);
     derivative.col(i) = (discrete_constraint(step, q0 + change, q1, true) -
                          discrete_constraint(step, q0 - change, q1, true)) /
                         (2.0 * change[i]);

@@ -45,9 +45,10 @@ double outside_span(Columns rows, const Columns& forms) {
 /// Largest difference between ∂c/∂q1 and central differences of c at (q0, q1).
 double derivative_error(const DiscreteRows& rows, Interval step, const Vector& q0, const Vector& q1) {
   const Columns exact = derivative(rows, step, q0, q1);
+  const double size = max_norm(q1);
   double largest = 0.0;
   for (Eigen::Index i = 0; i < q1.size(); ++i) {
-    const double delta = 1e-5 * std::max(1.0, std::abs(q1[i]));
+    const double delta = 1e-5 * size_beside(q1[i], size);
     Vector forward = q1, backward = q1;
     forward[i] += delta;
     backward[i] -= delta;
@@ -88,7 +89,7 @@ void require_discretisation(const DiscreteRows& rows, const ConstraintBlocks& co
                 1e-5 * size_or_one(std::max({max_norm(rate), max_norm(offset), max_norm(d)})),
                 "c(q,q)/h misses the term b of A v + b");
   Vector q1 = q;
-  for (int i = 0; i < n; ++i) q1[i] += 1e-2 * std::sin(1.0 + 1.7 * i) * std::max(1.0, std::abs(q[i]));
+  for (int i = 0; i < n; ++i) q1[i] += 1e-2 * std::sin(1.0 + 1.7 * i) * size_beside(q[i], max_norm(q));
   require_below(derivative_error(rows, {t, 0.05}, q, q1), difference_tolerance,
                 "∂c/∂q1 differs from differences");
 }

@@ -57,7 +57,9 @@ std::string describe_singularity(NonlinearProblem& problem, ConstVectorRef x, co
   problem.jacobian(x, values);
   if (!values.allFinite())
     return "; the Jacobian is not finite there: a formula or its derivative leaves the range of numbers, as "
-           "exp(u) does above u = 709, where tanh(u) and atan(u) do not";
+           "exp(u) does above u = 709, where tanh(u) and atan(u) do not, or is infinite, as that of sqrt(u) "
+           "and "
+           "of u^p with p < 1 at u = 0, also in max(0, u)^p, for which if(u > 0, u^p, 0) can be written";
   Eigen::FullPivLU<Columns> lu;
   lu.setThreshold(singular);
   lu.compute(balanced(problem.pattern().full(values)).transpose());

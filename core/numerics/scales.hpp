@@ -114,6 +114,12 @@ inline double largest_or_infinite(const double* x, int count) {
 /// A size to divide by: 1 where it is none.
 inline double size_or_one(double size) { return size > 0.0 && std::isfinite(size) ? size : 1.0; }
 
+/// How large a number counts beside others of its kind, as one that is varied or known to some digits: a
+/// small one beside a large one as that one, up to 1; 1 where all are zero, as coordinates in the origin.
+inline double size_beside(double x, double largest) {
+  return std::max(std::abs(x), std::min(1.0, size_or_one(largest)));
+}
+
 /// A size of terms to measure residuals by.  None is below this: where all terms vanish, as at rest without a
 /// force, so does the residual.
 constexpr double smallest_scale = 1e-100;

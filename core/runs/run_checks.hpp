@@ -30,7 +30,7 @@ class RunChecks {
   RunChecks(const Integrator& integrator, long steps)
       : scene_(integrator.scene()),
         energy_(integrator.scene(), integrator.method().damped),
-        step_(integrator, steps),
+        step_(integrator, steps, true),
         nodes_(integrator.scene(), steps),
         branch_(integrator),
         growth_(integrator, steps),
@@ -55,6 +55,7 @@ class RunChecks {
   void see(const Sample& point) {
     energy_.see(point);
     growth_.see(point);
+    step_.see(point);
     work_.see(point);
   }
   /// Where the run has come to its end.
@@ -63,10 +64,11 @@ class RunChecks {
     growth_.finish(integrator, step_.part_of_motion());
   }
 
-  /// Empty, or the doubts, one after the other.
+  /// Empty, or the doubts, one after the other.  Work done between the nodes of steps that cross kinks is not
+  /// known well: it tells nothing of a run that was confirmed.
   std::string text() const {
-    return joined_doubts({energy_.text(), work_.text(), step_.text(), nodes_.text(), branch_.text(),
-                          growth_.text(), jumps_.text(), kinks_.text(),
+    return joined_doubts({energy_.text(), step_.confirmed() ? std::string() : work_.text(), step_.text(),
+                          nodes_.text(), branch_.text(), growth_.text(), jumps_.text(), kinks_.text(),
                           scene_.doubt ? scene_.doubt() : std::string()});
   }
 

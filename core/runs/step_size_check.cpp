@@ -2,6 +2,7 @@
 #include <cmath>
 #include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/core/runs/step_size_check.hpp>
+#include <numeric>
 #include <sstream>
 
 namespace diracstep {
@@ -11,15 +12,30 @@ namespace {
 constexpr long steps_for_a_look = 600, fewest_looks = 3;
 constexpr double shortest_part = 1e-6;     // of a step, behind a kink
 constexpr double doubted_at_kinks = 2e-4;  // of the motion
+constexpr long most_repeated = 2000;
+constexpr int most_unknowns_repeated = 12;
+
+/// So many steps of one size over the time of `taken` that no node but the ends is one of theirs: a contact
+/// about a node that both share would be cut into the same parts.
+long finer(long taken) {
+  long count = std::lround(static_cast<double>(taken) / (1.0 - StepComparison::first_part));
+  while (std::gcd(count, taken) > 1) ++count;
+  return count;
+}
 
 }  // namespace
 
-StepSizeCheck::StepSizeCheck(const Integrator& integrator, long steps)
+StepSizeCheck::StepSizeCheck(const Integrator& integrator, long steps, bool repeats)
     : comparison_(integrator.scene(), integrator.method().order),
       between_looks_(std::clamp(steps / fewest_looks, 1L, steps_for_a_look)),
       next_look_(integrator.work().steps + std::min(1L, steps - 1)),
       fast_(max_norm(integrator.velocity_estimate()) > 0.0),
-      velocity_(integrator.velocity_estimate()) {}
+      velocity_(integrator.velocity_estimate()),
+      order_(std::max(integrator.method().order, integrator.options().order)),
+      repeats_(repeats && integrator.scene().kinks && steps <= most_repeated &&
+               integrator.scene().dimension() + integrator.scene().rows() <= most_unknowns_repeated),
+      wanted_(steps),
+      taken_before_(integrator.work().steps) {}
 
 void StepSizeCheck::divide(Integrator& integrator) {
   fast_ = false;
@@ -75,8 +91,48 @@ void StepSizeCheck::look_behind_kinks(Integrator& integrator) {
   integrator.restore(state);
 }
 
+void StepSizeCheck::see(const Sample& point) {
+  if (!repeats_) return;
+  if (first_.size() == 0) first_ = point.q;
+  way_ = std::max(way_, max_norm(point.q - first_));
+  largest_momentum_ = std::max(largest_momentum_, max_norm(point.p));
+}
+
+/// The run once more, with finer steps.
+void StepSizeCheck::repeat(Integrator& integrator) {
+  if (taken_ == 0 || taken_ != wanted_ || integrator.work().steps - taken_before_ != taken_ ||
+      !(way_ > 0.0) || !(largest_momentum_ > 0.0) || !integrator.sample(Momentum::projected, whole_).ok())
+    return;
+  const Snapshot end = integrator.save();
+  const long count = finer(taken_);
+  const double part = static_cast<double>(taken_) / static_cast<double>(count);
+  integrator.restore(start_of_run_);
+  bool ok = true;
+  for (long k = 0; k < count && ok; ++k) ok = integrator.step(part * integrator.options().step).ok();
+  constexpr double same_time = 1e-9;  // in steps; else those of the run were of several sizes
+  if (ok && integrator.sample(Momentum::projected, parts_).ok() &&
+      std::abs(parts_.time - whole_.time) <= same_time * std::abs(integrator.options().step))
+    error_ = unresolved_ + 1.0 / (1.0 - std::pow(part, order_)) *
+                               std::max(max_norm(whole_.q - parts_.q) / way_,
+                                        max_norm(whole_.p - parts_.p) / largest_momentum_);
+  integrator.restore(end);
+}
+
+double StepSizeCheck::largest_error() const { return order_ > 2 ? 1e-3 : order_ == 2 ? 1e-2 : 0.1; }
+
 std::string StepSizeCheck::text() const {
-  if (std::string text = comparison_.text(); !text.empty() || looks_at_kinks_ == 0) return text;
+  if (std::string text = comparison_.text(); !text.empty()) return text;
+  if (error_ > largest_error()) {
+    std::ostringstream text;
+    text.precision(2);
+    text
+        << "step size check: the run crosses kinks of the force, and with finer steps it ends elsewhere: its "
+           "error is "
+        << std::min(100.0, 100.0 * error_)
+        << " % of the motion; take shorter steps, or ask for an error, --error";
+    return text.str();
+  }
+  if (confirmed() || looks_at_kinks_ == 0) return {};
   const double part = comparison_.sum_at_kinks() / static_cast<double>(looks_at_kinks_);
   const double all = part * static_cast<double>(over_kinks_);
   if (!(all > doubted_at_kinks)) return {};

@@ -2,6 +2,7 @@
 #include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
+#include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/core/system/detail/sparse_dependence.hpp>
 #include <diracstep/core/system/redundant_rows.hpp>
 #include <optional>
@@ -144,6 +145,7 @@ std::optional<Vector> pose_near(const ConstraintBlocks& holonomic, double t, Vec
                                 const std::vector<int>& held) {
   constexpr int most = 50;
   constexpr double small = 1e-10, dependent = 1e-6;
+  const double from = q.norm();
   ConstraintsAtPoint rows(holonomic, static_cast<int>(q.size()));
   for (int iteration = 0; rows.rows() > 0 && iteration < most; ++iteration) {
     Vector phi(rows.rows());
@@ -161,7 +163,7 @@ std::optional<Vector> pose_near(const ConstraintBlocks& holonomic, double t, Vec
     solver.compute(a);
     const Vector change = solver.solve(phi);
     q -= change;
-    if (change.norm() <= small * (1.0 + q.norm())) return q;
+    if (change.norm() <= small * size_or_one(std::max(from, q.norm()))) return q;
     if (iteration + 1 == most) return std::nullopt;
   }
   return q;

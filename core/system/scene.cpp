@@ -47,6 +47,27 @@ void require_on_space(const Scene& scene, const Vector& q) {
   throw Misuse(message.str());
 }
 
+/// How large the numbers of a place count, along the tangent space.
+Vector sizes_of_place(const Scene& scene, const Vector& q) {
+  const double largest = max_norm(q);
+  if (scene.space) return Vector::Constant(scene.dimension(), largest);
+  return q.unaryExpr([largest](double x) { return size_beside(x, largest); });
+}
+
+/// The same of a velocity, of which none is no motion.
+Vector sizes_of_velocity(const Vector& v) {
+  const double largest = max_norm(v);
+  if (!(largest > 0.0)) return Vector::Zero(v.size());
+  return v.unaryExpr([largest](double x) { return size_beside(x, largest); });
+}
+
+/// terms += |A| sizes, and what the round-off of a number of size 1 is allowed.
+void add_terms(const ConstraintRows& rows, const Vector& a, const Vector& sizes, Vector& terms) {
+  constexpr double round_off = 1e-15 / start_tolerance;
+  const Vector size = a.cwiseAbs(), all = sizes.array() + round_off;
+  rows.pattern().multiply_add(size.data(), all.data(), terms.data());
+}
+
 }  // namespace
 
 std::vector<std::string> Scene::row_names() const {
@@ -223,6 +244,8 @@ void require_consistent(const Scene& scene, const Start& given) {
   require_finite(scene, "v", start.v);
   if (!std::isfinite(start.time)) throw Misuse(prefix + "the start time is not finite");
   require_on_space(scene, start.q);
+  const Vector position = sizes_of_place(scene, start.q), velocity = sizes_of_velocity(start.v);
+  const double since = std::abs(start.time);
   int first = 0;
   for (const auto& block : scene.constraints) {
     const int m = block->rows();
@@ -230,18 +253,22 @@ void require_consistent(const Scene& scene, const Start& given) {
     block->coefficients(start.time, start.q, a, b);
     if (block->holonomic()) {
       block->position(start.time, start.q, phi);
-      terms.setOnes();
-      const Vector sizes = scene.space ? Vector(Vector::Constant(scene.dimension(), max_norm(start.q)))
-                                       : Vector(start.q.cwiseAbs());
-      block->pattern().multiply_add(a.cwiseAbs().eval().data(), sizes.data(), terms.data());
+      terms = since * b.cwiseAbs();
+      add_terms(*block, a, position, terms);
       for (int r = 0; r < m; ++r)
         if (!(std::abs(phi[r]) <= start_tolerance * terms[r]))
           throw_off_row(scene, first + r, InconsistentStart::Of::position, phi[r], terms[r]);
     }
     residual = b;
     block->pattern().multiply_add(a.data(), start.v.data(), residual.data());
-    terms = b.cwiseAbs() + Vector::Ones(m);
-    block->pattern().multiply_add(a.cwiseAbs().eval().data(), start.v.cwiseAbs().eval().data(), terms.data());
+    terms = b.cwiseAbs();
+    add_terms(*block, a, velocity, terms);
+    // A and b may be differences of large terms: what they lose by q and t as they are known.
+    Vector by_q(a.size()), by_t(m);
+    block->derivative(start.time, start.q, start.v, 1.0, by_q);
+    block->time_derivative(start.time, start.q, start.v, by_t);
+    add_terms(*block, by_q, position, terms);
+    terms += since * by_t.cwiseAbs();
     for (int r = 0; r < m; ++r)
       if (!(std::abs(residual[r]) <= start_tolerance * terms[r]))
         throw_off_row(scene, first + r, InconsistentStart::Of::velocity, residual[r], terms[r]);

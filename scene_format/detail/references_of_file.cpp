@@ -99,7 +99,7 @@ std::optional<ReferencePoint> References::point(std::size_t i, double t) const {
 std::optional<ReferencePoint> References::at(double t) const {
   for (const std::size_t i : valid_) {
     const auto& time = stated(i).t;
-    if (time && std::abs(*time - t) > same_time * std::max(1.0, std::abs(t))) continue;
+    if (time && std::abs(*time - t) > same_time * std::max(std::abs(*time), std::abs(t))) continue;
     if (auto found = point(i, t)) return found;
   }
   return std::nullopt;

@@ -89,9 +89,12 @@ bool finite(const ConstraintRows& rows, double t, ConstVectorRef q) {
 }
 
 [[noreturn]] void fail_at_start(const LoadedScene& scene, const std::string& what, Place place) {
-  throw SceneError(
-      scene.program->document.file, place,
-      what + ": a derivative is not finite at the start; move the start or mend the formula there");
+  throw SceneError(scene.program->document.file, place,
+                   what +
+                       ": a first or second derivative is not finite at the start, as that of u^p with p < 2 "
+                       "at u = 0, also "
+                       "in max(0, u)^p, for which if(u > 0, u^p, 0) can be written; move the start or mend "
+                       "the formula there");
 }
 
 }  // namespace

@@ -292,5 +292,16 @@ control = { parameters = ["u"], cost = "u^2" }
   }
 }
 
+/// In the middle of the factorisation of a matrix of ten million unknowns, of which nothing can be kept.
+TEST_F(Endings, ALargeFactorisationEndsWithinSecondsOfASignal_slow) {
+  const std::string messages = path("messages");
+  Started process("boundary kepler_e06 --from x=1 y=0 --to x=-0.3 y=1.1 --end 2.1 --step 1e-6", messages);
+  std::this_thread::sleep_for(3s);
+  process.send(SIGINT);
+  ASSERT_TRUE(process.ends_within(5s));
+  EXPECT_EQ(process.status(), 1);
+  EXPECT_NE(contents(messages).find("interrupted"), std::string::npos) << contents(messages);
+}
+
 }  // namespace
 }  // namespace diracstep::testing

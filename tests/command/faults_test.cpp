@@ -167,12 +167,12 @@ TEST_F(EndingPlugin, ThatLoopsIsToldAndEndedByALimitOrASecondSignal) {
   expect_whole_files();
 
   fs::remove(path("c"));
-  // INT once it loops, soon after its first checkpoint, a message three seconds later, and TERM
+  // INT once it loops, soon after its first checkpoint, a message within a second, and TERM
   const std::string looping =
       "ENDING=loop '" DIRACSTEP_COMMAND "' " + saving() + " 2>'" + path("told") + "' & ";
   const Outcome twice =
       run("--version >/dev/null; " + looping + "until [ -e '" + path("c") +
-          "' ]; do sleep 0.1; done; sleep 0.5; kill -INT $!; sleep 3.5; kill -TERM $!; wait $!; echo $?");
+          "' ]; do sleep 0.1; done; sleep 0.5; kill -INT $!; sleep 1.5; kill -TERM $!; wait $!; echo $?");
   EXPECT_NE(twice.out.find("143"), std::string::npos) << twice.out;
   EXPECT_NE(contents(path("told")).find("has not ended yet"), std::string::npos) << contents(path("told"));
   expect_whole_files();

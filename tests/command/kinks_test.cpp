@@ -184,6 +184,49 @@ step = 0.1
   EXPECT_NEAR(at_end(fine, "q", "y"), exact, 1e-9);
 }
 
+/// A ball on floors that push, and do not pull, with dampers of their own, at steps that are a third of a
+/// contact to all of it: nothing is wrong by more than 1e-3 without a word.  The numbers are of the classical
+/// Runge-Kutta method in long double, a million steps, cut where the ball meets and leaves the floor.
+TEST_F(KinksOfARun, DampedContactsOfAFewStepsAreRightOrDoubted) {
+  struct Floor {
+    const char *potential, *force;
+    double k, c, step, x, v;
+  };
+  const char* push = "if(x < 0, max(0, -k*x - c*v_x), 0)";
+  const char* soft = "-c*max(0, -x)*v_x";
+  for (const Floor& it :
+       {Floor{"", push, 4000, 5, 0.03, -0.02560896732295906, 0.94547642595688119},
+        Floor{"", push, 10000, 2, 0.03, 0.33468533577577388, 1.0051534214444023},
+        Floor{" - k*max(0, -x)^2/2", soft, 10000, 100, 0.024, 0.30792984893307576, 1.4966409132949626}}) {
+    const std::string file =
+        scene("ball", std::string("lagrangian = \"v_x^2/2 - 10*x") + it.potential +
+                          "\"\n[coordinates]\nx = {}\n[parameters]\nk = " + std::to_string(it.k) +
+                          "\nc = " + std::to_string(it.c) + "\n[force]\nx = \"" + it.force +
+                          "\"\n[start]\nx = 0.5\n[span]\nend = 2.4\nstep = 0.03\n");
+    for (const double part : {1.0, 0.1}) {
+      const Outcome outcome =
+          run("run " + file + " --json --method type1/gl:3 --step " + std::to_string(part * it.step));
+      const double off =
+          std::max(std::abs(at_end(outcome, "q", "x") - it.x), std::abs(at_end(outcome, "v", "x") - it.v));
+      EXPECT_EQ(outcome.status, part == 1.0 ? 3 : 0) << it.force << ' ' << part << ' ' << off << outcome.err;
+      EXPECT_LT(off, part == 1.0 ? 0.1 : 1e-6) << it.force;
+    }
+  }
+}
+
+/// The first turning point of DryFrictionGoesOnPastItsTurningPoints at ω h = 0.6, 3 % off, and at 0.06.
+TEST_F(KinksOfARun, CoarseStepsOverDryFrictionAreDoubted) {
+  const std::string file = scene("dry",
+                                 "lagrangian = \"v_x^2/2 - 10*x^2/2\"\n[coordinates]\nx = {}\n[force]\n"
+                                 "x = \"-0.6*if(v_x > 0, 1, -1)\"\n[start]\nx = 1.3\n"
+                                 "[span]\nend = 1.2\nstep = 0.05\n") +
+                           " --method type1/midpoint";
+  const Outcome coarse = run("run " + file + " --step 0.2"), fine = run("run " + file + " --step 0.02");
+  EXPECT_EQ(coarse.status, 3) << coarse.err;
+  EXPECT_TRUE(says(coarse, "with finer steps it ends elsewhere")) << coarse.err;
+  EXPECT_EQ(fine.status, 0) << fine.err;
+}
+
 /// mod(t, 0.1) − 0.05 rises through zero in the middle of each tenth and falls at its end.
 TEST_F(KinksOfARun, EventsOnFunctionsThatJumpDoNotDependOnTheStep) {
   const std::string file = scene("wrap", R"toml(

@@ -190,5 +190,18 @@ tolerance = 1e-3
   EXPECT_NE(plan.out.find("the scene's file recommends it"), std::string::npos) << plan.out;
 }
 
+/// The derivative of max(0, −x)^0.5 is infinite at x = 0, and no number where the ball flies.
+TEST_F(Refusals, OfAnInfiniteDerivativeNameIt) {
+  const auto ball = [this](const char* force) {
+    return "run " + scene("ball", std::string("lagrangian = \"v_x^2/2 - 9.81*x\"\n[coordinates]\nx = {}\n"
+                                              "[force]\nx = \"") +
+                                      force + "\"\n[start]\nx = 1\n[span]\nend = 0.4\nstep = 0.01\n");
+  };
+  const Outcome refused = run(ball("1e3*max(0, -x)^0.5")), written = run(ball("if(x < 0, 1e3*(-x)^0.5, 0)"));
+  EXPECT_EQ(refused.status, 1);
+  EXPECT_NE(refused.err.find("if(u > 0, u^p, 0)"), std::string::npos) << refused.err;
+  EXPECT_EQ(written.status, 0) << written.err;
+}
+
 }  // namespace
 }  // namespace diracstep::testing

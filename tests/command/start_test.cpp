@@ -62,6 +62,36 @@ TEST_F(StartVerb, AStartOffTheRowsIsMisuse) {
   expect_misuse("start " + pendulum("x = 0.6\ny = -0.7\n"), {"rod", "guess"});
 }
 
+/// A start that is off by a millionth of the rod or of its speed is off in micrometres and megametres too.
+TEST_F(StartVerb, AStartOffTheRowsIsMisuseInAllUnits) {
+  const std::string file = scene("pendulum", R"toml(
+lagrangian = "(v_x^2 + v_y^2)/2 - 9.81*l*y"
+[coordinates]
+x = {}
+y = {}
+[parameters]
+l = 1.0
+off = 0.0
+along = 0.0
+[[rows]]
+name = "rod"
+equation = "x^2 + y^2 = l^2"
+[start]
+x = "(1 + off)*l"
+v_x = "along*l"
+v_y = "l"
+[span]
+end = 1
+step = 0.01
+)toml");
+  for (const char* length : {"1e-6", "1", "1e6"}) {
+    const std::string started = "start " + file + " --set l=" + length;
+    EXPECT_EQ(run(started).status, 0) << length;
+    expect_misuse(started + " --set off=1e-6", {"rod", "φ(q)"});
+    expect_misuse(started + " --set along=1e-6", {"rod", "off the distribution"});
+  }
+}
+
 TEST_F(StartVerb, ALagrangianWithoutMassesHasNoAccelerations) {
   const Outcome outcome = run("start lotka_volterra_2d --json");
   ASSERT_EQ(outcome.status, 0) << outcome.err;

@@ -189,5 +189,35 @@ step = 0.02
   EXPECT_NEAR(Json::parse(swung.out)["end"]["q"]["x"].get<double>(), -986.291751131, 1e-3);
 }
 
+/// Of two references the one at the end is taken, also where all times are below 1e-12.
+TEST_F(StatedErrors, AReferenceOfAnotherTimeIsNoneInAnyUnit) {
+  const Outcome outcome = run("run " + scene("short", R"toml(
+lagrangian = "v_x^2/2"
+[coordinates]
+x = {}
+[start]
+v_x = 1e12
+[span]
+end = 1e-12
+step = 1e-13
+[[reference]]
+kind = "own"
+how = "uniform motion"
+digits = 12
+t = 4e-13
+x = 0.4
+v_x = 1e12
+[[reference]]
+kind = "own"
+how = "uniform motion"
+digits = 12
+t = 1e-12
+x = 1.0
+v_x = 1e12
+)toml") + " --json");
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_LT(Json::parse(outcome.out)["error_q"].get<double>(), 1e-12) << outcome.out;
+}
+
 }  // namespace
 }  // namespace diracstep::testing

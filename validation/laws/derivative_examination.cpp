@@ -258,10 +258,11 @@ std::vector<Place> places(const Scene& scene, const std::vector<ExaminedPoint>& 
 
 Finding finding(const std::string& what, const Deviation& deviation) {
   if (!std::isfinite(deviation.largest))
-    return {what, false,
-            "not finite where the values are: a derivative leaves the range of numbers, as that of 1/(1 + "
-            "exp(u)) "
-            "does above u = 709; write (1 - tanh(u/2))/2 for it"};
+    return {
+        what, false,
+        "not finite where the values are: a derivative leaves the range of numbers, as that of 1/(1 + "
+        "exp(u)) does above u = 709, for which (1 - tanh(u/2))/2 can be written, or is infinite, as that of "
+        "sqrt(u) and of u^p with p < 1 at u = 0, also in max(0, u)^p, for which if(u > 0, u^p, 0) can"};
   return {what, deviation.largest <= derivative_tolerance,
           fmt::format("differs from differences by {:.1e}, allowed {:.0e}", deviation.largest,
                       derivative_tolerance)};

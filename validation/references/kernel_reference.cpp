@@ -140,8 +140,9 @@ class KernelIda {
   /// ∂F/∂y by central differences, and cj ∂F/∂ẏ.
   int differentiate(double t, double cj, ConstVectorRef y, ConstVectorRef rate) {
     Vector there = y, ahead(size_), behind(size_);
+    const double size = max_norm(y);
     for (Eigen::Index k = 0; k < size_; ++k) {
-      const double d = 1e-5 * std::max(1.0, std::abs(y[k]));
+      const double d = 1e-5 * size_beside(y[k], size);
       there[k] = y[k] + d;
       take(t, there, rate, ahead);
       there[k] = y[k] - d;
