@@ -94,8 +94,9 @@ Linearisation linearise(const Scene& given, const Equilibrium& at, double later)
   // As full ones: their products leave exact zeros where the motion is free.
   const Columns mass = balance.mass, damping = balance.damping;
   Columns stiffness = balance.stiffness;
-  // Left-trivialised derivatives commute where no force is left, here to its round-off.
-  if (scene->space && !scene->force) stiffness = 0.5 * (stiffness + stiffness.transpose()).eval();
+  // Left-trivialised derivatives commute where no force is left but those of holonomic rows, here to
+  // round-off.
+  if (scene->space && !scene->force && !mixed) stiffness = 0.5 * (stiffness + stiffness.transpose()).eval();
   linear.mass = s.transpose() * mass * s;
   linear.damping = s.transpose() * damping * s;
   linear.stiffness = s.transpose() * stiffness * n;
