@@ -159,11 +159,12 @@ CatalogueScene load(const std::shared_ptr<const CompiledScene>& compiled, const 
   StatedStart stated = start_of(*loaded);
   require_inputs_over_span(*loaded->program, stated.start.time);
   set_rates_of_states(loaded, stated);
-  put_on_space(*loaded, stated.start);
+  const std::string normalised = put_on_space(*loaded, stated.start);
   Scene scene = scene_of(loaded, stated.start);
   scene.refuse_redundant_rows = !document.drop_redundant_rows;
   CatalogueScene entry;
   entry.changes = document.notes;
+  if (!normalised.empty()) entry.changes.push_back(normalised);
   entry.all_rows = take_off_rows(document, scene);
   require_defined_start(*loaded, scene);
   start_at_operating_point(*loaded, scene, stated);

@@ -9,6 +9,7 @@
 #include <diracstep/core/numerics/near_names.hpp>
 #include <diracstep/core/runs/event_steps.hpp>
 #include <diracstep/core/runs/run.hpp>
+#include <diracstep/core/spaces/space.hpp>
 #include <diracstep/core/system/consistent_start.hpp>
 #include <diracstep/scene_format/position_names.hpp>
 #include <diracstep/sweeps/member_derivatives.hpp>
@@ -34,7 +35,14 @@ Component component(const Scene& scene, const std::string& name) {
     const auto found = std::ranges::find(scene.coordinates, coordinate);
     return found == scene.coordinates.end() ? -1 : static_cast<int>(found - scene.coordinates.begin());
   };
-  if (const int i = find(name); i >= 0) return {i, 'q'};
+  const int place = find(name);
+  if (const auto stored = position_names(scene);
+      scene.space && (place >= 0 || std::ranges::find(stored, name) != stored.end()))
+    throw Misuse(
+        fmt::format("'start.{}': a place on {} is no number; let formulas of its [start] depend on a "
+                    "parameter, and vary that",
+                    name, scene.space->name()));
+  if (place >= 0) return {place, 'q'};
   if (name.starts_with("v_") || name.starts_with("p_"))
     if (const int i = find(std::string_view(name).substr(2)); i >= 0) return {i, name[0]};
   throw Misuse(fmt::format("'start.{}': the scene '{}' has no such coordinate{}", name, scene.name,
@@ -144,7 +152,6 @@ CatalogueScene MemberRuns::scene_of(long number) const {
   const std::vector<std::string> names = sweep_.names();
   const std::vector<double> values = sweep_.member(number);
   CatalogueScene entry = make_scene_(parameters_of(number));
-  require_flat(*entry.scene, "a sweep");
   Start start = entry.scene->start;
   std::vector<std::string> given;
   for (std::size_t k = 0; k < names.size(); ++k) {

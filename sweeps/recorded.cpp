@@ -2,6 +2,7 @@
 #include <cmath>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/numerics/near_names.hpp>
+#include <diracstep/scene_format/position_names.hpp>
 #include <diracstep/sweeps/recorded.hpp>
 #include <limits>
 
@@ -12,7 +13,7 @@ namespace {
 constexpr double unmet = std::numeric_limits<double>::quiet_NaN();
 
 std::vector<std::string> trajectory_columns(const CatalogueScene& entry) {
-  std::vector<std::string> names = entry.scene->coordinates;
+  std::vector<std::string> names = position_names(*entry.scene);
   for (const char* prefix : {"v_", "p_"})
     for (const std::string& name : entry.scene->coordinates) names.push_back(prefix + name);
   for (const std::string& name : entry.shown().row_names()) names.push_back("lambda_" + name);
@@ -38,8 +39,9 @@ RecordedValue::RecordedValue(const CatalogueScene& entry, const std::string& nam
         "; there are its coordinates x, v_x, p_x, lambda_ROW, energy, invariant_NAME and its outputs");
   auto at = static_cast<std::size_t>(found - names.begin());
   const auto n = static_cast<std::size_t>(entry.scene->dimension());
-  const auto m = static_cast<std::size_t>(entry.shown().rows());
-  const std::pair<From, std::size_t> parts[] = {{From::position, n},
+  const auto m = static_cast<std::size_t>(entry.shown().rows()),
+             positions = static_cast<std::size_t>(entry.scene->storage_size());
+  const std::pair<From, std::size_t> parts[] = {{From::position, positions},
                                                 {From::velocity, n},
                                                 {From::momentum, n},
                                                 {From::force, m},
@@ -119,7 +121,7 @@ std::vector<double> Recorded::numbers(const CatalogueScene& entry, const Sample&
 std::vector<std::string> recorded_values(const Sweep& sweep, const CatalogueScene& entry) {
   if (!sweep.values.empty() || !sweep.extrema.empty() || !sweep.events.empty() || !sweep.derivatives.empty())
     return sweep.values;
-  std::vector<std::string> names = entry.scene->coordinates;
+  std::vector<std::string> names = position_names(*entry.scene);
   for (const std::string& name : entry.scene->coordinates) names.push_back("v_" + name);
   return names;
 }

@@ -11,6 +11,7 @@
 #include <diracstep/reports/json.hpp>
 #include <diracstep/reports/modes_plot.hpp>
 #include <diracstep/reports/report.hpp>
+#include <diracstep/scene_format/position_names.hpp>
 #include <memory>
 #include <numbers>
 #include <numeric>
@@ -147,15 +148,15 @@ std::string point_text(const CatalogueScene& entry, const Equilibrium& at) {
   const bool moves = at.v.size() > 0 && at.v.cwiseAbs().maxCoeff() > 0.0;
   std::vector<std::vector<std::string>> rows{{"coordinate", "q", "from"}};
   if (moves) rows[0].emplace_back("v");
-  const int shown = std::min(scene.dimension(), shown_coordinates);
+  const std::vector<std::string> names_of_q = position_names(scene);
+  const int count = scene.storage_size(), shown = std::min(count, shown_coordinates);
   for (int i = 0; i < shown; ++i) {
-    rows.push_back({scene.coordinates[static_cast<std::size_t>(i)], fmt::format("{:.15g}", at.q[i]),
+    rows.push_back({names_of_q[static_cast<std::size_t>(i)], fmt::format("{:.15g}", at.q[i]),
                     fmt::format("{:.6g}", scene.start.q[i])});
     if (moves) rows.back().push_back(fmt::format("{:.15g}", at.v[i]));
   }
   std::string text = aligned(rows);
-  if (shown < scene.dimension())
-    text += fmt::format("… {} of {} coordinates left out\n", scene.dimension() - shown, scene.dimension());
+  if (shown < count) text += fmt::format("… {} of {} coordinates left out\n", count - shown, count);
   const auto names = scene.row_names();
   for (int r = 0; r < std::min(scene.rows(), shown_coordinates); ++r)
     text += fmt::format("force of row {}: {:.15g}\n", names[static_cast<std::size_t>(r)], at.lambda[r]);
@@ -219,7 +220,7 @@ std::string as_json(const CatalogueScene& entry, const Found& found) {
   json["doubt"] = found.doubt.empty() ? Json(nullptr) : Json(found.doubt);
   json["t"] = found.at.time;
   json["iterations"] = found.at.iterations;
-  json["q"] = numbers_by_name(scene.coordinates, found.at.q);
+  json["q"] = numbers_by_name(position_names(scene), found.at.q);
   json["v"] = numbers_by_name(scene.coordinates, found.at.v);
   json["lambda"] = numbers_by_name(scene.row_names(), found.at.lambda);
   if (found.linear) {

@@ -6,6 +6,7 @@
 #include <diracstep/core/equilibrium/force_balance.hpp>
 #include <diracstep/core/equilibrium/sparse_equilibrium.hpp>
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/spaces/space.hpp>
 #include <optional>
 
 namespace diracstep {
@@ -29,7 +30,7 @@ class EquilibriumSearch {
       if (wanted_v_[i] != 0.0) moving_.push_back(static_cast<int>(i));
     size_ = start.q.lpNorm<Eigen::Infinity>();
     at_ = start.q;
-    reach_ = Vector::Ones(at_.size());
+    reach_ = Vector::Ones(scene.dimension());
     hold_constant_rows();
   }
 
@@ -80,7 +81,7 @@ class EquilibriumSearch {
     Point point{q, wanted_v_, {}, {}, {}, {}, {}};
     balance_.evaluate(time_, q, wanted_v_);
     const Columns a = balance_.one_forms;
-    const auto n = q.size(), m = a.rows();
+    const auto n = a.cols(), m = a.rows();
     const Columns of_moving = a(Eigen::all, moving_);
     Columns following = Columns::Zero(n, m);  // v of the moving coordinates that meets rows: −A_F⁺
     if (!moving_.empty() && m > 0)
@@ -105,6 +106,10 @@ class EquilibriumSearch {
     if (m > 0) left -= a.transpose() * point.lambda;
     point.residual << left, balance_.position, unmet * balance_.velocity;
     return point;
+  }
+
+  Vector moved(const Point& from, const Vector& change) const {
+    return moved_position(scene_, from.q, change);
   }
 
   /// The residual at one point with its forces along what is allowed at another, whose Jacobian it is for.
@@ -142,13 +147,13 @@ class EquilibriumSearch {
       const Vector off = residual_along(here.allowed, there.residual - (1.0 - part) * here.residual);
       return off.allFinite() && correction(off).norm() <= off_path * part * change.norm();
     };
-    if (change.norm() <= near_the_end * size_) return evaluate(here.q + change);
+    if (change.norm() <= near_the_end * size_) return evaluate(moved(here, change));
     for (double part = 1.0; part >= shortest_path_step; part /= 2.0) {
       const bool begins_there = std::ranges::all_of(std::array{0.125, 0.25, 0.5}, [&](double fraction) {
-        return on_path(evaluate(here.q + fraction * part * change), fraction * part);
+        return on_path(evaluate(moved(here, fraction * part * change)), fraction * part);
       });
       if (!begins_there) continue;
-      Point there = evaluate(here.q + part * change);
+      Point there = evaluate(moved(here, part * change));
       if (on_path(there, part)) return there;
     }
     return std::nullopt;
@@ -158,7 +163,7 @@ class EquilibriumSearch {
   /// as these fall (pseudo-transient continuation: Kelley and Keyes, SIAM J. Numer. Anal. 35, 1998), until
   /// Newton's method converges.
   Point relax(Point here) {
-    const Eigen::Index n = here.q.size(), k = here.allowed.cols();
+    const Eigen::Index n = here.v.size(), k = here.allowed.cols();
     const double masses = here.mass.norm();
     const double forces =
         std::max(here.jacobian.topRows(k).norm(), size_ > 0.0 ? here.residual.head(n).norm() / size_ : 0.0);
@@ -169,7 +174,7 @@ class EquilibriumSearch {
       Columns jacobian = here.jacobian;
       jacobian.topRows(k) += here.mass / time;
       factor(jacobian);
-      Point next = evaluate(here.q + correction(residual_along(here.allowed, here.residual)));
+      Point next = evaluate(moved(here, correction(residual_along(here.allowed, here.residual))));
       if (!next.residual.allFinite()) return here;
       const double falls = here.residual.norm() / next.residual.norm();
       time *= std::min(10.0, falls > not_away ? growth * falls : falls);
@@ -181,7 +186,7 @@ class EquilibriumSearch {
 
   /// What each equation may be off by: parts of its terms.
   Vector allowed(const Point& point) const {
-    const Vector q = point.q.cwiseAbs();
+    const Vector q = balance_.position_sizes(point.q);
     const Vector change = size_ * reach_;
     Vector sizes(point.residual.size());
     sizes << balance_.sizes + balance_.stiffness.cwiseAbs() * change,
@@ -214,7 +219,7 @@ class EquilibriumSearch {
   }
 
   std::string left_at(const Point& point, Eigen::Index equation) const {
-    const Eigen::Index n = point.q.size(), row = equation - n;
+    const Eigen::Index n = point.v.size(), row = equation - n;
     const std::string amount = to_text(point.residual[equation]);
     if (row < 0)
       return "a force of " + to_text(-point.residual[equation]) + " is left on '" +
@@ -249,6 +254,10 @@ class EquilibriumSearch {
 }  // namespace
 
 Equilibrium find_equilibrium(const Scene& scene, const Start& start, bool along_start) {
+  if (scene.space && (along_start || needs_sparse_matrices(scene)))
+    throw Misuse("scene '" + scene.name + "' on " + scene.space->name() + ": " +
+                 (along_start ? "steady motions are looked for in R^n only, equilibria at rest here too"
+                              : "equilibria are looked for with full matrices, of 2000 at most"));
   if (needs_sparse_matrices(scene)) {
     if (along_start)
       throw Misuse("scene '" + scene.name +

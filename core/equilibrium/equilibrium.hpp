@@ -33,6 +33,9 @@ struct Equilibrium {
 /// Velocities change from those of the start only as far as the rows ask for it.  It is steady where nothing
 /// depends on the moving coordinates; Linearisation::variation tells.
 ///
+/// On a group the equations are left-trivialised and q moves by q τ(x); equilibria at rest alone, and with
+/// full matrices.
+///
 /// Damped by following Newton's path: a step counts when the residual there is what the path predicts.
 /// Matrices are full up to 2000 coordinates and rows.  Beyond, they are sparse, all rows must be on positions
 /// and independent, the equilibrium isolated, and it cannot be asked for along_start.  Throws Misuse, and

@@ -3,6 +3,7 @@
 #include <diracstep/core/equilibrium/force_balance.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/numerics/sparse_columns.hpp>
+#include <diracstep/core/spaces/space.hpp>
 #include <diracstep/core/system/hidden_rows.hpp>
 #include <diracstep/core/system/lagrangian_derivatives.hpp>
 #include <diracstep/core/system/row_subset.hpp>
@@ -64,8 +65,9 @@ struct SortedRows {
       for (const int row : rows) of_part.push_back(first + row);
     };
     for (const auto& block : scene.constraints) {
-      std::vector<bool> held(static_cast<std::size_t>(block->rows()), true);
-      if (!is_on_positions(*block)) held = constant_rows(*block, scene.start);
+      const bool integrable = block->holonomic() || !scene.space;  // constant one-forms on groups are not
+      std::vector<bool> held(static_cast<std::size_t>(block->rows()), integrable);
+      if (integrable && !is_on_positions(*block)) held = constant_rows(*block, scene.start);
       for (const bool on_positions : {true, false}) {
         std::vector<int> rows;
         for (int r = 0; r < block->rows(); ++r)
@@ -87,6 +89,13 @@ struct SortedRows {
 };
 
 namespace {
+
+/// Products of the numbers of a rotation that cancel leave round-off where a matrix has zeros, which decide
+/// what is free.
+void drop_round_off(SparseMatrix& matrix) {
+  constexpr double part = 1e-14;
+  matrix.prune(largest_entry(matrix), part);
+}
 
 int rows_on_positions(const ConstraintBlocks& blocks) {
   int count = 0;
@@ -137,6 +146,15 @@ void ForceBalance::evaluate(double t, const Vector& q, const Vector& v) {
     damping -= sparse_map(of_force, by_v.data());
     free_stiffness_ -= sparse_map(of_force, by_q.data());
   }
+  if (scene_.space) {
+    const Space& space = *scene_.space;
+    Vector momentum(space.group_dimension());
+    Columns turned(momentum.size(), momentum.size());
+    space.embed(lv, momentum);
+    space.coadjoint(momentum, turned);
+    damping -= Columns(turned(space.tangent(), space.tangent())).sparseView();
+    for (SparseMatrix* matrix : {&mass, &damping, &free_stiffness_}) drop_round_off(*matrix);
+  }
   forces = convective + rate - lq - f;
   free_sizes_ = convective.cwiseAbs() + rate.cwiseAbs() + lq.cwiseAbs() + f.cwiseAbs();
   evaluate_rows();
@@ -162,7 +180,10 @@ void ForceBalance::evaluate_rows() {
     if (row < on_positions) derivative[k] = of_positions[k];
   });
   row_derivative = sparse_map(rows_.pattern(), derivative.data());
-  const Vector kept = one_forms * (q_ - scene_.start.q) + (t_ - scene_.start.time) * rows_.offsets();
+  if (scene_.space)
+    for (SparseMatrix* matrix : {&one_forms, &row_derivative}) drop_round_off(*matrix);
+  Vector kept;
+  if (!scene_.space) kept = one_forms * (q_ - scene_.start.q) + (t_ - scene_.start.time) * rows_.offsets();
   int row = 0;
   for (const auto& block : blocks_) {
     if (!is_on_positions(*block)) break;
@@ -183,8 +204,14 @@ void ForceBalance::set_multipliers(const Vector& lambda) {
     stiffness -= sparse_map(block->curvature_pattern(), curvature.data());
     row += block->rows();
   }
-  sizes = free_sizes_ + stiffness.cwiseAbs() * q_.cwiseAbs();
+  if (scene_.space) drop_round_off(stiffness);
+  sizes = free_sizes_ + stiffness.cwiseAbs() * position_sizes(q_);
   if (row > 0) sizes += one_forms.cwiseAbs().transpose() * lambda.cwiseAbs();
+}
+
+Vector ForceBalance::position_sizes(const Vector& q) const {
+  if (!scene_.space) return q.cwiseAbs();
+  return Vector::Constant(scene_.dimension(), q.lpNorm<Eigen::Infinity>());
 }
 
 Vector ForceBalance::in_order_of_scene(const Vector& here) const { return here(places_); }
@@ -199,9 +226,11 @@ bool needs_sparse_matrices(const Scene& scene) {
   return scene.dimension() > most_full || scene.rows() > most_full;
 }
 
+Vector moved_position(const Scene& scene, const Vector& q, const Vector& change) {
+  return scene.space ? scene.space->moved(q, change) : Vector(q + change);
+}
+
 std::shared_ptr<const Scene> with_start(const Scene& scene, const Start& start) {
-  if (scene.space)
-    throw Misuse("scene '" + scene.name + "': equilibria and linear equations are known in R^n only");
   auto copy = std::make_shared<Scene>(scene);
   copy->start = start;
   return with_lagrangian(*copy);

@@ -12,8 +12,9 @@ using SparseMatrix = Eigen::SparseMatrix<double>;
 struct SortedRows;  // of the source
 
 /// The equations of motion without acceleration, and their derivatives: what equilibria and linear equations
-/// about them are made of.  Third derivatives of L are left out; they vanish at rest and
-/// along motions that nothing depends on.
+/// about them are made of.  On a group derivatives are left-trivialised, at rest alone, where C has −ad*_v
+/// ∂L/∂v as well.  Third derivatives of L are left out; they vanish at rest and along motions that nothing
+/// depends on.
 class ForceBalance {
  public:
   /// The scene has a Lagrangian and outlives this.
@@ -30,12 +31,14 @@ class ForceBalance {
   SparseMatrix mass, damping, stiffness;  ///< M, C, K of linearise()
   SparseMatrix one_forms;                 ///< A, holonomic rows first
   SparseMatrix row_derivative;            ///< ∂(A v + b)/∂q
-  /// How many rows are on positions: holonomic ones, and nonholonomic ones with constant A, which keep A q as
-  /// it is at the scene's start.
+  /// How many rows are on positions: holonomic ones, and in R^n nonholonomic ones with constant A, which
+  /// keep A q as it is at the scene's start.
   int on_positions = 0;
 
   /// The blocks in the order of the rows here.
   const ConstraintBlocks& blocks() const { return blocks_; }
+  /// Sizes of coordinates for what round-off makes of them; on a group the largest number for all.
+  Vector position_sizes(const Vector& q) const;
   /// Values of rows in the order of the scene's rows, of those in the order here, and back.
   Vector in_order_of_scene(const Vector& here) const;
   Vector in_order_here(const Vector& of_scene) const;
@@ -54,7 +57,10 @@ class ForceBalance {
   Vector free_sizes_;
 };
 
-/// The scene with a Lagrangian and another start, completed.  Throws Misuse for scenes on groups.
+/// q + change, on a group q τ(change).
+Vector moved_position(const Scene& scene, const Vector& q, const Vector& change);
+
+/// The scene with a Lagrangian and another start, completed.
 std::shared_ptr<const Scene> with_start(const Scene& scene, const Start& start);
 
 /// That with its hidden rows below its own (hidden_rows.hpp).  Throws Misuse where it is too large for full

@@ -38,7 +38,7 @@ double variation_between(const BalanceAt& first, const BalanceAt& second, double
   if (size > 0.0) largest = std::max(largest, second.left.lpNorm<Eigen::Infinity>() / size);
   if (b.on_positions == 0) return largest;
   const double position =
-      Vector(b.one_forms.cwiseAbs() * second.q.cwiseAbs()).head(b.on_positions).maxCoeff();
+      Vector(b.one_forms.cwiseAbs() * b.position_sizes(second.q)).head(b.on_positions).maxCoeff();
   const double moved = b.position.lpNorm<Eigen::Infinity>();
   return std::max(largest, position > 0.0 ? moved / position : moved > 0.0 ? 1.0 : 0.0);
 }
@@ -92,7 +92,11 @@ Linearisation linearise(const Scene& given, const Equilibrium& at, double later)
   linear.drift = drift_of(balance, linear.positions);
   const Columns &n = linear.positions, &s = linear.velocities;
   // As full ones: their products leave exact zeros where the motion is free.
-  const Columns mass = balance.mass, damping = balance.damping, stiffness = balance.stiffness;
+  const Columns mass = balance.mass, damping = balance.damping;
+  Columns stiffness = balance.stiffness;
+  // Left-trivialised derivatives commute where no force is left but those of holonomic rows, here to
+  // round-off.
+  if (scene->space && !scene->force && !mixed) stiffness = 0.5 * (stiffness + stiffness.transpose()).eval();
   linear.mass = s.transpose() * mass * s;
   linear.damping = s.transpose() * damping * s;
   linear.stiffness = s.transpose() * stiffness * n;
@@ -110,7 +114,7 @@ Linearisation linearise(const Scene& given, const Equilibrium& at, double later)
   const double reach = std::max(given.start.q.lpNorm<Eigen::Infinity>(), at.q.lpNorm<Eigen::Infinity>());
   for (const double part : {0.382, 0.618}) {  // unequal, so that a period does not hide between them
     const double t = part * (later - at.time);
-    const BalanceAt there(*scene, at.time + t, at.q + t * at.v, at.v);
+    const BalanceAt there(*scene, at.time + t, moved_position(*scene, at.q, t * at.v), at.v);
     linear.variation = std::max(linear.variation, variation_between(here, there, reach));
   }
   return linear;

@@ -3,6 +3,7 @@
 #include <diracstep/core/equilibrium/sparse_equilibrium.hpp>
 #include <diracstep/core/equilibrium/sparse_modes.hpp>
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/spaces/space.hpp>
 #include <diracstep/core/system/contradictory_rows.hpp>
 
 namespace diracstep {
@@ -126,6 +127,10 @@ void add_mode(NearestModes& result, std::complex<double> s, double error, const 
 
 NearestModes nearest_modes(const Scene& given, const Equilibrium& at, int count, std::optional<double> near,
                            double later, const LargestEigenpairs& eigenpairs) {
+  if (given.space)
+    throw Misuse(
+        "scene '" + given.name + "' on " + given.space->name() +
+        ": modes by sparse matrices are known in R^n only; without --modes and --near all are found");
   const auto scene = with_independent_rows_there(with_start(given, {at.time, at.q, at.v}));
   const Eigen::Index n = scene->dimension(), wanted = 2 * Eigen::Index{count};
   if (count < 1 || wanted + 2 > 2 * (n - scene->rows()))

@@ -1,4 +1,5 @@
 #include <diracstep/core/methods/gauss_lobatto.hpp>
+#include <diracstep/core/methods/group_methods.hpp>
 #include <diracstep/core/methods/method.hpp>
 #include <diracstep/core/methods/quadrature.hpp>
 #include <diracstep/core/numerics/errors.hpp>
@@ -10,8 +11,9 @@
 #include <diracstep/core/steps/gauss_lobatto/phase_space_step.hpp>
 #include <diracstep/core/steps/gauss_lobatto/step.hpp>
 #include <diracstep/core/steps/gauss_lobatto/tableau.hpp>
+#include <diracstep/core/steps/groups/masses.hpp>
+#include <diracstep/core/steps/groups/quadrature_step.hpp>
 #include <diracstep/core/steps/groups/step.hpp>
-#include <diracstep/core/steps/groups/trapezoidal_step.hpp>
 #include <diracstep/core/steps/radau/step.hpp>
 #include <diracstep/core/steps/radau/tableau.hpp>
 #include <utility>
@@ -37,8 +39,10 @@ std::unique_ptr<StepProblem> step_of_first_order(int s, const Scene& scene, cons
 /// Throws Misuse on a configuration space of its own.
 void require_flat(const Scene& scene, const std::string& what) {
   if (scene.space)
-    throw Misuse("scene '" + scene.name + "' on " + scene.space->name() + ": " + what +
-                 " is known in R^n only; type1/midpoint, type1/trapezoidal and typeN/gl:S step it");
+    throw Misuse(
+        "scene '" + scene.name + "' on " + scene.space->name() + ": " + what +
+        " is known in R^n only; typeN/gl:S, type1/left, right, midpoint and trapezoidal, type2/euler, "
+        "type3/euler and their transforms step it");
 }
 
 bool asks_for_own_rule(const StepChoices& choices, const StepRule& own) {
@@ -59,6 +63,7 @@ StepFactory gauss_lobatto_factory(const std::string& name, int s) {
       return step_of_first_order(s, scene, motions, choices.dense);
     if (!asks_for_own_rule(choices, StepRule::midpoint))
       throw Misuse("method '" + name + "' has its own nodes for the constraint; no other rule applies");
+    if (scene.space && !choices.force_degenerate) require_masses(scene);
     if (scene.space) return group_step(s, scene);
     if (scene.by_hamiltonian()) return hamiltonian_step(s, scene, choices.dense);
     return gauss_lobatto_step(s, scene, choices.dense);
@@ -66,6 +71,31 @@ StepFactory gauss_lobatto_factory(const std::string& name, int s) {
 }
 
 }  // namespace
+
+StepFactory with_group_step(const MethodInfo& info, StepFactory in_flat_space) {
+  return [name = info.name, rule = info.constraint_rule, in_flat_space = std::move(in_flat_space)](
+             const Scene& scene, const StepChoices& choices) {
+    if (!scene.space) return in_flat_space(scene, choices);
+    if (!asks_for_own_rule(choices, rule))
+      throw Misuse("method '" + name + "' on " + scene.space->name() + " has its own rule for the rows");
+    if (!choices.force_degenerate) require_masses(scene);
+    return group_quadrature_step(rule, scene);
+  };
+}
+
+StepFactory with_group_step_of(const MethodInfo& info, StepFactory in_flat_space, StepFactory on_group) {
+  if (info.type != GeneratingType::four)
+    return [in_flat_space = std::move(in_flat_space), on_group = std::move(on_group)](
+               const Scene& scene, const StepChoices& choices) {
+      return scene.space ? on_group(scene, choices) : in_flat_space(scene, choices);
+    };
+  return [name = info.name, in_flat_space = std::move(in_flat_space)](const Scene& scene,
+                                                                      const StepChoices& choices) {
+    require_flat(scene, "a function of two momenta and no configuration, as that of '" + name +
+                            "', has no point whose chart they could be compared in and");
+    return in_flat_space(scene, choices);
+  };
+}
 
 std::string prefix_of(GeneratingType type) { return "type" + std::to_string(static_cast<int>(type)) + "/"; }
 
@@ -159,12 +189,7 @@ Method trapezoidal_method() {
   Method method = method_of(std::move(info), [](const Scene& scene) {
     return quadrature_lagrangian(lagrangian_of(scene), StepRule::trapezoidal);
   });
-  method.make_step = [stated = method.make_step](const Scene& scene, const StepChoices& choices) {
-    if (!scene.space) return stated(scene, choices);
-    if (!asks_for_own_rule(choices, StepRule::trapezoidal))
-      throw Misuse("method 'type1/trapezoidal' on " + scene.space->name() + " has its own rule for the rows");
-    return group_trapezoidal_step(scene);
-  };
+  method.make_step = with_group_step(method.info, std::move(method.make_step));
   return method;
 }
 

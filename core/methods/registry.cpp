@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <diracstep/core/methods/adjoint.hpp>
 #include <diracstep/core/methods/euler.hpp>
+#include <diracstep/core/methods/group_methods.hpp>
 #include <diracstep/core/methods/legendre.hpp>
 #include <diracstep/core/methods/quadrature.hpp>
 #include <diracstep/core/methods/registry.hpp>
@@ -17,11 +18,18 @@ constexpr std::string_view letters = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnop
 /// A name may hold names, which are read by recursion.
 constexpr std::size_t longest_name = 1000;
 
+void add_with_groups(Registry& registry, MethodInfo info, GeneratingFunctionFactory generating_function) {
+  Method method = method_of(std::move(info), std::move(generating_function));
+  method.make_step = with_group_step(method.info, std::move(method.make_step));
+  registry.add(std::move(method));
+}
+
 void add_quadrature(Registry& registry, StepRule rule, int order, std::string summary,
                     std::string adjoint = {}) {
-  registry.add({std::string("type1/") + name(rule), GeneratingType::one, order, false, rule,
-                std::move(summary), std::move(adjoint), 0, true},
-               [rule](const Scene& scene) { return quadrature_lagrangian(lagrangian_of(scene), rule); });
+  add_with_groups(registry,
+                  {std::string("type1/") + name(rule), GeneratingType::one, order, false, rule,
+                   std::move(summary), std::move(adjoint), 0, true},
+                  [rule](const Scene& scene) { return quadrature_lagrangian(lagrangian_of(scene), rule); });
 }
 
 /// "typeN/word(inner)" taken apart.
@@ -48,6 +56,20 @@ bool parse_transform(std::string_view name, Transform& transform) {
   const std::string_view inner = name.substr(bracket + 1, name.size() - bracket - 2);
   transform = {static_cast<GeneratingType>(*type), std::string(word), std::string(inner)};
   return true;
+}
+
+/// The method without transforms that steps a configuration space of its own as the transform of this name
+/// does: there a Legendre transform steps as what it transforms, and two adjoints cancel.  Nothing where an
+/// adjoint is asked for that has no name.
+std::optional<Method> stepped_as_on_group(const Registry& registry, const std::string& name) {
+  bool adjoint = false;
+  std::string inner = name;
+  for (Transform transform; parse_transform(inner, transform); inner = transform.inner)
+    if (transform.word == "adjoint") adjoint = !adjoint;
+  Method original = registry.method(inner);
+  if (!adjoint || original.info.self_adjoint) return original;
+  if (original.info.adjoint.empty()) return std::nullopt;
+  return registry.method(original.info.adjoint);
 }
 
 /// "typeN/gl:S", N = 1, 2, 3.
@@ -79,12 +101,15 @@ Registry Registry::with_built_ins() {
   add_quadrature(registry, StepRule::right, 1, "L_d = h L(q1, (q1-q0)/h)", "type1/left");
   registry.add(midpoint_method());
   registry.add(trapezoidal_method());
-  registry.add({"type2/euler", GeneratingType::two, 1, false, StepRule::left, "H_d+ = p1 q0 + h H(q0, p1)",
-                "type3/euler"},
-               [](const Scene& scene) { return euler_type2(hamiltonian_of(scene)); });
-  registry.add({"type3/euler", GeneratingType::three, 1, false, StepRule::right,
-                "H_d- = -p0 q1 + h H(q1, p0)", "type2/euler"},
-               [](const Scene& scene) { return euler_type3(hamiltonian_of(scene)); });
+  // Where there is a Lagrangian, the Legendre transforms of type1/left and type1/right.
+  add_with_groups(registry,
+                  {"type2/euler", GeneratingType::two, 1, false, StepRule::left, "H_d+ = p1 q0 + h H(q0, p1)",
+                   "type3/euler"},
+                  [](const Scene& scene) { return euler_type2(hamiltonian_of(scene)); });
+  add_with_groups(registry,
+                  {"type3/euler", GeneratingType::three, 1, false, StepRule::right,
+                   "H_d- = -p0 q1 + h H(q1, p0)", "type2/euler"},
+                  [](const Scene& scene) { return euler_type3(hamiltonian_of(scene)); });
   return registry;
 }
 
@@ -159,16 +184,22 @@ Method Registry::transformed(const std::string& name) const {
     if (inner.info.type != GeneratingType::one || transform.type == GeneratingType::one)
       throw Misuse("'" + name + "': the discrete Legendre transform leads from type 1 to types 2, 3 and 4");
     info.summary = "discrete Legendre transform of " + transform.inner;
-    return method_of(info, [s = inner.generating_function, type = transform.type](const Scene& scene) {
+    Method made = method_of(info, [s = inner.generating_function, type = transform.type](const Scene& scene) {
       return legendre(type, s(scene));
     });
+    made.make_step = with_group_step_of(info, std::move(made.make_step), inner.make_step);
+    return made;
   }
   if (const GeneratingType type = adjoint_type(*inner.info.type); transform.type != type)
     throw Misuse("'" + name + "': the adjoint is of another type; use " + prefix_of(type) + "adjoint(" +
                  transform.inner + ")");
   info.summary = "adjoint of " + transform.inner;
   info.constraint_rule = mirrored(inner.info.constraint_rule);
-  return method_of(info, [s = inner.generating_function](const Scene& scene) { return adjoint(s(scene)); });
+  Method made =
+      method_of(info, [s = inner.generating_function](const Scene& scene) { return adjoint(s(scene)); });
+  if (auto on_group = stepped_as_on_group(*this, name))
+    made.make_step = with_group_step_of(info, std::move(made.make_step), std::move(on_group->make_step));
+  return made;
 }
 
 Method Registry::adjoint_of(const Method& original) const {

@@ -1,12 +1,16 @@
 #include <algorithm>
 #include <cmath>
+#include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/core/spaces/axioms.hpp>
 #include <random>
+#include <sstream>
 
 namespace diracstep {
 
 namespace {
+
+constexpr double round_off = 1e-13, of_differences = 1e-7;
 
 class AxiomMeter {
  public:
@@ -99,12 +103,12 @@ class AxiomMeter {
     return part > widest ? Vector(widest / part * x) : x;
   }
 
-  void compare(const char* axiom, const Columns& one, const Columns& other) {
+  void compare(const char* axiom, const Columns& one, const Columns& other, double allowed = round_off) {
     double defect = max_norm(one - other) / std::max({1.0, max_norm(one), max_norm(other)});
     if (!std::isfinite(defect)) defect = HUGE_VAL;
     const auto found = std::ranges::find(defects_, axiom, &AxiomDefect::axiom);
     if (found == defects_.end())
-      defects_.push_back({axiom, defect});
+      defects_.push_back({axiom, defect, allowed});
     else
       found->defect = std::max(found->defect, defect);
   }
@@ -116,7 +120,7 @@ class AxiomMeter {
     const Columns difference = (of(h) - of(-h)) * 0.8 / h - (of(2 * h) - of(-2 * h)) * 0.2 / h +
                                (of(3 * h) - of(-3 * h)) * 4.0 / (105.0 * h) -
                                (of(4 * h) - of(-4 * h)) / (280.0 * h);
-    compare(axiom, 1e-6 * difference, 1e-6 * rate);
+    compare(axiom, difference, rate, of_differences);
   }
 
   const Space& space_;
@@ -131,6 +135,16 @@ std::vector<AxiomDefect> space_axiom_defects(const Space& space, int points, uns
   AxiomMeter meter(space, seed);
   for (int k = 0; k < points; ++k) meter.look(sizes[static_cast<std::size_t>(k) % std::size(sizes)]);
   return meter.defects();
+}
+
+void require_space_axioms(const Space& space) {
+  std::ostringstream failed;
+  for (const AxiomDefect& found : space_axiom_defects(space))
+    if (!(found.defect <= found.allowed))
+      failed << "\n  " << found.axiom << ", by " << found.defect << " where " << found.allowed
+             << " is allowed";
+  if (!failed.str().empty())
+    throw Misuse("space " + space.name() + " fails axioms of core/spaces/factor.hpp:" + failed.str());
 }
 
 }  // namespace diracstep

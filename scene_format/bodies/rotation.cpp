@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <diracstep/scene_format/bodies/rotation.hpp>
-#include <limits>
 
 namespace diracstep::bodies {
 
@@ -95,7 +94,7 @@ double distance_from_rotations(const Numbers& r) {
   const double determinant = r[0][0] * (r[1][1] * r[2][2] - r[1][2] * r[2][1]) -
                              r[0][1] * (r[1][0] * r[2][2] - r[1][2] * r[2][0]) +
                              r[0][2] * (r[1][0] * r[2][1] - r[1][1] * r[2][0]);
-  return determinant > 0.0 ? off : std::numeric_limits<double>::infinity();
+  return determinant > 0.0 ? off : std::max(off, 2.0);  // determinants of reflections are off by 2
 }
 
 Rotation::Quaternion quaternion_of(const Numbers& r) {

@@ -31,8 +31,11 @@ StatedStart start_of(const LoadedScene& loaded) {
       const auto& names = position ? loaded.layout.names() : loaded.components();
       if (!std::isfinite(value))
         throw SceneError(program.document.file, named.place,
-                         fmt::format("the start of '{}' is {}; expected a finite number",
-                                     names[static_cast<std::size_t>(index)], value));
+                         fmt::format("the start of '{}' is {}; expected a finite number{}",
+                                     names[static_cast<std::size_t>(index)], value,
+                                     program.document.spaces.kinds.empty() || !position
+                                         ? ""
+                                         : ": an axis, or a vector of a sphere, needs a length above 0"));
       (position ? start.q : second)[index] = value;
       (position ? stated.q : stated.v)[static_cast<std::size_t>(index)] = StartOrigin::given;
     });
@@ -42,10 +45,10 @@ StatedStart start_of(const LoadedScene& loaded) {
   return stated;
 }
 
-void put_on_space(const LoadedScene& loaded, Start& start) {
-  constexpr double most = 1e-3;
+std::string put_on_space(const LoadedScene& loaded, Start& start) {
+  constexpr double most = 1e-3, told = 1e-8;
   const SceneDocument& document = loaded.program->document;
-  if (document.spaces.kinds.empty()) return;
+  if (document.spaces.kinds.empty()) return {};
   const Vector on = named_space(document.spaces.kinds)->normalised(start.q);
   for (Eigen::Index i = 0; i < on.size(); ++i)
     if (!(std::abs(on[i] - start.q[i]) < most)) {
@@ -56,7 +59,9 @@ void put_on_space(const LoadedScene& loaded, Start& start) {
                       "has {:g}",
                       coordinate.name, start.q[i], on[i]));
     }
+  const double moved = (on - start.q).lpNorm<Eigen::Infinity>();
   start.q = on;
+  return moved < told ? "" : fmt::format("start put onto its groups and spheres, by {:.2g}", moved);
 }
 
 void set_rates_of_states(const LoadedScenePtr& loaded, StatedStart& stated) {

@@ -3,6 +3,7 @@
 #include <diracstep/core/system/consistent_start.hpp>
 #include <diracstep/scene_format/loader/loaded_scene.hpp>
 #include <diracstep/scene_format/scene_catalogue.hpp>
+#include <string>
 #include <vector>
 
 namespace diracstep {
@@ -11,8 +12,9 @@ namespace diracstep {
 /// not finite.
 StatedStart start_of(const LoadedScene& loaded);
 
-/// Onto groups and spheres, from the digits that a file states.  Throws SceneError where it is far from them.
-void put_on_space(const LoadedScene& loaded, Start& start);
+/// Onto groups and spheres, from the digits that a file states; a note where they were few.  Throws
+/// SceneError where it is far from them.
+std::string put_on_space(const LoadedScene& loaded, Start& start);
 
 /// Velocities of states are their rates.
 void set_rates_of_states(const LoadedScenePtr& loaded, StatedStart& stated);

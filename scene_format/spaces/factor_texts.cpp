@@ -140,6 +140,8 @@ FactorTexts factor_texts(const std::string& kind, const std::string& name) {
     texts.entries[fmt::format("v_{}[{}]", name, i + 1)] = named(form.vector_rate[i]);
   }
   if (is_flat(kind)) return texts;
+  if (kind == "S1" || kind == "SE2")
+    texts.definitions[name + "_angle"] = fmt::format("atan2({}, {})", texts.stored[1], texts.stored[0]);
   for (std::size_t i = 0; i < form.components; ++i)
     texts.entries[fmt::format("w_{}[{}]", name, i + 1)] = "v_" + texts.components[i];
   return texts;

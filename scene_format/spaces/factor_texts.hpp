@@ -16,9 +16,10 @@ namespace diracstep::spaces {
 ///   components  R_1, R_2, R_3, so that v_R_1 … are the components of the velocity
 ///   entries     "R[1,2]" → "2*(R_x*R_y - R_w*R_z)", …, "w_R[1]" → "v_R_1", …
 ///   rates       of the stored numbers: "0.5*(-R_x*v_R_1 - R_y*v_R_2 - R_z*v_R_3)", …
+///   definitions of S1 and SE2 the angle in (−π, π]: "a_angle" → "atan2(a_sin, a_cos)"
 struct FactorTexts {
   std::vector<std::string> stored, components, rates;
-  std::map<std::string, std::string> entries;
+  std::map<std::string, std::string> entries, definitions;
 };
 
 /// "SO3", "SE3", "SE2", "S2", "S1", "R1" … "R9".

@@ -62,6 +62,38 @@ values = ["x"]
   EXPECT_EQ(failed[4], "");
 }
 
+/// A free ball on SO3 turns by its rate: the stored numbers, rates and momenta of a group by name.
+TEST_F(SweepMembers, ScenesOnGroupsHaveTheirStoredNumbers) {
+  write("ball.toml", R"(name = "ball"
+lagrangian = "J*(w_R[1]^2 + w_R[2]^2 + w_R[3]^2)/2"
+[coordinates]
+R = "SO3"
+[parameters]
+J = 2
+[start]
+w_R = [0, 0, 1]
+[span]
+end = 1
+step = 0.1
+)");
+  const std::string sweep = "scene = \"ball.toml\"\n[grid]\nJ = [1, 3]\n";
+  const SweepReport report = run(
+      read_sweep(write("s.toml", sweep + "\"start.v_R_3\" = [0.4]\n[record]\nvalues = [\"R_z\", \"v_R_3\", "
+                                         "\"p_R_3\"]\n")),
+      {.folder = path("out")});
+  EXPECT_EQ(report.ok, 2);
+  const std::vector<std::string> last = fields(rows("out")[2]);
+  EXPECT_NEAR(std::stod(last[5]), std::sin(0.2), 1e-14);
+  EXPECT_NEAR(std::stod(last[6]), 0.4, 1e-14);
+  EXPECT_NEAR(std::stod(last[7]), 1.2, 1e-14);
+  for (const char* place : {"start.R_z", "start.R_1"})
+    expect_misuse(
+        [&] {
+          run(read_sweep(write("t.toml", sweep + '"' + place + "\" = [0.4]\n")), {.folder = path("other")});
+        },
+        {place, "a place on SO3", "depend on a parameter"});
+}
+
 /// A body that falls from h is at the ground at √(2h/g).
 TEST_F(SweepMembers, EventsAreTakenFromEachMember) {
   write("fall.toml", R"(name = "fall"

@@ -59,6 +59,10 @@ void DocumentReader::add_factor(const Item& item, const std::string& kind, const
     all.components.push_back(component);
   }
   for (const auto& [entry, text] : texts.entries) all.entries.emplace(entry, FormulaText{text, item.place});
+  for (const auto& [definition, text] : texts.definitions) {
+    require_new_name(definition, item.place);
+    document_.definitions.emplace(definition, FormulaText{text, item.place});
+  }
   for (const std::string& rate : texts.rates) all.rates.push_back({rate, item.place});
 }
 
@@ -171,12 +175,12 @@ void DocumentReader::require_no_spaces(const toml::table& root) const {
   const char* const refused = "beside coordinates that are groups and spheres";
   if (!document_.branches.empty() || !bodies_.expansion.coordinates.empty() || !document_.bodies.empty())
     fail(place_of(root.source()), fmt::format("circuits and bodies do not stand {}", refused));
-  if (document_.project || !document_.guesses.empty())
-    fail(place_of(root.get("start")->source()),
-         fmt::format("'guess' and 'project' do not stand {}; state a start on the rows", refused));
   for (const auto& row : document_.rows)
     if (row.compliance || row.loops)
       fail(row.place, fmt::format("repeated and compliant rows do not stand {}", refused));
+  if (document_.project || !document_.guesses.empty())
+    fail(place_of(root.get("start")->source()),
+         fmt::format("'guess' and 'project' do not stand {}; state a start on the rows", refused));
 }
 
 }  // namespace diracstep::scene_compiler

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <diracstep/core/equilibrium/eigenmodes.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/runs/run.hpp>
 #include <diracstep/core/spaces/space.hpp>
@@ -12,6 +13,8 @@
 #include <diracstep/solvers/kinsol_solver.hpp>
 #include <diracstep/validation/laws/derivative_examination.hpp>
 #include <string>
+
+#include "misuse.hpp"
 
 /// Scenes whose coordinates are groups and spheres, from text.
 namespace diracstep {
@@ -237,6 +240,10 @@ struct Refused {
   const char *lagrangian, *coordinates, *further, *expected;
 };
 
+void expect_refused(const Refused& one) {
+  testing::expect_misuse([&] { (void)made(one.lagrangian, one.coordinates, one.further); }, {one.expected});
+}
+
 /// What is not known on groups and spheres is refused with that reason.
 TEST(SpaceScenes, WhatIsNotKnownThereIsRefused) {
   const char *const L = "w_R[1]^2 + w_R[2]^2 + w_R[3]^2", *const R = "R = \"SO3\"";
@@ -257,14 +264,104 @@ TEST(SpaceScenes, WhatIsNotKnownThereIsRefused) {
            Refused{L, R, "[states]\ns = { rate = \"1\" }", "'states' is for scenes in R^n"},
            Refused{L, R, "[[events]]\nname = \"e\"\nevery = 0.1", "'events' is for scenes in R^n"},
            Refused{L, R, "[force]\nR_w = \"1\"", "there is no coordinate 'R_w'"},
+           Refused{L, R, "[[rows]]\nname = \"a\"\nequation = \"R[1,1] = 0\"\ncompliance = \"1\"",
+                   "repeated and compliant rows"},
        }) {
-    try {
-      (void)made(one.lagrangian, one.coordinates, one.further);
-      ADD_FAILURE() << "accepted; expected: " << one.expected;
-    } catch (const Misuse& misuse) {
-      EXPECT_NE(std::string(misuse.what()).find(one.expected), std::string::npos) << misuse.what();
-    }
+    expect_refused(one);
   }
+}
+
+TEST(SpaceStarts, WithoutADirectionOrOffTheSpaceAreToldSo) {
+  const char *const L = "v_g_1^2", *const length = "needs a length above 0";
+  for (const Refused& one : {
+           Refused{L, "g = \"SO3\"", "[start]\ng = { axis = [0, 0, 0], angle = 1 }", length},
+           Refused{L, "g = \"S2\"", "[start]\ng = [0, 0, 0]", length},
+           Refused{L, "g = \"SO3\"", "[start]\ng = { matrix = [[1,0,0],[0,1,0.01],[0,0,1]] }", "no rotation"},
+           Refused{L, "g = \"SE2\"", "[start]\ng = [1, 0.1, 0, 0]", "a cosine and its sine"},
+           Refused{L, "g = \"S1\"\ng_angle = {}", "", "used twice"},
+       }) {
+    expect_refused(one);
+  }
+  const CatalogueScene few_digits = made("v_g_1^2", "g = \"SO3\"", "[start]\ng = [0.7071, 0.7071, 0, 0]");
+  ASSERT_EQ(few_digits.changes.size(), 1U);
+  EXPECT_EQ(few_digits.changes[0], "start put onto its groups and spheres, by 6.8e-06");
+}
+
+TEST(SpaceScenes, AnglesAreThoseOfTheCosineAndTheSine) {
+  const CatalogueScene scene =
+      made("w_a[1]^2 + w_g[1]^2 + w_g[2]^2 + w_g[3]^2", "a = \"S1\"\ng = \"SE2\"",
+           "[start]\na = 3\ng = { angle = -1.5 }\nw_a = [0.5]\n[outputs]\none = \"a_angle\"\n"
+           "other = \"g_angle\"\nturning = \"rate(a_angle)\"");
+  const Sample end = end_of(scene.scene, "type1/gl:2", 0.1, 10);
+  EXPECT_NEAR(scene.outputs[0].at(end.point()), 3.5 - 2.0 * std::acos(-1.0), 1e-14);  // in (−π, π]
+  EXPECT_NEAR(scene.outputs[1].at(end.point()), -1.5, 1e-14);
+  EXPECT_NEAR(scene.outputs[2].at(end.point()), 0.5, 1e-14);
+}
+
+/// The frequencies of a scene at the equilibrium that its start leads to, the largest first.
+std::vector<double> frequencies(const CatalogueScene& of) {
+  const Equilibrium at = find_equilibrium(*of.scene, of.scene->start);
+  EXPECT_TRUE(at.ok()) << at.failure;
+  std::vector<double> found;
+  for (const Mode& mode : eigenmodes(linearise(*of.scene, at, 1.0)).modes) {
+    EXPECT_NEAR(mode.eigenvalue.real(), 0.0, 1e-9);
+    if (mode.eigenvalue.imag() > 1e-6) found.push_back(mode.eigenvalue.imag());
+  }
+  std::ranges::sort(found, std::greater<>());
+  return found;
+}
+
+void expect_frequencies(const CatalogueScene& of, std::vector<double> expected) {
+  std::ranges::sort(expected, std::greater<>());
+  const std::vector<double> found = frequencies(of);
+  ASSERT_EQ(found.size(), expected.size());
+  for (std::size_t i = 0; i < found.size(); ++i) EXPECT_NEAR(found[i], expected[i], 1e-9);
+}
+
+/// A body that hangs from its pivot: c/J about both axes, and with a rotor of momentum s along the third the
+/// roots of J λ² − i s λ + c = 0; the same with its centre of mass on rows; a pendulum on a sphere, g/l
+/// twice.
+TEST(SpaceScenes, HangingBodiesVibrateAtTheirFrequencies) {
+  const char* const start = "[start]\nR = { axis = [1, 0.2, 0], angle = 2.9 }";
+  expect_frequencies(made("(2*w_R[1]^2 + 3*w_R[2]^2 + w_R[3]^2)/2 - 5*R[3,3]", "R = \"SO3\"", start),
+                     {std::sqrt(5.0 / 2.0), std::sqrt(5.0 / 3.0)});
+  const double root = std::sqrt(0.7 * 0.7 + 4.0 * 2.0 * 5.0);
+  expect_frequencies(made("w_R[1]^2 + w_R[2]^2 + w_R[3]^2/2 + 0.7*w_R[3] - 5*R[3,3]", "R = \"SO3\"", start),
+                     {(root + 0.7) / 4.0, (root - 0.7) / 4.0});
+  const std::string rows =
+      "[[rows]]\nname = \"a\"\nequation = \"x[1] - R[1,3] = 0\"\n"
+      "[[rows]]\nname = \"b\"\nequation = \"x[2] - R[2,3] = 0\"\n"
+      "[[rows]]\nname = \"c\"\nequation = \"x[3] - R[3,3] = 0\"\n"
+      "[start]\nR = { axis = [1, 0, 0], angle = 3 }\nx = [0, \"-sin(3)\", \"cos(3)\"]";
+  expect_frequencies(
+      made("(2*w_R[1]^2 + 3*w_R[2]^2 + w_R[3]^2)/2 + (v_x[1]^2 + v_x[2]^2 + v_x[3]^2)/2 - 5*x[3]",
+           "R = \"SO3\"\nx = \"R3\"", rows),
+      {std::sqrt(5.0 / 3.0), std::sqrt(5.0 / 4.0)});
+  expect_frequencies(
+      made("2*(v_S[1]^2 + v_S[2]^2 + v_S[3]^2) - 2*9.81*2*S[3]", "S = \"S2\"", "[start]\nS = [0.3, 0.1, -1]"),
+      {std::sqrt(9.81), std::sqrt(9.81)});
+  const CatalogueScene spinning = made("w_R[1]^2 + w_R[2]^2 + w_R[3]^2 - R[3,3]", "R = \"SO3\"", start);
+  EXPECT_THROW((void)find_equilibrium(*spinning.scene, spinning.scene->start, true), Misuse);
+}
+
+/// A constant row is none on positions.  A skate rests across a slope, and nothing turns it: eigenvalues 0.
+TEST(SpaceScenes, ConstantRowsOnGroupsHoldNoPosition) {
+  const std::string row = "[[rows]]\nname = \"skate\"\nequation = \"w_R[3] = 0\"\n";
+  const CatalogueScene body = made("(2*w_R[1]^2 + 3*w_R[2]^2 + w_R[3]^2)/2 - 5*R[3,3]", "R = \"SO3\"",
+                                   row + "[start]\nR = { axis = [1, 0.2, 0], angle = 2.9 }");
+  const Equilibrium at = find_equilibrium(*body.scene, body.scene->start);
+  ASSERT_TRUE(at.ok()) << at.failure;
+  EXPECT_NEAR(spaces::rotation_matrix(at.q[0], at.q[1], at.q[2], at.q[3])[2][2], -1.0, 1e-12);
+  EXPECT_NEAR(at.lambda[0], 0.0, 1e-9);
+  const CatalogueScene skate = made("(2*w_R[1]^2 + w_R[2]^2 + w_R[3]^2)/2 - 0.7*R[1,3]", "R = \"SE2\"",
+                                    row + "[start]\nR = { angle = 0.4 }");
+  const Equilibrium across = find_equilibrium(*skate.scene, skate.scene->start);
+  ASSERT_TRUE(across.ok()) << across.failure;
+  EXPECT_NEAR(across.q[1], 1.0, 1e-12);
+  EXPECT_NEAR(std::abs(across.lambda[0]), 0.7, 1e-12);
+  const Eigenmodes modes = eigenmodes(linearise(*skate.scene, across, 1.0));
+  EXPECT_TRUE(modes.modes.empty());
+  EXPECT_EQ(modes.zeros, 5);
 }
 
 /// As `diracstep check` does: all derivatives against differences along the space.

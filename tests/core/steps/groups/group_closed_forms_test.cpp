@@ -157,5 +157,63 @@ TEST(GroupStepClosedForms, AgreesWithTheQuaternionAndItsRowToTheErrorsOfBoth) {
   }
 }
 
+/// The same top by its directors d_i = R e_i in R^9 with six rows, L by Euler's tensor E = tr(J)/2 − J:
+/// ½ Σ E_ij d_i'·d_j'.
+TEST(GroupStepClosedForms, AgreesWithItsDirectorsToTheErrorsOfBoth) {
+  const GroupScene top = group_scenes::heavy_top();
+  const Eigen::Matrix3d J = group_scenes::generic_inertia(),
+                        E = 0.5 * J.trace() * Eigen::Matrix3d::Identity() - J;
+  Scene flat;
+  flat.name = "top by its directors";
+  for (int i = 0; i < 9; ++i) flat.coordinates.push_back("d" + std::to_string(i));
+  flat.lagrangian = lagrangian<9>([E]<class T>(const std::array<T, 9>& d, const std::array<T, 9>& v) {
+    T value(0.0);
+    for (std::size_t i = 0; i < 3; ++i) {
+      const T& height = d[3 * i + 2];
+      value -= group_scenes::top_k[i] * height + 0.5 * group_scenes::top_K[i] * height * height;
+      for (std::size_t j = 0; j < 3; ++j)
+        for (std::size_t k = 0; k < 3; ++k)
+          value += 0.5 * E(static_cast<int>(i), static_cast<int>(j)) * v[3 * i + k] * v[3 * j + k];
+    }
+    return value;
+  });
+  flat.constraints = {holonomic<9, 6>([]<class T>(const std::array<T, 9>& d) {
+    const auto dot = [&](std::size_t i, std::size_t j) {
+      return d[3 * i] * d[3 * j] + d[3 * i + 1] * d[3 * j + 1] + d[3 * i + 2] * d[3 * j + 2];
+    };
+    return std::array<T, 6>{0.5 * (dot(0, 0) - 1.0),
+                            0.5 * (dot(1, 1) - 1.0),
+                            0.5 * (dot(2, 2) - 1.0),
+                            dot(0, 1),
+                            dot(1, 2),
+                            dot(2, 0)};
+  })};
+  const Start& start = top.scene->start;
+  const auto matrix = spaces::rotation_matrix(start.q[0], start.q[1], start.q[2], start.q[3]);
+  Eigen::Matrix3d R, hat;
+  for (int i = 0; i < 9; ++i)
+    R(i / 3, i % 3) = matrix[static_cast<std::size_t>(i / 3)][static_cast<std::size_t>(i % 3)];
+  hat << 0.0, -start.v[2], start.v[1], start.v[2], 0.0, -start.v[0], -start.v[1], start.v[0], 0.0;
+  const Eigen::Matrix3d rate = R * hat;
+  flat.start = {0.0, R.reshaped(), rate.reshaped()};  // by columns
+  const double T = 2.0;
+  const Vector reference = group_scenes::reference(top, T);
+  for (const int steps : {16, 64}) {
+    const Sample end =
+        testing::samples_of(std::make_shared<Scene>(flat), {.method = gl(3), .step = T / steps}, steps,
+                            Momentum::projected, Registry::with_built_ins(), steps)
+            .back();
+    const Eigen::Matrix3d there = end.q.reshaped(3, 3), turning = there.transpose() * end.v.reshaped(3, 3);
+    Vector observed(12);
+    observed << there.transpose().reshaped(), turning(2, 1), turning(0, 2), turning(1, 0);
+    const double of_group = error_at(top, reference, T, steps, gl(3)),
+                 of_directors = (observed - reference.head(12)).lpNorm<Eigen::Infinity>();
+    EXPECT_LT(of_group, of_directors) << steps;
+    if (steps == 64) {
+      EXPECT_LT(of_directors, 1e-7);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace diracstep

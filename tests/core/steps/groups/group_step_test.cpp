@@ -2,8 +2,8 @@
 
 #include <diracstep/core/methods/composition.hpp>
 #include <diracstep/core/runs/run_checks.hpp>
+#include <diracstep/core/steps/groups/quadrature_step.hpp>
 #include <diracstep/core/steps/groups/step.hpp>
-#include <diracstep/core/steps/groups/trapezoidal_step.hpp>
 #include <diracstep/core/system/consistent_start.hpp>
 
 #include "differences.hpp"
@@ -52,7 +52,8 @@ TEST_P(GroupStep, JacobianAgreesWithDifferences) {
   scene().lagrangian->gradient(0.0, start.q, start.v, force, at.p);
   std::vector<std::unique_ptr<StepProblem>> steps;
   for (const int s : {1, 2, 3}) steps.push_back(group_step(s, scene()));
-  steps.push_back(group_trapezoidal_step(scene()));
+  for (const StepRule& rule : {StepRule::left, StepRule::right, StepRule::trapezoidal})
+    steps.push_back(group_quadrature_step(rule, scene()));
   for (const auto& step : steps) {
     step->begin({0.0, 0.3}, at, {});
     Vector x(step->size());
@@ -151,14 +152,16 @@ TEST(GroupStepLaws, IsSymplectic) {
   for (const GroupScene& of :
        {group_scenes::heavy_top(), group_scenes::heavy_top(group_scenes::rotations<Retraction::cayley>()),
         group_scenes::body_on_spring()})
-    for (const std::string& method : {gl(1), gl(2), gl(3), std::string("type1/trapezoidal")})
+    for (const std::string& method : {gl(1), gl(2), gl(3), std::string("type1/trapezoidal"),
+                                      std::string("type2/euler"), std::string("type3/euler")})
       EXPECT_LT(symplectic_defect(of, method, 0.25), 2e-9) << of.name << " " << method;
 }
 
 /// The potential of the top depends on γ = Rᵀe₃ alone, so that turns about e₃ leave it: γ·p is kept.
 TEST(GroupStepLaws, KeepsTheMomentumMap) {
   for (const auto& on : {group_scenes::rotations(), group_scenes::rotations<Retraction::cayley>()})
-    for (const std::string& method : {gl(1), gl(2), gl(3), std::string("type1/trapezoidal")}) {
+    for (const std::string& method : {gl(1), gl(2), gl(3), std::string("type1/trapezoidal"),
+                                      std::string("type2/euler"), std::string("type3/euler")}) {
       Integrator integrator = integrator_of(group_scenes::heavy_top(on).scene, method, 0.25);
       const auto vertical = [&] {
         const Vector& q = integrator.position();
@@ -267,8 +270,10 @@ TEST(GroupStepInARun, FailsWithTheReasonBeyondTheInjectivityOfTheRetraction) {
 
 TEST(GroupStepInARun, RefusesMethodsOfRn) {
   const auto scene = group_scenes::heavy_top().scene;
-  for (const char* method : {"type1/left", "type2/euler", "damped/radau:2", "type2/legendre(type1/midpoint)"})
-    testing::expect_misuse([&] { integrator_of(scene, method, 0.1); }, {"on SO3", "known in R^n only"});
+  testing::expect_misuse([&] { integrator_of(scene, "damped/radau:2", 0.1); },
+                         {"on SO3", "known in R^n only"});
+  testing::expect_misuse([&] { integrator_of(scene, "type4/legendre(type1/midpoint)", 0.1); },
+                         {"on SO3", "no configuration"});
   testing::expect_misuse([&] { integrator_of(scene, gl(2), 0.1, true); }, {"no compensated sums"});
 }
 

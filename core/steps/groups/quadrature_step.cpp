@@ -1,9 +1,10 @@
 #include <array>
 #include <cmath>
+#include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/core/spaces/space.hpp>
 #include <diracstep/core/steps/groups/point.hpp>
-#include <diracstep/core/steps/groups/trapezoidal_step.hpp>
+#include <diracstep/core/steps/groups/quadrature_step.hpp>
 #include <span>
 #include <string>
 
@@ -11,10 +12,23 @@ namespace diracstep {
 
 namespace {
 
-class GroupTrapezoidalStep final : public StepProblem {
+/// The weights of the two ends.
+std::array<double, 2> end_weights(const StepRule& rule) {
+  std::array<double, 2> weights{};
+  for (const StepNode& node : rule.nodes()) {
+    if (node.c != 0.0 && node.c != 1.0)
+      throw Misuse("a step by the " + name(rule) +
+                   " rule on a group: its nodes are the ends of a step alone");
+    weights[node.c == 0.0 ? 0 : 1] += node.weight;
+  }
+  return weights;
+}
+
+class GroupQuadratureStep final : public StepProblem {
  public:
-  explicit GroupTrapezoidalStep(const Scene& scene)
-      : space_(*scene.space),
+  GroupQuadratureStep(const StepRule& rule, const Scene& scene)
+      : weights_(end_weights(rule)),
+        space_(*scene.space),
         n_(scene.dimension()),
         m_(scene.rows()),
         first_(scene),
@@ -60,12 +74,12 @@ class GroupTrapezoidalStep final : public StepProblem {
       f.setConstant(std::nan(""));
       return;
     }
-    space_.restrict(0.5 * (first_.momentum() + last_.momentum()) - back_.transpose() * carried_, f.head(n_));
+    space_.restrict(momentum_ - back_.transpose() * carried_, f.head(n_));
     if (m_ == 0) return;
     Vector positions(m_);
     last_rows_.positions(step_.end(), q1_, positions);
-    const Vector rates = 0.5 * (first_rows_.forms() * v_ + first_rows_.offsets() + last_rows_.forms() * v_ +
-                                last_rows_.offsets());
+    const Vector rates = weights_[0] * (first_rows_.forms() * v_ + first_rows_.offsets()) +
+                         weights_[1] * (last_rows_.forms() * v_ + last_rows_.offsets());
     for (int r = 0; r < m_; ++r) f[n_ + r] = holonomic(r) ? positions[r] / step_.size : rates[r];
   }
 
@@ -77,14 +91,19 @@ class GroupTrapezoidalStep final : public StepProblem {
     }
     const double h = step_.size;
     const Eigen::Index d = space_.group_dimension();
-    GroupPoint<Eigen::Dynamic>::Derivatives at_first, at_last;
-    first_.derivatives(at_first);
-    last_.derivatives(at_last);
-    Columns along(d, d);
-    space_.dtau_transposed_along(-h * v_, carried_, along);
+    GroupPoint<Eigen::Dynamic>::Derivatives at;
+    Columns momentum(d, d);
+    space_.dtau_transposed_along(-h * v_, carried_, momentum);
+    momentum *= h;
     const Columns moved = h * dtau_;
-    const Columns momentum = 0.5 * (at_first.momentum_xi + at_last.momentum_xi + at_last.momentum_g * moved) +
-                             h * along - 0.5 * h * back_.transpose() * at_first.force_xi;
+    if (weights_[0] != 0.0) {
+      first_.derivatives(at);
+      momentum += weights_[0] * (at.momentum_xi - h * back_.transpose() * at.force_xi);
+    }
+    if (weights_[1] != 0.0) {
+      last_.derivatives(at);
+      momentum += weights_[1] * (at.momentum_xi + at.momentum_g * moved);
+    }
     matrix.topLeftCorner(n_, n_) = momentum(space_.tangent(), space_.tangent());
     if (m_ == 0) return;
     const Columns impulse = back_.transpose() * first_rows_.forms().transpose();
@@ -92,7 +111,8 @@ class GroupTrapezoidalStep final : public StepProblem {
     matrix.bottomRightCorner(m_, m_).setZero();
     Columns turned(m_, d);
     last_rows_.derivative(step_.end(), q1_, v_, turned);
-    const Columns rates = 0.5 * (first_rows_.forms() + last_rows_.forms() + turned * moved),
+    const Columns rates =
+                      weights_[0] * first_rows_.forms() + weights_[1] * (last_rows_.forms() + turned * moved),
                   positions = last_rows_.forms() * dtau_;
     for (int r = 0; r < m_; ++r)
       matrix.block(n_ + r, 0, 1, n_) = (holonomic(r) ? positions : rates).row(r)(space_.tangent());
@@ -105,10 +125,9 @@ class GroupTrapezoidalStep final : public StepProblem {
       end.at.v.setConstant(n_, std::nan(""));
       return;
     }
-    const double h = step_.size;
     end.at.q = q1_;
     end.at.p.resize(n_);
-    space_.restrict(adjoint_.transpose() * carried_ + 0.5 * h * last_.force(), end.at.p);
+    space_.restrict(adjoint_.transpose() * carried_ + end_impulse_, end.at.p);
     end.at.v = x.head(n_);
     end.impulse = x.tail(m_);
     end.memory.known = true;
@@ -140,16 +159,27 @@ class GroupTrapezoidalStep final : public StepProblem {
     for (Columns* matrix : {&adjoint_, &dtau_, &back_}) matrix->resize(d, d);
     Columns unused(d, d);
     space_.maps(h * v_, adjoint_, unused, dtau_, back_);
-    first_.evaluate(step_.start, q0_, v_);
-    last_.evaluate(step_.end(), q1_, v_);
-    carried_ = p0_ + 0.5 * h * first_.force();
+    momentum_.setZero(d);
+    end_impulse_.setZero(d);
+    carried_ = p0_;
+    if (weights_[0] != 0.0) {
+      first_.evaluate(step_.start, q0_, v_);
+      momentum_ += weights_[0] * first_.momentum();
+      carried_ += weights_[0] * h * first_.force();
+      force_size_ = std::max(force_size_, max_norm(first_.force()));
+    }
+    if (weights_[1] != 0.0) {
+      last_.evaluate(step_.end(), q1_, v_);
+      momentum_ += weights_[1] * last_.momentum();
+      end_impulse_ = weights_[1] * h * last_.force();
+      force_size_ = std::max(force_size_, max_norm(last_.force()));
+    }
     if (m_ > 0) {
       last_rows_.evaluate(step_.end(), q1_);
       const Vector impulse = first_rows_.impulse(x.tail(m_));
       carried_ += impulse;
       impulse_size_ = std::max(impulse_size_, max_norm(impulse));
     }
-    force_size_ = std::max({force_size_, max_norm(first_.force()), max_norm(last_.force())});
     set_scales();
     return true;
   }
@@ -161,6 +191,7 @@ class GroupTrapezoidalStep final : public StepProblem {
     if (m_ > 0) blocks_[1].scale = scale_of(max_norm(first_rows_.forms()) * (max_norm(v_) + q / h));
   }
 
+  std::array<double, 2> weights_;  ///< of the two ends
   const Space& space_;
   int n_, m_;
   GroupPoint<Eigen::Dynamic> first_, last_;
@@ -168,7 +199,7 @@ class GroupTrapezoidalStep final : public StepProblem {
   SparsityPattern pattern_;
   std::array<ResidualBlock, 2> blocks_;
   Interval step_{};
-  Vector q0_, p0_, q1_, v_, last_x_, carried_;
+  Vector q0_, p0_, q1_, v_, last_x_, carried_, momentum_, end_impulse_;
   Columns adjoint_, dtau_, back_;
   double force_size_ = 0.0, impulse_size_ = 0.0;
   std::string failure_;
@@ -177,8 +208,8 @@ class GroupTrapezoidalStep final : public StepProblem {
 
 }  // namespace
 
-std::unique_ptr<StepProblem> group_trapezoidal_step(const Scene& scene) {
-  return std::make_unique<GroupTrapezoidalStep>(scene);
+std::unique_ptr<StepProblem> group_quadrature_step(const StepRule& rule, const Scene& scene) {
+  return std::make_unique<GroupQuadratureStep>(rule, scene);
 }
 
 }  // namespace diracstep
