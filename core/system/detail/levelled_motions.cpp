@@ -13,7 +13,7 @@ namespace diracstep {
 
 namespace {
 
-constexpr double independent_by = 1e-7;
+constexpr double independent_by = 1e-7, least_row = 1e-2;
 
 std::vector<int> numbers(int first, int count) {
   std::vector<int> all(static_cast<std::size_t>(count));
@@ -21,9 +21,12 @@ std::vector<int> numbers(int first, int count) {
   return all;
 }
 
-/// Rows of a matrix that are independent, those of earlier groups before others.
+/// Rows of a matrix that are independent, those of earlier groups before others.  Small rows count by their
+/// size beside the largest: they may be round-off.
 std::vector<int> independent_rows(Columns matrix, const std::vector<std::vector<int>>& groups) {
-  for (Eigen::Index r = 0; r < matrix.rows(); ++r) matrix.row(r) /= size_or_one(matrix.row(r).norm());
+  const double least = matrix.rows() > 0 ? least_row * matrix.rowwise().norm().maxCoeff() : 0.0;
+  for (Eigen::Index r = 0; r < matrix.rows(); ++r)
+    matrix.row(r) /= size_or_one(std::max(matrix.row(r).norm(), least));
   std::vector<int> taken;
   for (std::vector<int> group : groups)
     while (!group.empty()) {
@@ -75,6 +78,21 @@ FirstOrderMotions without_levels(const Scene& scene, const Place& at) {
   return motions;
 }
 
+/// Sizes of the rows of an array by what their derivatives are, where this is more than round-off of terms.
+Vector row_sizes(const EquationArray& array, const Place& place) {
+  constexpr double part_of_terms = 1e-6;
+  const double size = size_or_one(std::max(max_norm(place.z), max_norm(place.w)));
+  Vector sizes = part_of_terms / size * array.round_off();
+  for (Eigen::Index r = 0; r < sizes.size(); ++r)
+    sizes[r] = size_or_one(
+        std::max(sizes[r], std::hypot(array.by_state().row(r).norm(), array.by_unknowns().row(r).norm())));
+  return sizes;
+}
+
+Columns scaled_by_unknowns(const EquationArray& array, const Place& place) {
+  return row_sizes(array, place).cwiseInverse().asDiagonal() * array.by_unknowns();
+}
+
 /// Moves a place, z and W of it, to a solution of all equations of an array by Gauss-Newton steps, the least
 /// ones.  Gives the number of the row that is off most where there is none near it, -1 where there is.
 int moved_onto(const Scene& scene, EquationArray& array, Place& place) {
@@ -96,8 +114,9 @@ int moved_onto(const Scene& scene, EquationArray& array, Place& place) {
       row += block->rows();
     }
     if (!off.allFinite() || !by.allFinite()) return 0;
+    const Vector sizes = row_sizes(array, place);
     for (Eigen::Index r = 0; r < by.rows(); ++r) {
-      const double size = size_or_one(by.row(r).norm());
+      const double size = r < rows ? sizes[r] : size_or_one(by.row(r).norm());
       by.row(r) /= size;
       off[r] /= size;
     }
@@ -131,14 +150,14 @@ std::vector<std::vector<int>> groups_of(const EquationArray& array, int n, int m
 }
 
 /// `kept` and `by` at a place; `open` are the directions of (v_0, Λ_0) that stay open.
-ConstraintLevels levels_at(const EquationArray& array, int n, int m, Columns& open) {
+ConstraintLevels levels_at(const EquationArray& array, const Place& place, int n, int m, Columns& open) {
   const int leading = n + m;
   ConstraintLevels levels;
   levels.count = array.orders();
-  levels.kept = independent_rows(array.by_unknowns(), groups_of(array, n, m));
+  const Columns all = scaled_by_unknowns(array, place);
+  levels.kept = independent_rows(all, groups_of(array, n, m));
   std::ranges::sort(levels.kept);
-  Columns rows = array.by_unknowns()(levels.kept, Eigen::all);
-  for (Eigen::Index r = 0; r < rows.rows(); ++r) rows.row(r) /= size_or_one(rows.row(r).norm());
+  const Columns rows = all(levels.kept, Eigen::all);
   const Columns others = rows.rightCols(rows.cols() - leading);
   std::vector<int> beside =
       independent_rows(others.transpose(), {numbers(0, static_cast<int>(others.cols()))});
@@ -173,11 +192,12 @@ std::vector<int> constraints_at(const Scene& scene, const FirstOrderMotions& mot
   return left;
 }
 
-bool regular_at(const EquationArray& array, int n, int m, const ConstraintLevels& levels) {
+bool regular_at(const EquationArray& array, const Place& place, int n, int m,
+                const ConstraintLevels& levels) {
   Columns open;
-  const ConstraintLevels here = levels_at(array, n, m, open);
+  const ConstraintLevels here = levels_at(array, place, n, m, open);
   if (open.cols() > 0 || here.kept.size() != levels.kept.size()) return false;
-  const Columns solved = array.by_unknowns()(levels.kept, levels.by);
+  const Columns solved = scaled_by_unknowns(array, place)(levels.kept, levels.by);
   return independent_rows(solved, {numbers(0, static_cast<int>(solved.rows()))}).size() == levels.kept.size();
 }
 
@@ -204,9 +224,9 @@ FirstOrderMotions levelled_motions(const Scene& scene) {
       }
       array.evaluate(place.t, place.z, place.w, true);
       if (found.empty()) {
-        found.push_back(levels_at(array, n, m, motions.open));
+        found.push_back(levels_at(array, place, n, m, motions.open));
         if (motions.open.cols() > 0) break;
-      } else if (!regular_at(array, n, m, found.front())) {
+      } else if (!regular_at(array, place, n, m, found.front())) {
         return {};
       }
     }

@@ -110,7 +110,8 @@ void require_determined(const Scene& scene, const FirstOrderMotions& motions) {
   std::string velocities, forces;
   for (Eigen::Index k = 0; k < open.cols(); ++k) {
     Vector direction = open.col(k) / max_norm(open.col(k));
-    direction = (direction.array().abs() < 1e-10).select(0.0, direction);
+    const Vector whole = direction.array().round();
+    direction = ((direction - whole).array().abs() < 1e-8).select(whole, direction);
     Eigen::Index first = 0;
     while (direction[first] == 0.0) ++first;
     if (direction[first] < 0.0) direction = -direction;
