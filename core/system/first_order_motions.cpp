@@ -132,7 +132,8 @@ FirstOrderMotions motions_of_one_level(const Scene& scene) {
 }  // namespace
 
 bool by_two_form_alone(const Scene& scene, const FirstOrderMotions& motions) {
-  return !motions.hide_equations() && motions.u.cols() == 0 && scene.rows() == 0 && !scene.force;
+  const bool refused = motions.open.cols() > 0 || !motions.contradiction.empty();
+  return !refused && !motions.hide_equations() && motions.u.cols() == 0 && scene.rows() == 0 && !scene.force;
 }
 
 FirstOrderMotions first_order_motions(const Scene& scene) {
@@ -143,7 +144,10 @@ FirstOrderMotions first_order_motions(const Scene& scene) {
       scene.dimension() + scene.rows() > most_with_levels || open_directions(scene, motions).cols() == 0)
     return motions;
   FirstOrderMotions levelled = levelled_motions(scene);
-  return levelled.exist() ? levelled : motions;
+  if (!levelled.levels.empty()) return levelled;
+  motions.open = levelled.open;
+  motions.contradiction = levelled.contradiction;
+  return motions;
 }
 
 FirstOrderPoint::FirstOrderPoint(const Scene& scene, FirstOrderMotions motions)

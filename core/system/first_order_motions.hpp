@@ -5,14 +5,19 @@
 #include <diracstep/core/system/lagrangian_derivatives.hpp>
 #include <diracstep/core/system/scene.hpp>
 #include <memory>
+#include <string>
 #include <vector>
 
 namespace diracstep {
 
-/// Of the equations of one level of the constraint algorithm: those that determine unknowns, those that do
-/// not beside them, and the unknowns that the former are solved for.
-struct ConstraintLevel {
-  std::vector<int> kept, left, by;
+/// Of the equations of a scene and `count` time derivatives of them, the levels of the constraint algorithm:
+/// those that determine unknowns, the unknowns that they are solved for, and those beside them that are
+/// constraints.
+struct ConstraintLevels {
+  int count = 0;
+  std::vector<int> kept, by, left = {};
+
+  bool empty() const { return count == 0; }
 };
 
 /// The motions of first order of a Lagrangian: the columns of W span the constant kernel of ∂²L/∂v², and
@@ -33,15 +38,17 @@ struct ConstraintLevel {
 /// state.
 ///
 /// `levels`: combinations of these equations and of the rows are constraints, or constraints have rates that
-/// are constraints again (detail/constraint_levels.hpp); `along` and `inert` as above, and `affine` where the
-/// equations of all of them are affine in velocities and forces.
+/// are constraints again (detail/constraint_levels.hpp); `along` and `inert` as above.  Where no number of
+/// levels determines velocities and forces of rows, `open` holds the directions of (v, Λ) that stay open, and
+/// where equations contradict each other, `contradiction` names the one that is off most.
 struct FirstOrderMotions {
   Columns w, u;
   bool by_force = false;
   std::vector<int> along = {}, inert = {};
   std::vector<bool> hidden = {};
-  std::vector<ConstraintLevel> levels = {};
-  bool affine = false;
+  ConstraintLevels levels = {};
+  Columns open = {};
+  std::string contradiction = {};
 
   bool exist() const { return w.cols() > 0; }
   bool hide_equations() const { return !hidden.empty() || !levels.empty(); }
@@ -75,6 +82,8 @@ class FirstOrderPoint {
   const Vector& force() const { return force_; }                ///< ∂L/∂q + f + AᵀΛ
   const Vector& momentum_rate() const { return rate_; }         ///< (∂²L/∂v∂q) v + ∂²L/∂v∂t
   const Vector& row_residual() const { return row_residual_; }  ///< A v + b
+  /// A, at once.
+  Columns rows_here() const { return constraints_.pattern().full(constraints_.coefficients()); }
   Columns mass_here() const { return scene_.lagrangian->pattern().full(l_.vv); }  ///< ∂²L/∂v², at once
   const Columns& mass() const { return mass_; }                                   ///< ∂²L/∂v²
   const Columns& momentum_by_q() const { return by_q_; }                          ///< ∂²L/∂v∂q
@@ -105,7 +114,10 @@ class MomentumVelocityProblem : public NonlinearProblem {
   int size() const final { return n_ + m_; }
   const SparsityPattern& pattern() const final { return pattern_; }
   std::span<const ResidualBlock> blocks() const final { return blocks_; }
-  void begin(double t, ConstVectorRef q, ConstVectorRef p);
+  virtual void begin(double t, ConstVectorRef q, ConstVectorRef p);
+  /// From now on what is solved within starts from the last solution: quicker along a motion, but bits depend
+  /// on where it was asked before.
+  virtual void start_from_last() {}
 
  protected:
   explicit MomentumVelocityProblem(const Scene& scene);
@@ -119,11 +131,13 @@ class MomentumVelocityProblem : public NonlinearProblem {
   SparsityPattern pattern_;
 };
 
-/// By the equations of FirstOrderPoint.
+/// By the equations of FirstOrderPoint.  Steps of motions by_force leave p up to the annihilator of the rows;
+/// since momenta along W are known, it is p + Aᵀμ with Wᵀ(p + Aᵀμ) = Wᵀ ∂L/∂v that counts.
 class FirstOrderVelocityProblem final : public MomentumVelocityProblem {
  public:
   FirstOrderVelocityProblem(const Scene& scene, const FirstOrderMotions& motions);
 
+  void begin(double t, ConstVectorRef q, ConstVectorRef p) override;
   void residual(ConstVectorRef x, VectorRef f) override;
   void jacobian(ConstVectorRef x, VectorRef values) override;
 

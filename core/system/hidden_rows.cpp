@@ -11,6 +11,9 @@
 #include <diracstep/core/system/multiplier_rows.hpp>
 #include <diracstep/core/system/rows_along_motions.hpp>
 #include <limits>
+#include <memory>
+#include <string>
+#include <utility>
 
 namespace diracstep {
 
@@ -143,7 +146,7 @@ Point near(const Start& start) {
   return point;
 }
 
-[[noreturn]] void refuse(const Scene& scene, const Columns& w, const char* why) {
+[[noreturn]] void refuse(const Scene& scene, const Columns& w, const std::string& why) {
   std::string motions;
   for (Eigen::Index k = 0; k < w.cols(); ++k)
     motions += (k == 0 ? "'" : ", '") + motion_along(scene, w.col(k)) + "'";
@@ -258,9 +261,13 @@ ConstraintBlocks hidden_rows(const Scene& scene) {
   const Eigen::Index r = parts.resisted.cols(), c = parts.free.cols();
   if (r > 0 && !first_order.by_force)
     blocks.push_back(rows_along_motions(scene, false, parts.resisted, units.head(r)));
-  if (multipliers)
-    blocks.push_back(std::make_shared<MultiplierRows>(scene, parts.free, units.tail(c)));
-  else if (c > 0)
+  if (multipliers) {
+    auto rows = std::make_shared<MultiplierRows>(scene, parts.free, units.tail(c));
+    if (const std::string twice = rows_said_twice(scene, *rows); !twice.empty())
+      refuse(scene, parts.free,
+             "what it is a multiplier of says the same as " + twice + ": leave out the one or the other");
+    blocks.push_back(std::move(rows));
+  } else if (c > 0)
     blocks.push_back(rows_along_motions(scene, true, parts.free, units.tail(c)));
   return blocks;
 }

@@ -202,7 +202,7 @@ void KernelVelocityProblem::residual(ConstVectorRef x, VectorRef f) {
   const double velocity = m_ > 0 ? max_norm(x.head(n_)) : 0.0, forms = max_norm(point_.full().rows());
   std::size_t b = 0;
   const auto raise = [&](bool present, double terms) {
-    if (present) blocks_[b].scale = std::max(blocks_[b].scale, scale_of(terms));
+    if (present && std::isfinite(terms)) blocks_[b].scale = scale_of(terms);
     if (present) ++b;
   };
   raise(inert_ > 0, std::max(max_norm(p_), max_norm(point_.full().momentum())));

@@ -1,6 +1,8 @@
 #include <Eigen/LU>
 #include <cmath>
+#include <diracstep/core/numerics/kernel_basis.hpp>
 #include <diracstep/core/numerics/scales.hpp>
+#include <diracstep/core/system/constraint_distribution.hpp>
 #include <diracstep/core/system/lagrangian_derivatives.hpp>
 #include <diracstep/core/system/multiplier_rows.hpp>
 #include <diracstep/core/system/rows_along_motions.hpp>
@@ -137,6 +139,31 @@ bool are_multipliers(const Scene& scene, const Columns& directions) {
       return false;
   }
   return true;
+}
+
+std::string rows_said_twice(const Scene& scene, const MultiplierRows& rows) {
+  const Eigen::Index n = scene.dimension(), m = scene.rows(), k = rows_at_shown_points(rows);
+  if (m == 0) return {};
+  ConstraintsAtPoint own(scene.constraints, scene.dimension());
+  Columns dependent;
+  for (const double phase : {0.0, 1.0}) {
+    Vector q = scene.start.q, a(2 * k * n), b(2 * k);
+    for (Eigen::Index i = 0; i < n; ++i)
+      q[i] +=
+          1e-2 * size_or_one(max_norm(scene.start.q)) * std::sin(1.0 + phase + 1.7 * static_cast<double>(i));
+    own.evaluate(scene.start.time, q);
+    rows.coefficients(scene.start.time, q, a, b);
+    Columns all(m + k, n);
+    all << own.pattern().full(own.coefficients()), a.reshaped(2 * k, n).topRows(k);
+    for (Eigen::Index r = 0; r < m + k; ++r) all.row(r) /= size_or_one(max_norm(all.row(r).transpose()));
+    dependent = kernel_basis(all.transpose(), 1e-9);
+    if (dependent.cols() == 0) return {};
+  }
+  std::string names;
+  for (int r = 0; r < m; ++r)
+    if (max_norm(dependent.row(r).transpose()) > 1e-9 * max_norm(dependent))
+      names += (names.empty() ? "" : ", ") + row_label(scene.constraints, r);
+  return names;
 }
 
 int rows_at_shown_points(const ConstraintRows& rows) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <diracstep/core/system/scene.hpp>
+#include <string>
 
 namespace diracstep {
 
@@ -42,6 +43,10 @@ class MultiplierRows final : public ConstraintRows {
 /// Whether the columns of `directions`, which carry no momentum and no force, are as described above, near
 /// the start.
 bool are_multipliers(const Scene& scene, const Columns& directions);
+
+/// The rows of the scene that say what these of multipliers say already, near the start, so that only sums of
+/// the forces of both are determined: "row 'rod'"; empty where there are none.
+std::string rows_said_twice(const Scene& scene, const MultiplierRows& rows);
 
 /// How many of the rows of a block hold at q as shown, where multipliers do not stand still: the first so
 /// many.

@@ -145,6 +145,37 @@ inline DegenerateCase lagging_servo() {
           Vector{{s, c, (4.0 * s - 2.0 * c) / 5.0 + 0.7 * std::exp(-2.0)}}};
 }
 
+/// The pendulum in canonical coordinates with the force of its rod as a coordinate: three levels.
+inline DegenerateCase canonical_pendulum_by_multiplier() {
+  const DegenerateCase by_row = canonical_pendulum();
+  Scene scene = scene_of("canonical pendulum by a multiplier", {"x", "y", "p", "r", "a"});
+  scene.lagrangian = lagrangian<5>([](const auto& q, const auto& v) {
+    return q[2] * v[0] + q[3] * v[1] - 0.5 * (q[2] * q[2] + q[3] * q[3]) - q[1] +
+           q[4] * (q[0] * q[0] + q[1] * q[1] - 1.0);
+  });
+  scene.start = {0.0, Vector{{1.0, 0.0, 0.0, 0.6, -0.18}}, Vector::Zero(5)};
+  Vector end(5);
+  end << by_row.q, by_row.lambda;
+  return {std::make_shared<const Scene>(scene), end};
+}
+
+/// The first of two masses on a spring is to be at x = sin 2t, by a force z on the second: five levels, which
+/// give y = x + x'' and z = y'' + y − x.
+inline DegenerateCase far_servo() {
+  Scene scene = scene_of("far servo", {"x", "p", "y", "r", "z"});
+  scene.lagrangian = lagrangian<5>([](const auto& q, const auto& v) {
+    return q[1] * v[0] + q[3] * v[2] - 0.5 * (q[1] * q[1] + q[3] * q[3]) -
+           0.5 * (q[0] - q[2]) * (q[0] - q[2]);
+  });
+  scene.force = force<5>([]<class T>(const std::array<T, 5>& q, const std::array<T, 5>&, const T& t) {
+    using std::sin;
+    return std::array<T, 5>{T(0.0), T(0.0), q[4], T(0.0), q[0] - sin(2.0 * t)};
+  });
+  scene.start = {0.0, Vector{{0.0, 2.0, 0.0, -6.0, 0.0}}, Vector{{2.0, 0.0, -6.0, 0.0, 16.0}}};
+  const double s = std::sin(2.0), c = std::cos(2.0);
+  return {std::make_shared<const Scene>(scene), Vector{{s, 2.0 * c, -3.0 * s, -6.0 * c, 8.0 * s}}};
+}
+
 inline const std::vector<DegenerateCase>& levelled_cases() {
   static const std::vector<DegenerateCase> cases{canonical_pendulum(), canonical_nonholonomic(),
                                                  odd_two_form(), vortex_on_a_wall()};

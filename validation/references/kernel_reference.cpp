@@ -28,6 +28,7 @@ class KernelIda {
         pattern_(SparsityPattern::dense(static_cast<int>(size_), static_cast<int>(size_))),
         linear_solver_(detail::make_linear_solver(pattern_)),
         values_(size_, size_) {
+    velocity_->start_from_last();
     for (auto* vector : {&y_, &rate_, &differential_})
       vector->reset(detail::require(N_VNew_Serial(size_, context_), "N_VNew_Serial"));
   }

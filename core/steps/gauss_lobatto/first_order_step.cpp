@@ -156,7 +156,7 @@ class FirstOrderStep final : public StepProblem {
   }
 
   void raise(std::size_t block, double terms) {
-    if (std::isfinite(terms)) blocks_[block].scale = std::max(blocks_[block].scale, scale_of(terms));
+    if (std::isfinite(terms)) blocks_[block].scale = scale_of(terms);
   }
 
   /// What positions of stage i bring into row block i: the rows of the momentum hold those of all stages.

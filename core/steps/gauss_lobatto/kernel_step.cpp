@@ -216,8 +216,7 @@ class KernelStep final : public StepProblem {
     }
     const std::array terms{momentum, force, velocity, hidden / h, velocity / h, max_norm(q0_) / h + velocity};
     for (std::size_t b = 0; b < blocks_.size(); ++b)
-      if (const double size = terms.at(kinds_[b]); std::isfinite(size))
-        blocks_[b].scale = std::max(blocks_[b].scale, scale_of(size));
+      if (const double size = terms.at(kinds_[b]); std::isfinite(size)) blocks_[b].scale = scale_of(size);
   }
 
   void differentiate(ConstVectorRef x) {

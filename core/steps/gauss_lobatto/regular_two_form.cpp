@@ -1,6 +1,7 @@
 #include <Eigen/LU>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/steps/gauss_lobatto/regular_two_form.hpp>
+#include <diracstep/core/system/detail/constraint_levels.hpp>
 #include <diracstep/core/system/lagrangian_derivatives.hpp>
 
 namespace diracstep {
@@ -31,9 +32,8 @@ void require_regular_two_form(const Scene& scene) {
       "': its Lagrangian θ(q)·v − H(q) is linear in v, and the two-form dθ has rank " +
       std::to_string(two_form.rank()) + " of " + std::to_string(n) +
       " at the start, so nothing determines the velocities of" + open +
-      "; a phase-space Lagrangian pairs coordinates, and others must follow from constraints of at most "
-      "two levels" +
-      (n % 2 == 1 ? ", as one of an odd number must" : ""));
+      "; a phase-space Lagrangian pairs coordinates, and others must follow from constraints of at most " +
+      std::to_string(most_levels) + " levels" + (n % 2 == 1 ? ", as one of an odd number must" : ""));
 }
 
 }  // namespace diracstep

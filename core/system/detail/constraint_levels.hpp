@@ -1,85 +1,113 @@
 #pragma once
 
-#include <diracstep/core/system/kernel_motions.hpp>
+#include <Eigen/LU>
+#include <algorithm>
+#include <diracstep/core/system/detail/equation_array.hpp>
+#include <diracstep/core/system/first_order_motions.hpp>
 #include <string>
 #include <vector>
 
 namespace diracstep {
 
-/// The constraint algorithm (M. J. Gotay, J. M. Nester, G. Hinds, J. Math. Phys. 19, 1978) on the equations
-/// K_0(t,z,w) = 0 of a degenerate Lagrangian, z = (q, p_i) and w = (v, Λ),
+/// The constraint algorithm (M. J. Gotay, J. M. Nester, G. Hinds, J. Math. Phys. 19, 1978) of a degenerate
+/// Lagrangian, on its equations and their time derivatives up to an order K (equation_array.hpp),
+/// F(t,z,W) = 0 with z = (q, p_i).  Each derivative is a level of the algorithm.
 ///
-///   ∂L/∂v_i − p_i = 0,   E = 0,   A v + b = 0                                    (kernel_motions.hpp),
-///
-/// with z' = g(z,w) = (v, (∂L/∂q + f + AᵀΛ)_i).  Where ∂K_l/∂w is singular with constant rank, rows N that
-/// span its left kernel give constraints on z alone, N K_l = 0, and N dK_l/dt = N (∂_t + g·∂_z) K_l takes
-/// their place in K_{l+1}: until ∂K_l/∂w is regular.  So rows between positions of canonical pairs, whose
-/// rates hold momenta, and two-forms dθ that are singular.
-///
-/// N = (−J_nk J_kk⁻¹, 1) with the rows `kept` and the unknowns `by` that they are solved for; J and the rates
-/// are central differences of order 8, good to 1e-13 of their terms for each level.
+/// Where ∂F/∂W has constant rank, and its kernel no part in v_0 and Λ_0, as many rows `kept`, those of low
+/// order first, are solved for as many unknowns `by`, v_0 and Λ_0 among them, the others left at zero. So v
+/// and Λ are functions of (t,z), near the constraints as well, and z' = g(t,z).  Those of the other rows that
+/// say something new, `left`, are the constraints of all levels, C(t,z) = F_left(t,z,W(t,z)), beside the
+/// holonomic rows φ; with N = (−J_lk J_kk⁻¹, 1), ∂C/∂z = N ∂F/∂z.  So rows between positions of canonical
+/// pairs, whose rates hold momenta, two-forms dθ that are singular, and multipliers as coordinates.
+struct LevelledPoint {
+  Vector w;                                     ///< W, a guess before solve()
+  Vector rate;                                  ///< g
+  Vector constraints;                           ///< φ and C
+  Columns rate_by_state, constraints_by_state;  ///< of differentiate()
+  Vector state = {};                            ///< where w was solved for
+  Columns by_state = {};                        ///< ∂W_by/∂z there; empty where it is not known
+  Eigen::PartialPivLU<Columns> factors = {};    ///< of J_kk with rows divided by `sizes`
+  Vector sizes = {};                            ///< empty: not factored
+};
+
 class LevelledEquations {
  public:
   LevelledEquations(const Scene& scene, const FirstOrderMotions& motions);
 
-  /// K of the last level at (t,z,w), n + m numbers: those that are no rates in front.
-  Vector evaluate(double t, ConstVectorRef z, ConstVectorRef w);
-  /// K_l of any level.
-  Vector at(std::size_t level, double t, ConstVectorRef z, ConstVectorRef w);
+  /// The reach of differences for points near this one, and W there in `at`; false as solve().
+  bool begin(double t, ConstVectorRef z, ConstVectorRef v, LevelledPoint& at);
+  /// The same from a known W in units of a known reach; false also where that is not short enough.
+  bool resume(double t, ConstVectorRef z, ConstVectorRef w, double reach, LevelledPoint& at);
+  /// W, g, φ and C at (t,z) by Newton's method from at.w; false where it does not converge.
+  bool solve(double t, ConstVectorRef z, LevelledPoint& at);
+  /// Their derivatives, after solve() at the same place.
+  void differentiate(double t, ConstVectorRef z, LevelledPoint& at);
 
-  // At the point of the last evaluate():
-  const Vector& rate() const { return rate_; }          ///< g
-  const Vector& momentum() const { return momentum_; }  ///< ∂L/∂v, n numbers
-  double terms() const { return terms_; }               ///< size of what cancels in K_0
-  double rate_terms() const;                     ///< of its rates, as far as round-off of differences goes
-  double resolved() const { return resolved_; }  ///< shortest time that rates are differenced over
+  /// Whether the reach was short enough at the last solve().
+  bool smooth() const { return array_.smooth(); }
 
-  /// φ, and the left rows of K_l of each level: N K_l at a w that solves K = 0.
-  Vector constraints(double t, ConstVectorRef z, ConstVectorRef w);
-  /// Their derivative by z along K = 0, by differences good to 1e-7: N ∂K_l/∂z.
-  Columns constraint_derivative(double t, ConstVectorRef z, ConstVectorRef w);
+  // At the point of the last solve():
+  const Vector& momentum() const { return array_.momentum(); }  ///< ∂L/∂v, n numbers
+  double terms() const { return std::max(array_.terms(), array_.row_terms()); }
+  /// Round-off of v_0 and Λ_0 in units of ε times their size, as estimated by begin() or resume(); it grows
+  /// with the number of levels.
+  double loss() const { return loss_; }
+  /// That of C in units of ε.
+  double constraint_terms() const { return constraint_terms_; }
+
   std::string constraint_name(int number) const;
-
-  int unknowns() const { return n_ + m_; }
-  int inert() const { return inert_; }
-  int constraint_count() const { return holonomic_count_ + hidden_count_; }
+  double reach() const { return array_.reach(); }
+  int unknowns() const { return array_.unknowns(); }
+  int leading() const { return n_ + m_; }  ///< v_0 and Λ_0
+  int states() const { return array_.states(); }
+  int constraint_count() const { return holonomic_count_ + static_cast<int>(levels_.left.size()); }
   Vector state(ConstVectorRef q, ConstVectorRef p) const;  ///< z, of all of p
 
  private:
-  Vector equations(double t, ConstVectorRef z, ConstVectorRef w);
-  Columns by_unknowns(std::size_t level, double t, const Vector& z, const Vector& w);
-  Columns left_kernel(std::size_t level, double t, const Vector& z, const Vector& w);
+  void factor(double t, ConstVectorRef z, LevelledPoint& at);
+  void estimate_loss(const LevelledPoint& at);
+  double part_of_leading(ConstVectorRef change, ConstVectorRef w) const;
+  void take_constraints(double t, ConstVectorRef z, LevelledPoint& at);
 
   Scene scene_;
-  FirstOrderMotions motions_;
+  std::vector<int> inert_;
+  ConstraintLevels levels_;
   ConstraintBlocks holonomic_;
-  int n_, m_, inert_, holonomic_count_, hidden_count_ = 0;
-  KernelPoint point_;
+  int n_, m_, holonomic_count_;
+  EquationArray array_;
+  double loss_ = 1.0, constraint_terms_ = 0.0;
   ConstraintsAtPoint forms_;  ///< of φ
-  Vector rate_, momentum_;
-  double terms_ = 0.0, resolved_ = 1.0;
 };
 
-constexpr int most_with_levels = 40;  ///< coordinates and rows
+/// "the equation of motion along 'x'", of a row of an array.
+std::string name_of_equation(const Scene& scene, const std::vector<int>& inert, int row);
 
-/// The levels of a scene whose equations of first order leave velocities or forces of rows open; none where
-/// ranks change near the start or where two levels do not determine them.
+constexpr int most_with_levels = 40;  ///< coordinates and rows
+constexpr int most_levels = 5;        ///< time derivatives of equations
+
+/// The levels of a scene whose equations of first order leave velocities or forces of rows open; without
+/// levels, and with what is open or contradictory, where none or more than most_levels determine them, and
+/// none at all where ranks change near the start.
 FirstOrderMotions levelled_motions(const Scene& scene);
 
-/// Unknowns (v, Λ) at given t, q, p: the equations of the last level.
+/// Unknowns (v, Λ) at given t, q, p: less those by the equations of all levels.
 class LevelledVelocityProblem final : public MomentumVelocityProblem {
  public:
   LevelledVelocityProblem(const Scene& scene, const FirstOrderMotions& motions);
 
   void residual(ConstVectorRef x, VectorRef f) override;
   void jacobian(ConstVectorRef x, VectorRef values) override;
+  void start_from_last() override { from_last_ = true; }
 
  private:
-  LevelledEquations equations_;
-};
+  bool solve(const Vector& z, ConstVectorRef v);
 
-/// w at (t,z) by Newton's method from `w`; NaN where it does not converge.
-Vector solved_unknowns(LevelledEquations& equations, double t, const Vector& z, Vector w);
+  LevelledEquations equations_;
+  bool from_last_ = false;
+  double solved_t_ = 0.0;
+  Vector solved_z_;
+  LevelledPoint at_;
+};
 
 /// The start moved onto the constraints of all levels, as moved_onto_hidden() does for those of one.
 Start moved_onto_levels(const Scene& scene, const FirstOrderMotions& motions, Start start,

@@ -1,4 +1,6 @@
+#include <Eigen/QR>
 #include <algorithm>
+#include <cmath>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/numerics/kernel_basis.hpp>
 #include <diracstep/core/numerics/scales.hpp>
@@ -27,6 +29,17 @@ void MomentumVelocityProblem::begin(double t, ConstVectorRef q, ConstVectorRef p
   for (ResidualBlock& block : blocks_) block.scale = smallest_scale;
 }
 
+void FirstOrderVelocityProblem::begin(double t, ConstVectorRef q, ConstVectorRef p) {
+  MomentumVelocityProblem::begin(t, q, p);
+  if (m_ == 0 || !point_.motions().by_force) return;
+  const Vector none = Vector::Zero(n_);
+  point_.evaluate(t, q, none, Vector::Zero(m_));
+  const Columns forms = point_.rows_here(), &w = point_.motions().w;
+  const Columns along = w.transpose() * forms.transpose();
+  p_ += forms.transpose() *
+        along.completeOrthogonalDecomposition().solve(w.transpose() * (point_.momentum() - p));
+}
+
 void FirstOrderVelocityProblem::residual(ConstVectorRef x, VectorRef f) {
   point_.evaluate(t_, q_, x.head(n_), x.tail(m_));
   const Columns &w = point_.motions().w, &u = point_.motions().u;
@@ -35,7 +48,7 @@ void FirstOrderVelocityProblem::residual(ConstVectorRef x, VectorRef f) {
   f.tail(m_) = point_.row_residual();
   std::size_t b = 0;
   const auto raise = [&](double terms) {
-    blocks_[b].scale = std::max(blocks_[b].scale, scale_of(terms));
+    if (std::isfinite(terms)) blocks_[b].scale = scale_of(terms);
     ++b;
   };
   if (u.cols() > 0) raise(std::max(max_norm(p_), max_norm(point_.momentum())));
@@ -87,12 +100,21 @@ void require_determined(const Scene& scene, const FirstOrderMotions& motions) {
     throw Misuse(
         "scene '" + scene.name + "': rows and forces on motions of first order take full matrices, and " +
         "it has more than " + std::to_string(most_coordinates_of_first_order) + " coordinates and rows");
-  const Columns open = open_directions(scene, motions);
+  if (!motions.contradiction.empty())
+    throw Misuse("scene '" + scene.name +
+                 "': its Lagrangian has motions of first order, and no point near the start is on all of its "
+                 "equations of motion, rows and time derivatives of them: off most is " +
+                 motions.contradiction + "; do rows, or multipliers as coordinates, contradict each other?");
+  const Columns open = motions.open.cols() > 0 ? motions.open : open_directions(scene, motions);
   if (open.cols() == 0) return;
   std::string velocities, forces;
   for (Eigen::Index k = 0; k < open.cols(); ++k) {
     Vector direction = open.col(k) / max_norm(open.col(k));
-    direction = (direction.array().abs() < 1e-10).select(0.0, direction);
+    const Vector whole = direction.array().round();
+    direction = ((direction - whole).array().abs() < 1e-8).select(whole, direction);
+    Eigen::Index first = 0;
+    while (direction[first] == 0.0) ++first;
+    if (direction[first] < 0.0) direction = -direction;
     const std::string along = motion_along(scene, direction.head(n));
     if (!along.empty()) velocities += (velocities.empty() ? "'" : ", '") + along + "'";
     for (int r = 0; r < m; ++r)
@@ -103,8 +125,9 @@ void require_determined(const Scene& scene, const FirstOrderMotions& motions) {
   throw Misuse("scene '" + scene.name +
                "': its Lagrangian has motions of first order, whose equations together with the rows do not "
                "determine at the start: " +
-               what +
-               "; constraints that these equations hide, and rates of these, are followed over two levels");
+               what + "; with up to " + std::to_string(most_levels) +
+               " time derivatives of them nothing else does: is a term missing in L, or is a row, or a "
+               "multiplier as a coordinate, there twice?");
 }
 
 }  // namespace diracstep

@@ -148,6 +148,15 @@ TEST(MultipliersAsCoordinates, HaveTheOrderTwiceTheStagesLikeThePositions) {
   }
 }
 
+TEST(MultipliersAsCoordinates, BesideARowThatSaysTheSameAreRefused) {
+  auto scene = std::make_shared<Scene>(*with_multipliers());
+  scene->constraints = {holonomic<6, 1>(
+      []<class T>(const std::array<T, 6>& q) { return std::array<T, 1>{2.0 * Links::apart(q)[1]}; },
+      {"link"})};
+  expect_misuse([&] { (void)samples_of(scene, {.method = "type1/gl:2", .step = 0.1}, 1); },
+                {"'multipliers'", "row 'link'", "leave out the one or the other"});
+}
+
 TEST(MultipliersAsCoordinates, OfWhatMovesWithTheTimeAreRefused) {
   auto scene = std::make_shared<Scene>(*with_multipliers());
   scene->lagrangian = lagrangian<6>([](const auto& q, const auto& v, const auto& t) {

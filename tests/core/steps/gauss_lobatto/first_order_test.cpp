@@ -1,8 +1,11 @@
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <diracstep/constraints/holonomic.hpp>
 #include <diracstep/constraints/pfaffian.hpp>
+#include <diracstep/core/system/first_order_motions.hpp>
+#include <tuple>
 
 #include "degenerate_cases.hpp"
 #include "extrapolation.hpp"
@@ -281,21 +284,67 @@ TEST(FirstOrderStep, IsSelfAdjoint) {
 }
 
 TEST(FirstOrderStep, WhatIsNotDeterminedIsRefusedWithItsDirection) {
-  Scene scene;  // constraints x, py, y and px of four levels
-  scene.name = "four levels";
-  scene.coordinates = {"x", "y", "px", "py"};
-  scene.lagrangian = lagrangian<4>([](const auto& q, const auto& v) {
-    return q[2] * v[0] + q[3] * v[1] - q[2] * q[3] - 0.5 * (q[0] * q[0] + q[1] * q[1]);
+  Scene scene;
+  scene.name = "row twice";  // so that nothing tells how the force is shared
+  scene.coordinates = {"x", "y", "px", "py", "a"};
+  scene.lagrangian = lagrangian<5>([](const auto& q, const auto& v) {
+    return q[2] * v[0] + q[3] * v[1] - 0.5 * (q[2] * q[2] + q[3] * q[3] + q[0] * q[0] + q[1] * q[1]) +
+           q[4] * q[0];
   });
   scene.constraints = {
-      holonomic<4, 1>([]<class T>(const std::array<T, 4>& q) { return std::array<T, 1>{q[0]}; }, {"wall"})};
-  scene.start = {0.0, Vector::Zero(4), Vector::Zero(4)};
+      holonomic<5, 1>([]<class T>(const std::array<T, 5>& q) { return std::array<T, 1>{q[0]}; }, {"wall"})};
+  scene.start = {0.0, Vector::Zero(5), Vector::Zero(5)};
   testing::expect_misuse(
       [&] {
         const Integrator taken(std::make_shared<const Scene>(scene), Registry::with_built_ins(), kinsol(),
                                {.method = gl(2), .step = 0.1});
       },
-      {"'four levels'", "the velocity along 'px'", "the force of row 'wall'", "two levels"});
+      {"'row twice'", "the velocity along 'a'", "there twice"});
+}
+
+/// Two conductors side by side, one of them not linear, behind an inertia: steps leave the momentum up to the
+/// impulse of the row, so that velocities read by it had the order 1.
+TEST(VelocitiesByForce, HaveTheOrderOfTheMethodBesideRows) {
+  Scene scene;
+  scene.name = "conductors";
+  scene.coordinates = {"x", "a", "b"};
+  scene.lagrangian =
+      lagrangian<3>([](const auto& q, const auto& v) { return 0.5 * v[0] * v[0] - 0.5 * q[0] * q[0]; });
+  scene.force = force<3>([]<class T>(const Three<T>&, const Three<T>& v, const T& t) {
+    using std::cos;
+    return Three<T>{cos(t), -v[1] - v[1] * v[1] * v[1], -2.0 * v[2]};
+  });
+  scene.constraints = {pfaffian<3, 1>(
+      []<class T>(const Three<T>&) {
+        return std::array<Three<T>, 1>{{{T(1.0), T(-1.0), T(-1.0)}}};
+      },
+      {"node"})};
+  scene.start = {0.0, Vector::Zero(3), Vector::Zero(3)};
+  const auto push = [](LongReal v) {  // u of  v = a + u/2, u = a + a³
+    LongReal a = v / 2;
+    for (int k = 0; k < 60; ++k) a -= (1.5L * a + a * a * a / 2 - v) / (1.5L + 1.5L * a * a);
+    return a + a * a * a;
+  };
+  const LongVector end = testing::extrapolated(
+      [push](LongReal t, const LongVector& y) {
+        return LongVector{{y[1], std::cos(t) - y[0] - push(y[1])}};
+      },
+      LongVector{{0.0L, 0.0L}}, 1.0L);
+  ASSERT_TRUE(first_order_motions(scene).by_force);
+  for (const auto& [method, order, steps] :
+       {std::tuple{std::string("type1/midpoint"), 2, 10L}, {gl(2), 4, 5L}, {gl(3), 6, 3L}}) {
+    std::array<double, 2> errors{};
+    for (std::size_t k = 0; k < 2; ++k) {
+      const long count = steps << k;
+      const Sample at = samples_of(std::make_shared<const Scene>(scene),
+                                   {.method = method, .step = 1.0 / static_cast<double>(count)}, count)
+                            .back();
+      errors.at(k) = std::max(std::abs(at.v[0] - static_cast<double>(end[1])),
+                              std::abs(at.lambda[0] + static_cast<double>(push(end[1]))));
+    }
+    EXPECT_NEAR(std::log2(errors[0] / errors[1]), order, 0.6)
+        << method << " errors " << errors[0] << " " << errors[1];
+  }
 }
 
 }  // namespace

@@ -34,12 +34,29 @@ TEST(LevelledStep, OrderIsTwiceTheStages) {
 
 TEST(LevelledStep, OrderWithConstraintsOfTwoLevels) {
   const DegenerateCase that = testing::lagging_servo();
-  EXPECT_EQ(first_order_motions(*that.scene).levels.size(), 2u);
+  EXPECT_EQ(first_order_motions(*that.scene).levels.count, 2);
   for (const auto& [s, steps] : {std::pair{1, 4L}, {2, 2L}}) {
     const double first = testing::error_at_end(that, gl(s), steps),
                  second = testing::error_at_end(that, gl(s), 2 * steps);
     EXPECT_NEAR(std::log2(first / second), 2.0 * s, 0.45) << s << " errors " << first << " " << second;
   }
+}
+
+TEST(LevelledStep, OrderWithConstraintsOfThreeLevels) {
+  const DegenerateCase that = testing::canonical_pendulum_by_multiplier();
+  EXPECT_EQ(first_order_motions(*that.scene).levels.count, 3);
+  for (const auto& [s, steps] : {std::pair{1, 20L}, {2, 5L}, {3, 4L}}) {
+    const double first = testing::error_at_end(that, gl(s), steps),
+                 second = testing::error_at_end(that, gl(s), 2 * steps);
+    EXPECT_NEAR(std::log2(first / second), 2.0 * s, 0.3) << s << " errors " << first << " " << second;
+  }
+}
+
+/// Five constraints tell all of five coordinates, so that what is left is round-off of the differences.
+TEST(LevelledStep, FollowsConstraintsOfFiveLevels) {
+  const DegenerateCase that = testing::far_servo();
+  EXPECT_EQ(first_order_motions(*that.scene).levels.count, 5);
+  EXPECT_LT(testing::error_at_end(that, gl(2), 5), 1e-7);
 }
 
 TEST(LevelledStep, JacobianAgreesWithDifferences) {
@@ -68,10 +85,10 @@ TEST(LevelledStep, KeepsAllConstraints) {
     for (const Sample& at : samples) {
       Vector w(at.v.size() + at.lambda.size());
       w << at.v, at.lambda;
-      const Vector off = equations.constraints(at.time, equations.state(at.q, at.p), w);
-      EXPECT_LT(max_norm(off), 1e-12) << that.scene->name << " t = " << at.time;
-      EXPECT_LT(max_norm(equations.evaluate(at.time, equations.state(at.q, at.p), w)), 1e-11)
-          << that.scene->name;
+      LevelledPoint there;
+      ASSERT_TRUE(equations.begin(at.time, equations.state(at.q, at.p), at.v, there));
+      EXPECT_LT(max_norm(there.constraints), 1e-12) << that.scene->name << " t = " << at.time;
+      EXPECT_LT(distance(there.w.head(w.size()), w), 1e-11) << that.scene->name;
     }
   }
 }
@@ -136,6 +153,35 @@ TEST(LevelledStep, StartsOffTheConstraintsAreToldAndMoved) {
   EXPECT_LT(std::abs(moved[0] * moved[0] + moved[1] * moved[1] - 1.0), 1e-13);
   EXPECT_LT(std::abs(moved[0] * moved[2] + moved[1] * moved[3]), 1e-13);
   EXPECT_LT(distance(moved, off.start.q), 0.2);
+}
+
+TEST(LevelledStep, ContradictionsAreToldWithAnEquation) {
+  Scene scene = testing::scene_of("two walls", {"x", "p", "a", "b"});
+  scene.lagrangian = lagrangian<4>([](const auto& q, const auto& v) {
+    return q[1] * v[0] - 0.5 * q[1] * q[1] + q[2] * (q[0] - 1.0) + q[3] * (q[0] - 2.0);
+  });
+  scene.start = {0.0, Vector{{1.0, 0.0, 0.0, 0.0}}, Vector::Zero(4)};
+  expect_misuse(
+      [&] {
+        (void)Integrator(std::make_shared<const Scene>(scene), Registry::with_built_ins(), kinsol(),
+                         {.method = gl(2), .step = 0.1});
+      },
+      {"'two walls'", "the equation of motion along '", "contradict each other"});
+}
+
+TEST(LevelledStep, TwoMultipliersOfOneRowAreNamed) {
+  Scene scene = testing::scene_of("twice", {"x", "y", "p", "r", "a", "b"});
+  scene.lagrangian = lagrangian<6>([](const auto& q, const auto& v) {
+    const auto rod = q[0] * q[0] + q[1] * q[1] - 1.0;
+    return q[2] * v[0] + q[3] * v[1] - 0.5 * (q[2] * q[2] + q[3] * q[3]) - q[1] + (q[4] + q[5]) * rod;
+  });
+  scene.start = {0.0, Vector{{1.0, 0.0, 0.0, 0.6, 0.0, -0.18}}, Vector::Zero(6)};
+  expect_misuse(
+      [&] {
+        (void)Integrator(std::make_shared<const Scene>(scene), Registry::with_built_ins(), kinsol(),
+                         {.method = gl(2), .step = 0.1});
+      },
+      {"'twice'", "the velocity along 'a-b'", "there twice"});
 }
 
 TEST(LevelledStep, WhatNothingDeterminesIsRefusedWithItsDirection) {
