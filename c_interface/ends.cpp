@@ -91,8 +91,7 @@ void tell_boundary(const BoundaryReport& report, diracstep_boundary& found) {
   if (report.action) {
     found.action = report.action->value;
     found.gradient = keep_entries(report.action->gradient);
-    if (report.action->hessian.size() > 0)
-      found.hessian = keep_matrix(report.action->hessian);
+    if (report.action->hessian.size() > 0) found.hessian = keep_matrix(report.action->hessian);
   }
   found.free_directions = report.free_directions;
   found.multipliers = static_cast<int>(report.multipliers.size());

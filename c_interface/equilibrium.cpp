@@ -19,12 +19,6 @@ void add_parts(const std::complex<double>& value, std::vector<double>& to) {
   to.insert(to.end(), {value.real(), value.imag()});
 }
 
-/// The scene with all its rows, whose forces are then the least ones.
-const Scene& scene_at_rest(const diracstep_model& model) {
-  const CatalogueScene& entry = entry_of(model);
-  return entry.events.empty() && entry.all_rows && !model.drop_redundant ? *entry.all_rows : *entry.scene;
-}
-
 /// Forces of the rows that are shown.
 Vector forces_at_rest(const diracstep_model& model, const Equilibrium& at) {
   const int shown = model.entry.shown().rows();
@@ -86,11 +80,20 @@ SmallMotionOptions modes_from(const diracstep_rest& rest) {
 
 void find(const diracstep_model& model, const diracstep_rest& rest, diracstep_equilibrium& found) {
   const SmallMotionOptions options = modes_from(rest);
-  const Scene& scene = scene_at_rest(model);
-  const Equilibrium at = find_equilibrium(scene, scene.start, rest.along != 0);
+  const CatalogueScene& entry = entry_of(model);
+  const bool all = entry.events.empty() && entry.all_rows && !model.drop_redundant;
+  std::shared_ptr<const Scene> scene = all ? entry.all_rows : entry.scene;
+  Equilibrium at = find_equilibrium(*scene, scene->start, rest.along != 0);
+  if (all && !at.ok()) {  // rows that depend on their surface alone bar the way there
+    Equilibrium by_independent = find_equilibrium(*entry.scene, entry.scene->start, rest.along != 0);
+    if (by_independent.ok()) {
+      scene = entry.scene;
+      at = std::move(by_independent);
+    }
+  }
   tell_point(model, at, found);
   if (!at.ok()) throw Failure("no equilibrium found: " + at.failure);
-  tell_motions(small_motions(scene, at, model.entry.t_end, options, largest_eigenpairs), found);
+  tell_motions(small_motions(*scene, at, entry.t_end, options, largest_eigenpairs), found);
 }
 
 std::vector<std::string> origins_of(const CatalogueScene& entry) {

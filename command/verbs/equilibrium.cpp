@@ -209,9 +209,20 @@ void draw(const EquilibriumArguments& options, const CatalogueScene& entry, cons
 
 void equilibrium(const EquilibriumArguments& options, Session& session) {
   CatalogueScene entry = make_scene(session, options.scene, parameters(options.set));
-  if (entry.events.empty() && entry.all_rows && !session.drop_redundant_rows) entry.scene = entry.all_rows;
+  const std::shared_ptr<const Scene> independent = entry.scene;
+  const bool all = entry.events.empty() && entry.all_rows && !session.drop_redundant_rows;
+  if (all) entry.scene = entry.all_rows;
   tell_events_left_out(entry);
-  const Found found = find(options, entry);
+  Found found = find(options, entry);
+  if (all && !found.at.ok()) {  // rows that depend on their surface alone bar the way there
+    CatalogueScene without = entry;
+    without.scene = independent;
+    Found by_independent = find(options, without);
+    if (by_independent.at.ok()) {
+      entry = std::move(without);
+      found = std::move(by_independent);
+    }
+  }
   print(options.json ? as_json(entry, found) : as_text(entry, found));
   if (found.small && !options.picture.empty()) draw(options, entry, found.small->modes, session);
   if (!found.at.ok()) {

@@ -1,5 +1,7 @@
 """Starts, equilibria and parameters from data."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -20,6 +22,16 @@ def test_an_equilibrium_and_its_eigenvalues(spring):
         spring.equilibrium(modes=0)
     with pytest.raises(ds.Misuse, match="along"):
         spring.equilibrium(along=1)
+
+
+def test_rows_that_depend_on_their_surface_alone():
+    """A pendulum on two rows for one circle, from where Newton's path ends: the search crashed."""
+    found = ds.Scene(["x", "y"], lambda q, v: v @ v / 2 - 9.81 * q.y, rows=lambda q: [q @ q - 1, (q @ q - 1) * (2 + q.x)],
+                     q=[1.0, 0.0]).equilibrium()
+    assert found.q == pytest.approx([0.0, -1.0], abs=1e-9) and found.eigenvalues.imag == pytest.approx([np.sqrt(9.81)])
+    assert found.lambda_ @ [1, 2] == pytest.approx(-9.81 / 2)  # the least that holds the weight: along (1, 2)
+    bricard = ds.load(Path(__file__).parents[2] / "examples" / "scenes" / "bricard.toml").equilibrium()
+    assert np.sin(bricard.q[::2]) == pytest.approx(np.ones(3)) and len(bricard.lambda_) == 5
 
 
 def test_modes_of_several_coordinates_stand_in_rows():
