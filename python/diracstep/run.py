@@ -214,9 +214,9 @@ class Run(Points):
 
         q, v: n numbers, or by coordinate; parameters: by name.  A product with jacobian(), which is taken for it.
         """
-        names, moved = self.scene.coordinates, parameters or {}
+        moved = parameters or {}
         direction = np.concatenate([np.zeros(len(names)) if given is None else column(given, names, what)
-                                    for given, what in ((q, "q"), (v, "v"))] + [[real(value, name) for name, value in moved.items()]])
+                                    for given, what, names in ((q, "q", self.scene.positions), (v, "v", self.scene.coordinates))] + [[real(value, name) for name, value in moved.items()]])
         found = self.jacobian(list(moved))
         return {what: getattr(found, what) @ direction for what in "qvp"}
 

@@ -65,7 +65,17 @@ def test_a_sphere_beside_its_closed_form():
 
 
 def test_what_knows_flat_scenes_only_says_so(top):
-    for call in (lambda: top.run(until=0.01).gradient({"q": [1, 0, 0, 0]}), lambda: top.boundary({"R_w": 1.0}),
-                 lambda: top.fit({"t": [0.1], "R_1": [1.0]}, ["m"]), lambda: top.equilibrium()):
-        with pytest.raises(ds.Misuse, match="SO3|R\\^n|space"):
+    for call in (lambda: top.run(until=0.01).gradient({"q": [1, 0, 0, 0]}), lambda: top.run(until=0.01).jvp(q=[1, 0, 0, 0]),
+                 lambda: top.boundary({"R_w": 1.0}), lambda: top.boundary([1.0, 0.0, 0.0, 0.0]),
+                 lambda: top.fit({"t": [0.1], "R_1": [1.0]}, ["m"])):
+        with pytest.raises(ds.Misuse, match="R\\^n"):
             call()
+
+
+@pytest.mark.parametrize("q, words", [([2.0, 0, 0, 0], "is not on SO3, by 1: .* length 1$"), ([0.0, 0, 0, 0], "one here has none"),
+                                      ([np.nan, 0, 0, 0], "finite numbers")])
+def test_a_start_that_is_no_rotation_is_refused(top, q, words):
+    with pytest.raises(ds.Misuse, match=words):
+        top.integrator(step=0.001).reset(q=q)
+    with pytest.raises(ds.Misuse, match=words):
+        top.ensemble([q], steps=1)
