@@ -26,6 +26,14 @@ Parameters named_values(int count, const diracstep_parameter* list, const char* 
   return values;
 }
 
+std::vector<std::string> texts_of(int count, const char* const* list, const char* what) {
+  std::vector<std::string> texts;
+  if (count > 0) (void)given(list, what);
+  for (int k = 0; k < count; ++k)
+    texts.emplace_back(&given(list[k], (std::string(what) + ", one of them,").c_str()));
+  return texts;
+}
+
 Momentum momentum_from(int momentum) {
   switch (momentum) {
     case DIRACSTEP_PROJECTED:

@@ -9,10 +9,7 @@ using namespace diracstep::c_interface;
 namespace {
 
 ParametricScene parametric(const diracstep_model& model, const diracstep_derivatives& wanted) {
-  std::vector<std::string> names;
-  if (wanted.parameters > 0) (void)given(wanted.parameter, "the list of parameters");
-  for (int k = 0; k < wanted.parameters; ++k)
-    names.emplace_back(&given(wanted.parameter[k], "the name of a parameter"));
+  const auto names = texts_of(wanted.parameters, wanted.parameter, "the list of parameters");
   if (names.empty()) return {model.entry.scene, nullptr};
   if (!model.text.empty())
     return parametric_scene_from_text(model.name, model.text, model.entry, names, model.changes);

@@ -1,11 +1,11 @@
 /* DiracStep from C and from every language that can call C: scenes from files, from text or made of
  * callbacks, plans, runs into the caller's arrays, single steps, ensembles, motions between two ends, optimal
- * control.  Link libdiracstep.
+ * control, equilibria, parameters from data.  Link libdiracstep.
  *
  * Every function that can fail returns DIRACSTEP_OK or one of the codes below it; diracstep_message says what
- * happened.  Structs that are all zero are the defaults.  Columns of a point hold n numbers (coordinates), m
- * numbers (rows), i numbers (invariants) or o numbers (outputs): see diracstep_facts.  Units are those of the
- * scene.
+ * happened.  Structs that are all zero are the defaults.  Columns of a point hold n numbers (coordinates), s
+ * numbers (q; s = n in R^n, more where it is stored on groups and spheres: docs/manifolds.md), m numbers
+ * (rows), i numbers (invariants) or o numbers (outputs): see diracstep_facts.  Units are those of the scene.
  *
  * Events of a scene (docs/events.md) are looked for by runs, searches, ensembles and single steps, and act.
  *
@@ -24,7 +24,7 @@ extern "C" {
 
 /* Raised when a struct here or in diracstep_scene.h, or what a function does, changes; not for new functions.
  */
-#define DIRACSTEP_VERSION_OF_C_INTERFACE 6u
+#define DIRACSTEP_VERSION_OF_C_INTERFACE 7u
 
 #if defined(_WIN32)
 #define DIRACSTEP_API __declspec(dllexport)
@@ -87,11 +87,12 @@ DIRACSTEP_API void diracstep_close(diracstep_model *model);
 /* Sizes and times of a scene.  What it points to is there as long as the model. */
 typedef struct diracstep_facts {
   int dimension;  /* n */
+  int storage;    /* s */
   int rows;       /* m, those that are off at the start included */
   int invariants; /* i */
   int outputs;    /* o */
   double start_time;
-  const double *start_q, *start_v; /* n numbers */
+  const double *start_q, *start_v; /* s and n numbers */
   double end_time;                 /* where a run ends that is given no other end */
   double step;                     /* a coarse but sensible step */
 } diracstep_facts;
@@ -118,9 +119,65 @@ enum {
   DIRACSTEP_PLUGINS,     /* name, path, description */
   DIRACSTEP_OUTPUTS,     /* name */
   DIRACSTEP_INPUTS,      /* name, times between which the table has values; none outside */
-  DIRACSTEP_EVENTS       /* name, "record", "stop" or "act" */
+  DIRACSTEP_EVENTS,      /* name, "record", "stop" or "act" */
+  DIRACSTEP_POSITIONS    /* name of each number of q: the coordinates in R^n */
 };
 DIRACSTEP_API int diracstep_list(const diracstep_model *model, int what, diracstep_table *table);
+
+/* One point of the motion.  Columns that are NULL are not written. */
+typedef struct diracstep_state {
+  double time;
+  double energy;
+  double *q;      /* s numbers */
+  double *v;      /* n numbers, in the distribution */
+  double *p;      /* the representative asked for */
+  double *lambda; /* forces of the rows, 0 of those that are off */
+  double *invariants;
+  double *outputs; /* of the scene's file */
+} diracstep_state;
+
+/* Solves the start as the first step takes it: places and velocities that the file leaves open, momenta
+ * projected, forces of rows, and the acceleration, n numbers or NULL, NaN where L is linear in v.  `origins`,
+ * or NULL: name, "given", "guess", "rate" or "left out", value in the file, for q and then for v or p; of
+ * scenes that are not from files no rows. */
+DIRACSTEP_API int diracstep_solve_start(const diracstep_model *model, diracstep_state *state,
+                                        double *acceleration, diracstep_table *origins);
+
+/* ---- Equilibria (docs/equilibria.md) ---- */
+
+/* What is looked for. */
+typedef struct diracstep_rest {
+  int along;  /* 1: a steady motion, in which coordinates with a velocity at the start keep moving */
+  int modes;  /* so many modes, by sparse matrices; 0: all by full ones, or of a large scene ten … */
+  int nearby; /* 1: by sparse matrices those nearest to `near`, else the slowest */
+  double near;
+} diracstep_rest;
+
+/* What was found.  Texts and numbers are valid until the next call of this thread; matrices stand row by row,
+ * NULL where they are sparse. */
+typedef struct diracstep_equilibrium {
+  double time;
+  int iterations;
+  const double *q, *v, *lambda; /* s, n and m numbers */
+  int modes;
+  const double
+      *eigenvalue;       /* modes × 2, real and imaginary part, of a pair that with imaginary part above 0 */
+  const double *shape;   /* modes × n × 2, the largest component 1 */
+  int zeros;             /* further eigenvalues, which are 0 */
+  const char *stability; /* in words */
+  double near;           /* the number that the modes are nearest to; NaN where they are all */
+  double variation;      /* of the linear equations on the way to the end of the scene, of their size */
+  int redundant_rows;
+  int positions, velocities; /* P and U, the degrees of freedom: δq = N y, δv = S u + D y … */
+  const double *of_positions, *of_velocities, *drift; /* N, n × P; S, n × U; D, n × P … */
+  const double *mass, *damping, *stiffness;           /* … U × U, U × U, U × P */
+  const char *doubt;                                  /* "", or why eigenvalues are not to be believed */
+} diracstep_equilibrium;
+
+/* Finds where the scene rests, its start as the guess, and its small motions there; events are not looked
+ * for.  DIRACSTEP_FAILED where none is found: q, v and lambda are then where the search has ended. */
+DIRACSTEP_API int diracstep_find_equilibrium(const diracstep_model *model, const diracstep_rest *rest,
+                                             diracstep_equilibrium *found);
 
 /* ---- Integrators ---- */
 
@@ -148,18 +205,6 @@ typedef struct diracstep_options {
   double smallest_step; /* of steps that vary, without sign; 0: 1e-9 of the time to the end */
   long max_steps;       /* of steps that vary: the next one fails; 0: ten million */
 } diracstep_options;
-
-/* One point of the motion.  Columns that are NULL are not written. */
-typedef struct diracstep_state {
-  double time;
-  double energy;
-  double *q;
-  double *v;      /* in the distribution */
-  double *p;      /* the representative asked for */
-  double *lambda; /* forces of the rows, 0 of those that are off */
-  double *invariants;
-  double *outputs; /* of the scene's file */
-} diracstep_state;
 
 typedef struct diracstep_integrator diracstep_integrator;
 
@@ -227,7 +272,7 @@ DIRACSTEP_API int diracstep_read_statistics(const diracstep_integrator *integrat
 typedef struct diracstep_event {
   const char *name;
   double time;
-  const double *q, *v;             /* n numbers: the point just before … */
+  const double *q, *v;             /* s and n numbers: the point just before … */
   const double *after_q, *after_v; /* … and what the event made of it; NULL where it does not act */
   double impulse; /* Λ_c of a contact, momentum over the unit of its row; NaN where there is none */
 } diracstep_event;
@@ -246,7 +291,7 @@ typedef struct diracstep_points {
   long room;                                         /* points for which there is room */
   long count;                                        /* points written */
   double *t;                                         /* room numbers */
-  double *q, *v, *p, *lambda, *invariants, *outputs; /* room × n, n, n, m, i, o */
+  double *q, *v, *p, *lambda, *invariants, *outputs; /* room × s, n, n, m, i, o */
   double *energy;
   /* Called when there is no room for the next point: enlarges the arrays and `room`, and returns 0.  Where it
    * is NULL or returns anything else the run fails there. */
@@ -331,13 +376,53 @@ typedef struct diracstep_derivatives {
 DIRACSTEP_API int diracstep_differentiate(const diracstep_model *model, diracstep_integrator *integrator,
                                           const diracstep_derivatives *derivatives);
 
+/* ---- Parameters from data ---- */
+
+/* Measured numbers, and which parameters of the scene are fitted to them. */
+typedef struct diracstep_data {
+  const char *file;          /* CSV: t, then columns; an empty field was not measured.  Or NULL: */
+  int columns;               /* how many … */
+  const char *const *column; /* … coordinates, "v_" before one for its velocity, outputs … */
+  long rows;
+  const double *time;  /* … at these times, which ascend … */
+  const double *value; /* … rows × columns, NaN where nothing was measured */
+  int sigmas;          /* columns whose standard deviation, or that in relation to others, is not 1 … */
+  const diracstep_parameter *sigma; /* … and they */
+  int parameters;                   /* P … */
+  const char *const *parameter;     /* … which begin with the values of the model, or with … */
+  int starts;
+  const diracstep_parameter *start;
+  double confidence; /* of the intervals; 0: 0.95 */
+  int max_motions;   /* that the search may take; 0: 200 */
+  const int *stop;   /* or NULL, looked at in each step */
+} diracstep_data;
+
+/* What was found.  Texts and numbers are valid until the next call of this thread. */
+typedef struct diracstep_fitted {
+  int motions;              /* that were taken */
+  long measured;            /* numbers that were */
+  double residual;          /* standard deviation of what is left, in units of sigma */
+  const double *value;      /* P numbers … */
+  const double *interval;   /* … what their confidence interval is to both sides, infinite where the data do
+                             * not determine one … */
+  const double *covariance; /* … P × P */
+  const char *ending;       /* of the search, in words */
+  const char *doubt;        /* "", or why the parameters are not to be believed */
+} diracstep_fitted;
+
+/* Fits parameters of a scene from a file or text by least squares.  Of the options method, order, step (the
+ * largest; between two times so many equal ones are taken), rule, solver and jacobian count.
+ * DIRACSTEP_FAILED where the search does not converge: `found` is then the best so far. */
+DIRACSTEP_API int diracstep_fit(const diracstep_model *model, const diracstep_options *options,
+                                const diracstep_data *data, diracstep_fitted *found);
+
 /* ---- Ensembles ---- */
 
 /* Many starts of one scene, each of them consistent. */
 typedef struct diracstep_ensemble {
   int members;
   const double *time;  /* or NULL: all at the scene's; equal ones where steps is 0 */
-  const double *q, *v; /* members × n; v may be NULL: the scene's */
+  const double *q, *v; /* members × s, n; v may be NULL: the scene's */
   long steps;          /* 0: to the end that the options give */
   int momentum;
   int threads;     /* 0: one for each processor.  Results are the same bits for every number */

@@ -5,6 +5,7 @@
 #include <diracstep/c_interface/point_writer.hpp>
 #include <diracstep/core/runs/run.hpp>
 #include <diracstep/scene_format/parametric_scene_file.hpp>
+#include <diracstep/scene_format/position_names.hpp>
 
 using namespace diracstep;
 using namespace diracstep::c_interface;
@@ -15,7 +16,8 @@ namespace {
 struct EqualSteps {
   EqualSteps(const diracstep_model& model, const diracstep_options& given)
       : solvers(solvers_from(given)), options(stepping_from(model, given)) {
-    if (!entry_of(model).events.empty())
+    require_flat(*entry_of(model).scene, "a search for a motion between two ends");
+    if (!model.entry.events.empty())
       throw Misuse(
           "a motion between two ends does not go with the events of the scene: when one is met is not known "
           "before");
@@ -68,17 +70,6 @@ void write_nodes(const diracstep_model& model, const Report& report, diracstep_p
   }
 }
 
-const double* keep_numbers(std::vector<double> numbers) {
-  const auto kept = std::make_shared<const std::vector<double>>(std::move(numbers));
-  keep(kept);
-  return kept->data();
-}
-
-template <class Numbers>
-const double* keep_entries(const Numbers& numbers) {
-  return keep_numbers({numbers.data(), numbers.data() + numbers.size()});
-}
-
 BoundaryConditions conditions_of_boundary(const diracstep_model& model, const diracstep_ends& ends) {
   const NamedNumbers start = named_values(ends.of_start, ends.at_start, "number asked of the start"),
                      end = named_values(ends.of_end, ends.at_end, "number asked of the end");
@@ -100,8 +91,7 @@ void tell_boundary(const BoundaryReport& report, diracstep_boundary& found) {
   if (report.action) {
     found.action = report.action->value;
     found.gradient = keep_entries(report.action->gradient);
-    if (report.action->hessian.size() > 0)
-      found.hessian = keep_entries(Columns(report.action->hessian.transpose()));
+    if (report.action->hessian.size() > 0) found.hessian = keep_matrix(report.action->hessian);
   }
   found.free_directions = report.free_directions;
   found.multipliers = static_cast<int>(report.multipliers.size());

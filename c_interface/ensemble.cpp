@@ -8,14 +8,15 @@ using namespace diracstep::c_interface;
 namespace {
 
 std::vector<Start> starts_of(const diracstep_model& model, const diracstep_ensemble& ensemble) {
-  const int n = model.scene->dimension();
+  const auto n = static_cast<std::size_t>(model.scene->dimension()),
+             s = static_cast<std::size_t>(model.scene->storage_size());
   const double* const q = &given(ensemble.q, "the list of starts q");
   std::vector<Start> starts(static_cast<std::size_t>(ensemble.members), model.scene->start);
   for (std::size_t k = 0; k < starts.size(); ++k) {
-    const std::size_t row = k * static_cast<std::size_t>(n);
     if (ensemble.time != nullptr) starts[k].time = ensemble.time[k];
-    starts[k].q = Eigen::Map<const Vector>(q + row, n);
-    if (ensemble.v != nullptr) starts[k].v = Eigen::Map<const Vector>(ensemble.v + row, n);
+    starts[k].q = Eigen::Map<const Vector>(q + k * s, static_cast<Eigen::Index>(s));
+    if (ensemble.v != nullptr)
+      starts[k].v = Eigen::Map<const Vector>(ensemble.v + k * n, static_cast<Eigen::Index>(n));
   }
   return starts;
 }

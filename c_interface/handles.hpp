@@ -22,6 +22,7 @@ struct diracstep_model {
   std::shared_ptr<const diracstep::Scene> scene;  ///< completed
   std::string name, text;                         ///< what the scene was made from, where it is from a file
   diracstep::Parameters changes;
+  bool drop_redundant = false;
 };
 
 namespace diracstep::c_interface {
@@ -114,6 +115,18 @@ diracstep_table keep(int columns, std::vector<std::string> cells);
 /// What C reads that is neither.
 void keep(std::shared_ptr<const void> owner);
 
+/// Numbers in the order they lie in memory: those of a matrix column by column.  Null for none.
+const double* keep_numbers(std::vector<double> numbers);
+template <class Numbers>
+const double* keep_entries(const Numbers& numbers) {
+  return numbers.size() > 0 ? keep_numbers({numbers.data(), numbers.data() + numbers.size()}) : nullptr;
+}
+
+/// Row by row.
+inline const double* keep_matrix(const Columns& matrix) { return keep_entries(Columns(matrix.transpose())); }
+
+/// So many texts; throws Misuse where one is NULL, `what` they are.
+std::vector<std::string> texts_of(int count, const char* const* list, const char* what);
 /// So many numbers by name; throws Misuse where one has none, `what` it is.
 Parameters named_values(int count, const diracstep_parameter* list, const char* what);
 

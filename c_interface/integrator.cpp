@@ -106,10 +106,6 @@ void read_parameters(SnapshotReader& from, const Parameters& parameters) {
                    " = " + to_text(value));
 }
 
-Eigen::Map<const Vector> column(const double* numbers, const diracstep_integrator& handle) {
-  return {numbers, handle.scene->dimension()};
-}
-
 }  // namespace
 
 FixedMotion& c_interface::fixed_of(const diracstep_integrator& handle, const char* what) {
@@ -200,7 +196,9 @@ int diracstep_reset(diracstep_integrator* integrator, double time, const double*
     diracstep_integrator& handle = given(integrator, "the integrator");
     if ((q == nullptr) != (v == nullptr)) throw Misuse("only one of q and v is NULL; both or none must be");
     const std::optional<Start> start =
-        q == nullptr ? std::nullopt : std::optional<Start>({time, column(q, handle), column(v, handle), {}});
+        q == nullptr ? std::nullopt
+                     : std::optional<Start>({time, Eigen::Map<const Vector>(q, handle.scene->storage_size()),
+                                             Eigen::Map<const Vector>(v, handle.scene->dimension())});
     FixedMotion* const fixed = start ? &fixed_of(handle, "another start") : nullptr;
     handle.doubt.clear();
     handle.checks.clear();

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <diracstep/c_interface/handles.hpp>
+#include <diracstep/scene_format/position_names.hpp>
 
 using namespace diracstep;
 using namespace diracstep::c_interface;
@@ -134,6 +135,8 @@ diracstep_table list(const diracstep_model& model, int what) {
       return keep(3, inputs(entry_of(model)));
     case DIRACSTEP_EVENTS:
       return keep(2, events(entry_of(model)));
+    case DIRACSTEP_POSITIONS:
+      return keep(1, position_names(*entry_of(model).scene));
     case DIRACSTEP_PARAMETERS:
       return keep(4, parameters(entry_of(model)));
     default:

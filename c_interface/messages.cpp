@@ -69,6 +69,13 @@ diracstep_table keep(int columns, std::vector<std::string> cells) {
 
 void keep(std::shared_ptr<const void> owner) { answers().others.push_back(std::move(owner)); }
 
+const double* keep_numbers(std::vector<double> numbers) {
+  if (numbers.empty()) return nullptr;
+  const auto kept = std::make_shared<const std::vector<double>>(std::move(numbers));
+  keep(kept);
+  return kept->data();
+}
+
 bool stopped(const int* flag) {
   return flag != nullptr &&
          std::atomic_ref<int>(const_cast<int&>(*flag)).load(std::memory_order_relaxed) != 0;

@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <diracstep/c_interface/handles.hpp>
 #include <diracstep/plugins/callback_scene.hpp>
-#include <diracstep/scene_format/position_names.hpp>
 #include <diracstep/scene_format/scene_file.hpp>
 
 using namespace diracstep;
@@ -106,11 +105,11 @@ int diracstep_open(unsigned version, const diracstep_source* source, diracstep_m
       made->name = from.name != nullptr ? from.name : "text";
       if (from.text != nullptr) made->text = from.text;
       made->changes = named_values(from.parameters, from.parameter, "parameter");
+      made->drop_redundant = from.drop_redundant != 0;
       const bool refused = made->entry.scene->refuse_redundant_rows;
       const bool of_a_file = made->entry.stated_start.has_value();  // which has left them out
       if (refused ? from.drop_redundant != 0 : !of_a_file) drop_redundant_rows(made->entry);
       set_tolerances(made->entry, named_values(from.tolerances, from.tolerance, "tolerance"));
-      require_flat(*made->entry.scene, "the interface of C, and with it those of Python and Julia,");
       made->scene = completed(made->entry.scene);
     }
     *model = made.release();
@@ -125,6 +124,7 @@ int diracstep_read_facts(const diracstep_model* model, diracstep_facts* facts) {
     const CatalogueScene& entry = entry_of(from);
     const Start& start = from.scene->start;
     given(facts, "where the facts go") = {from.scene->dimension(),
+                                          from.scene->storage_size(),
                                           entry.shown().rows(),
                                           static_cast<int>(entry.invariants.size()),
                                           static_cast<int>(entry.outputs.size()),

@@ -50,8 +50,17 @@ class CallbackLagrangian final : public Lagrangian {
     return f;
   }
 
+  /// Differences are judged at points of the motion, which this is taken at: errors of forces by the energies
+  /// of forces and of the motion, those of momenta by energies of any kind.
   void gradient(double t, ConstVectorRef x, ConstVectorRef y, VectorRef fx, VectorRef fy) const override {
-    gradient_noted(t, x, y, fx, fy, f_.gradient == nullptr);
+    if (f_.gradient != nullptr) return call_gradient(t, x, y, fx, fy);
+    gradient_by_differences([&](ConstVectorRef shifted) { return value(t, shifted, y); }, x, fx, origin_.q,
+                            origin_.quality.get());
+    gradient_by_differences([&](ConstVectorRef shifted) { return value(t, x, shifted); }, y, fy, origin_.v,
+                            origin_.speed_quality.get());
+    if (!origin_.quality || !origin_.speed_quality) return;
+    origin_.quality->note_size(fy.dot(y));
+    origin_.speed_quality->note_size(origin_.quality->largest_energy());
   }
 
   void hessian(double t, ConstVectorRef x, ConstVectorRef y, VectorRef fxx, VectorRef fxy,
@@ -62,43 +71,45 @@ class CallbackLagrangian final : public Lagrangian {
       });
     Vector other(dimension());
     const Noise noise = noise_at(t, x, y);
-    differences_.evaluate([&](ConstVectorRef q, VectorRef fx) { gradient_noted(t, q, y, fx, other, false); },
+    differences_.evaluate([&](ConstVectorRef q, VectorRef fx) { gradient_of(Half::x, t, q, y, fx, other); },
                           x, fxx, origin_.q, nullptr, noise.x);
-    differences_.evaluate([&](ConstVectorRef v, VectorRef fx) { gradient_noted(t, x, v, fx, other, false); },
+    differences_.evaluate([&](ConstVectorRef v, VectorRef fx) { gradient_of(Half::x, t, x, v, fx, other); },
                           y, fxy, origin_.v, nullptr, noise.x);
-    differences_.evaluate([&](ConstVectorRef v, VectorRef fy) { gradient_noted(t, x, v, other, fy, false); },
+    differences_.evaluate([&](ConstVectorRef v, VectorRef fy) { gradient_of(Half::y, t, x, v, fy, other); },
                           y, fyy, origin_.v, nullptr, noise.y);
   }
 
   void gradient_rate(double t, ConstVectorRef x, ConstVectorRef y, VectorRef fyt) const override {
-    Vector fx(dimension());
-    rate_by_differences([&](double s, VectorRef fy) { gradient_noted(s, x, y, fx, fy, false); }, t, fyt,
+    Vector other(dimension());
+    rate_by_differences([&](double s, VectorRef fy) { gradient_of(Half::y, s, x, y, fy, other); }, t, fyt,
                         origin_.time_scale, noise_at(t, x, y).y);
   }
 
   void position_gradient_rate(double t, ConstVectorRef x, ConstVectorRef y, VectorRef fxt) const override {
-    Vector fy(dimension());
-    rate_by_differences([&](double s, VectorRef fx) { gradient_noted(s, x, y, fx, fy, false); }, t, fxt,
+    Vector other(dimension());
+    rate_by_differences([&](double s, VectorRef fx) { gradient_of(Half::x, s, x, y, fx, other); }, t, fxt,
                         origin_.time_scale, noise_at(t, x, y).x);
   }
 
  private:
-  /// The gradient; `noted`: at a point of the motion, where differences are judged.  Errors of forces are
-  /// measured by the energies of forces and of the motion, those of momenta by energies of any kind.
-  void gradient_noted(double t, ConstVectorRef x, ConstVectorRef y, VectorRef fx, VectorRef fy,
-                      bool noted) const {
+  void call_gradient(double t, ConstVectorRef x, ConstVectorRef y, VectorRef fx, VectorRef fy) const {
+    call(origin_.owner, "lagrangian.gradient",
+         [&] { return f_.gradient(f_.data, t, x.data(), y.data(), fx.data(), fy.data()); });
+  }
+
+  enum class Half { x, y };
+  /// Half of the gradient, beside a point of the motion: nothing is judged there.  `other` may receive the
+  /// other half.
+  void gradient_of(Half half, double t, ConstVectorRef x, ConstVectorRef y, VectorRef wanted,
+                   VectorRef other) const {
     if (f_.gradient != nullptr)
-      return call(origin_.owner, "lagrangian.gradient",
-                  [&] { return f_.gradient(f_.data, t, x.data(), y.data(), fx.data(), fy.data()); });
-    DifferenceQuality* const quality = noted ? origin_.quality.get() : nullptr;
-    DifferenceQuality* const speed_quality = noted ? origin_.speed_quality.get() : nullptr;
-    gradient_by_differences([&](ConstVectorRef shifted) { return value(t, shifted, y); }, x, fx, origin_.q,
-                            quality);
-    gradient_by_differences([&](ConstVectorRef shifted) { return value(t, x, shifted); }, y, fy, origin_.v,
-                            speed_quality);
-    if (quality == nullptr || speed_quality == nullptr) return;
-    quality->note_size(fy.dot(y));
-    speed_quality->note_size(quality->largest_energy());
+      return half == Half::x ? call_gradient(t, x, y, wanted, other) : call_gradient(t, x, y, other, wanted);
+    if (half == Half::x)
+      gradient_by_differences([&](ConstVectorRef shifted) { return value(t, shifted, y); }, x, wanted,
+                              origin_.q, nullptr);
+    else
+      gradient_by_differences([&](ConstVectorRef shifted) { return value(t, x, shifted); }, y, wanted,
+                              origin_.v, nullptr);
   }
 
   /// What differences of L lose of the gradient; empty where callbacks give it.

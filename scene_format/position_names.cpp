@@ -3,6 +3,7 @@
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/spaces/space.hpp>
 #include <diracstep/scene_format/position_names.hpp>
+#include <diracstep/scene_format/scene_catalogue.hpp>
 #include <diracstep/scene_format/spaces/factor_texts.hpp>
 
 namespace diracstep {
@@ -51,6 +52,19 @@ std::vector<std::string> position_names(const Scene& scene) {
     names.insert(names.end(), texts.stored.begin(), texts.stored.end());
   }
   return names;
+}
+
+const char* describe(StartOrigin origin) {
+  switch (origin) {
+    case StartOrigin::given:
+      return "given";
+    case StartOrigin::guess:
+      return "guess";
+    case StartOrigin::rate:
+      return "rate";
+    default:
+      return "left out";
+  }
 }
 
 void require_flat(const Scene& scene, const std::string& what) {

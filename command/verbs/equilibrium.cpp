@@ -5,8 +5,7 @@
 #include <cmath>
 #include <diracstep/command/arguments.hpp>
 #include <diracstep/command/verbs.hpp>
-#include <diracstep/core/equilibrium/eigenmodes.hpp>
-#include <diracstep/core/equilibrium/sparse_modes.hpp>
+#include <diracstep/core/equilibrium/small_motions.hpp>
 #include <diracstep/eigenvalues/largest_eigenpairs.hpp>
 #include <diracstep/reports/json.hpp>
 #include <diracstep/reports/modes_plot.hpp>
@@ -34,69 +33,18 @@ struct EquilibriumArguments {
 /// What was found, and what it means for small motions where something was.
 struct Found {
   Equilibrium at;
-  std::optional<Linearisation> linear;  ///< by full matrices
-  std::optional<NearestModes> nearest;  ///< by sparse ones
-  std::optional<Eigenmodes> modes;
-  std::string doubt;
+  std::optional<SmallMotions> small;
 };
 
-constexpr double steady = 1e-7;              // relative change of the linear equations along a motion
 constexpr std::size_t shown_components = 6;  // of a mode
 constexpr double shown_from = 1e-3;          // of its largest
 constexpr int shown_coordinates = 40;
-constexpr int default_modes = 10;  // of a scene that is too large for full matrices
-
-/// A kink of the formulas at the point, across which derivatives jump; empty where there is none.
-std::string kink_there(const Scene& scene, const Equilibrium& at) {
-  constexpr double beside = 1e-7;  // of the largest coordinate or velocity
-  if (!scene.kinks || scene.kinks->count() == 0 || scene.space) return {};
-  Vector here(scene.kinks->count()), before = here, behind = here;
-  scene.kinks->evaluate(at.time, at.q, at.v, here);
-  const double largest = std::max(at.q.lpNorm<Eigen::Infinity>(), scene.start.q.lpNorm<Eigen::Infinity>());
-  const double step = beside * (largest > 0.0 ? largest : 1.0);
-  for (const bool moves : {false, true})
-    for (Eigen::Index i = 0; i < at.q.size(); ++i) {
-      Vector q = at.q, v = at.v;
-      double& moved = moves ? v[i] : q[i];
-      const double value = moved;
-      moved = value - step;
-      scene.kinks->evaluate(at.time, q, v, before);
-      moved = value + step;
-      scene.kinks->evaluate(at.time, q, v, behind);
-      for (Eigen::Index k = 0; k < here.size(); ++k)
-        if (const auto number = static_cast<std::size_t>(k);
-            scene.kinks->kinds()[number] == Kinks::Kind::kink && before[k] * behind[k] < 0.0)
-          return fmt::format(
-              "the formulas have a kink there ({}): derivatives differ on its two sides, and eigenvalues by "
-              "one of them tell nothing of the motion",
-              scene.kinks->names()[number]);
-    }
-  return {};
-}
 
 Found find(const EquilibriumArguments& options, const CatalogueScene& entry) {
-  Found found{find_equilibrium(*entry.scene, entry.scene->start, options.along), {}, {}, {}, {}};
-  if (!found.at.ok()) return found;
-  const Scene& scene = *entry.scene;
-  double variation = 0.0;
-  if (options.modes || options.near || needs_sparse_matrices(scene)) {
-    found.nearest = nearest_modes(scene, found.at, options.modes.value_or(default_modes), options.near,
-                                  entry.t_end, largest_eigenpairs);
-    found.modes = found.nearest->found;
-    variation = found.nearest->variation;
-  } else {
-    found.linear = linearise(scene, found.at, entry.t_end);
-    found.modes = eigenmodes(*found.linear);
-    variation = found.linear->variation;
-  }
-  if (found.nearest && !found.nearest->failure.empty())
-    found.doubt = found.nearest->failure;
-  else if (!(variation <= steady))
-    found.doubt = fmt::format(
-        "the linear equations change by {:.2g} of their size {} until t = {:g}: the eigenvalues hold at "
-        "t = {:g} only",
-        variation, options.along ? "along the motion" : "with the time", entry.t_end, found.at.time);
-  if (found.doubt.empty()) found.doubt = kink_there(scene, found.at);
+  Found found{find_equilibrium(*entry.scene, entry.scene->start, options.along), {}};
+  if (found.at.ok())
+    found.small =
+        small_motions(*entry.scene, found.at, entry.t_end, {options.modes, options.near}, largest_eigenpairs);
   return found;
 }
 
@@ -172,18 +120,20 @@ std::string as_text(const CatalogueScene& entry, const Found& found) {
                                  : moves        ? "a steady motion"
                                                 : "at rest",
                                  found.at.iterations, point_text(entry, found.at));
-  if (found.nearest)
+  if (!found.small) return text;
+  const SmallMotions& small = *found.small;
+  if (small.nearest)
     text += fmt::format("the eigenvalues nearest to {:.6g}, by sparse matrices\n\n{}of these: {}\n",
-                        found.nearest->near, modes_text(*entry.scene, *found.modes),
-                        describe(found.modes->stability));
-  if (!found.linear) return text;
-  const Linearisation& linear = *found.linear;
+                        small.nearest->near, modes_text(*entry.scene, small.modes),
+                        describe(small.modes.stability));
+  if (!small.linear) return text;
+  const Linearisation& linear = *small.linear;
   text += fmt::format("degrees of freedom: {} of position, {} of velocity\n", linear.positions.cols(),
                       linear.velocities.cols());
   if (linear.redundant_rows > 0)
     text += fmt::format("redundant constraints there: {}; the forces of rows are the least that hold it\n",
                         linear.redundant_rows);
-  return text + '\n' + modes_text(*entry.scene, *found.modes) + describe(found.modes->stability) + '\n';
+  return text + '\n' + modes_text(*entry.scene, small.modes) + describe(small.modes.stability) + '\n';
 }
 
 Json numbers_by_name(const std::vector<std::string>& names, const Vector& values,
@@ -212,19 +162,9 @@ Json mode_json(const Scene& scene, const Mode& mode) {
   return {{"eigenvalue", {mode.eigenvalue.real(), mode.eigenvalue.imag()}}, {"mode", shape}};
 }
 
-std::string as_json(const CatalogueScene& entry, const Found& found) {
-  const Scene& scene = *entry.scene;
-  Json json{{"scene", scene.name}, {"parameters", Json::object()}};
-  for (const auto& [key, value] : entry.parameters) json["parameters"][key] = Json(value);
-  json["status"] = !found.at.ok() ? found.at.failure : found.doubt.empty() ? "ok" : "doubted";
-  json["doubt"] = found.doubt.empty() ? Json(nullptr) : Json(found.doubt);
-  json["t"] = found.at.time;
-  json["iterations"] = found.at.iterations;
-  json["q"] = numbers_by_name(position_names(scene), found.at.q);
-  json["v"] = numbers_by_name(scene.coordinates, found.at.v);
-  json["lambda"] = numbers_by_name(scene.row_names(), found.at.lambda);
-  if (found.linear) {
-    const Linearisation& linear = *found.linear;
+void add_small_motions(Json& json, const Scene& scene, const SmallMotions& small) {
+  if (small.linear) {
+    const Linearisation& linear = *small.linear;
     json["redundant_rows"] = linear.redundant_rows;
     json["variation"] = linear.variation;
     json["positions"] = matrix_json(linear.positions);
@@ -234,16 +174,29 @@ std::string as_json(const CatalogueScene& entry, const Found& found) {
     json["damping"] = matrix_json(linear.damping);
     json["stiffness"] = matrix_json(linear.stiffness);
   }
-  if (found.nearest) {
-    json["near"] = found.nearest->near;
-    json["variation"] = found.nearest->variation;
+  if (small.nearest) {
+    json["near"] = small.nearest->near;
+    json["variation"] = small.nearest->variation;
   }
-  if (found.modes) {
-    json["zero_eigenvalues"] = found.modes->zeros;
-    json["stability"] = describe(found.modes->stability);
-    json["modes"] = Json::array();
-    for (const Mode& mode : found.modes->modes) json["modes"].push_back(mode_json(scene, mode));
-  }
+  json["zero_eigenvalues"] = small.modes.zeros;
+  json["stability"] = describe(small.modes.stability);
+  json["modes"] = Json::array();
+  for (const Mode& mode : small.modes.modes) json["modes"].push_back(mode_json(scene, mode));
+}
+
+std::string as_json(const CatalogueScene& entry, const Found& found) {
+  const Scene& scene = *entry.scene;
+  Json json{{"scene", scene.name}, {"parameters", Json::object()}};
+  for (const auto& [key, value] : entry.parameters) json["parameters"][key] = Json(value);
+  const std::string doubt = found.small ? found.small->doubt : "";
+  json["status"] = !found.at.ok() ? found.at.failure : doubt.empty() ? "ok" : "doubted";
+  json["doubt"] = doubt.empty() ? Json(nullptr) : Json(doubt);
+  json["t"] = found.at.time;
+  json["iterations"] = found.at.iterations;
+  json["q"] = numbers_by_name(position_names(scene), found.at.q);
+  json["v"] = numbers_by_name(scene.coordinates, found.at.v);
+  json["lambda"] = numbers_by_name(scene.row_names(), found.at.lambda);
+  if (found.small) add_small_motions(json, scene, *found.small);
   return to_text(json, 2) + '\n';
 }
 
@@ -257,16 +210,27 @@ void draw(const EquilibriumArguments& options, const CatalogueScene& entry, cons
 
 void equilibrium(const EquilibriumArguments& options, Session& session) {
   CatalogueScene entry = make_scene(session, options.scene, parameters(options.set));
-  if (entry.events.empty() && entry.all_rows && !session.drop_redundant_rows) entry.scene = entry.all_rows;
+  const std::shared_ptr<const Scene> independent = entry.scene;
+  const bool all = entry.events.empty() && entry.all_rows && !session.drop_redundant_rows;
+  if (all) entry.scene = entry.all_rows;
   tell_events_left_out(entry);
-  const Found found = find(options, entry);
+  Found found = find(options, entry);
+  if (all && !found.at.ok()) {  // rows that depend on their surface alone bar the way there
+    CatalogueScene without = entry;
+    without.scene = independent;
+    Found by_independent = find(options, without);
+    if (by_independent.at.ok()) {
+      entry = std::move(without);
+      found = std::move(by_independent);
+    }
+  }
   print(options.json ? as_json(entry, found) : as_text(entry, found));
-  if (found.modes && !options.picture.empty()) draw(options, entry, *found.modes, session);
+  if (found.small && !options.picture.empty()) draw(options, entry, found.small->modes, session);
   if (!found.at.ok()) {
     say(fmt::format("no equilibrium found: {}", found.at.failure));
     session.exit_status = failed;
-  } else if (!found.doubt.empty()) {
-    say("doubted: " + found.doubt);
+  } else if (!found.small->doubt.empty()) {
+    say("doubted: " + found.small->doubt);
     session.exit_status = doubted;
   }
 }

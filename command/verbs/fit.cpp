@@ -2,21 +2,16 @@
 
 #include <CLI/App.hpp>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <diracstep/command/arguments.hpp>
 #include <diracstep/command/interrupt.hpp>
 #include <diracstep/command/verbs.hpp>
 #include <diracstep/core/numerics/errors.hpp>
-#include <diracstep/core/numerics/near_names.hpp>
-#include <diracstep/files/csv_table.hpp>
 #include <diracstep/files/output_file.hpp>
 #include <diracstep/reports/json.hpp>
 #include <diracstep/reports/plot.hpp>
 #include <diracstep/reports/report.hpp>
-#include <diracstep/scene_format/parametric_scene_file.hpp>
-#include <diracstep/scene_format/position_names.hpp>
-#include <diracstep/sensitivities/fit.hpp>
+#include <diracstep/scene_format/fitted_scene.hpp>
 #include <memory>
 
 namespace diracstep::command {
@@ -34,62 +29,6 @@ struct FitArguments {
   int max_evaluations = 200;
   bool json = false;
 };
-
-/// Columns of a trajectory that nothing is fitted to.
-bool is_left_alone(const std::string& name) {
-  return name == "energy" || std::ranges::any_of(std::array{"p_", "lambda_", "invariant_", "d("},
-                                                 [&](const char* start) { return name.starts_with(start); });
-}
-
-/// The columns that are coordinates, velocities v_NAME or outputs; any other name is a mistake.
-FitData data_of(const CsvTable& table, const std::string& path, const CatalogueScene& entry,
-                const Parameters& sigma) {
-  const Scene& scene = *entry.scene;
-  if (table.lines.empty()) throw Misuse(fmt::format("'{}' has no lines of data", path));
-  if (table.names.empty()) throw Misuse(fmt::format("'{}': the first line does not name the columns", path));
-  if (table.names.front() != "t")
-    throw Misuse(fmt::format("'{}': the first column is '{}'; expected t", path, table.names.front()));
-  std::vector<std::string> known;
-  for (const char* prefix : {"", "v_"})
-    for (const std::string& name : scene.coordinates) known.push_back(prefix + name);
-  for (const Output& output : entry.outputs) known.push_back(output.name);
-  FitData data;
-  std::vector<std::size_t> used;
-  Parameters left = sigma;
-  for (std::size_t c = 1; c < table.names.size(); ++c) {
-    const std::string& name = table.names[c];
-    const auto found = std::ranges::find(known, name);
-    if (found == known.end()) {
-      if (is_left_alone(name)) continue;
-      throw Misuse(fmt::format("'{}': the column '{}' is no coordinate, velocity or output of scene '{}'{}",
-                               path, name, scene.name, did_you_mean(name, known)));
-    }
-    const auto number = static_cast<int>(found - known.begin());
-    const int n = scene.dimension();
-    const auto given = left.find(name);
-    const double deviation = given != left.end() ? given->second : 1.0;
-    if (number < 2 * n)
-      data.columns.push_back({number % n, number >= n, deviation});
-    else
-      data.columns.push_back({0, false, deviation, number - 2 * n});
-    if (given != left.end()) left.erase(given);
-    used.push_back(c);
-  }
-  if (used.empty())
-    throw Misuse(fmt::format("'{}' has no column of a coordinate, velocity or output of scene '{}'", path,
-                             scene.name));
-  if (!left.empty())
-    throw Misuse(fmt::format("--sigma: '{}' is no column of '{}'", left.begin()->first, path));
-  const auto rows = static_cast<Eigen::Index>(table.lines.size());
-  data.times.resize(rows);
-  data.values.resize(rows, static_cast<Eigen::Index>(used.size()));
-  for (Eigen::Index k = 0; k < rows; ++k) {
-    const auto& row = table.lines[static_cast<std::size_t>(k)];
-    data.times[k] = row[0];
-    for (std::size_t c = 0; c < used.size(); ++c) data.values(k, static_cast<Eigen::Index>(c)) = row[used[c]];
-  }
-  return data;
-}
 
 std::string fit_text(const FitReport& report, const std::vector<std::string>& names,
                      const FitArguments& arguments, const std::string& scene) {
@@ -149,12 +88,6 @@ std::string fit_json(const FitReport& report, const std::vector<std::string>& na
   return to_text(json, 2) + '\n';
 }
 
-std::string column_name(const FitData::Column& column, const CatalogueScene& entry) {
-  if (column.output >= 0) return entry.outputs[static_cast<std::size_t>(column.output)].name;
-  return (column.velocity ? "v_" : "") +
-         entry.scene->coordinates[static_cast<std::size_t>(column.coordinate)];
-}
-
 /// What is left of each column in units of its standard deviation, over the time.
 void draw_residuals(const std::string& stem, const FitData& data, const FitReport& report,
                     const CatalogueScene& entry) {
@@ -210,48 +143,21 @@ void run_fit(FitArguments arguments, Session& session) {
     changes[name] = value;
   }
   const CatalogueScene entry = make_scene(session, arguments.scene, changes);
-  require_flat(*entry.scene, "fit");
-  if (!entry.events.empty())
-    throw Misuse("fit does not go with the events of the scene: when one is met is not differentiated");
-  Vector begin(static_cast<Eigen::Index>(parameters_fitted.size()));
-  for (std::size_t k = 0; k < parameters_fitted.size(); ++k) {
-    const auto found = entry.parameters.find(parameters_fitted[k]);
-    if (found == entry.parameters.end())
-      throw Misuse(fmt::format("--parameters: scene '{}' has no parameter '{}'", entry.scene->name,
-                               parameters_fitted[k]));
-    begin[static_cast<Eigen::Index>(k)] = found->second;
-  }
-  const CsvTable table = read_csv(arguments.data, "the data", most_data_bytes, 2, EmptyFields::missing);
-  const FitData data = data_of(table, arguments.data, entry, parameters(arguments.sigma, "--sigma"));
+  const FittedScene of{arguments.scene, std::nullopt, changes, parameters_fitted};
+  const Vector begin = fit_start(of, entry);
+  const Parameters sigma = parameters(arguments.sigma, "--sigma");
+  const FitData data =
+      fit_data(read_csv(arguments.data, "the data", most_data_bytes, 2, EmptyFields::missing),
+               fmt::format("'{}'", arguments.data), entry, sigma);
   take_recommendation(entry, arguments.method, arguments.step);
   IntegratorOptions steps = integrator_options(session, arguments.method);
   const double last = data.times[data.times.size() - 1];
   steps.step = arguments.step.value_or(entry.natural_step);
   if (!arguments.step) steps.step = std::copysign(steps.step, last - entry.scene->start.time);
-  const auto all_of = [&](const Vector& values) {
-    Parameters all = changes;
-    for (std::size_t k = 0; k < parameters_fitted.size(); ++k)
-      all[parameters_fitted[k]] = values[static_cast<Eigen::Index>(k)];
-    return all;
-  };
-  const FitProblem problem{
-      [&](const Vector& values) {
-        const Parameters all = all_of(values);
-        return parametric_scene(arguments.scene, diracstep::make_scene(arguments.scene, all),
-                                parameters_fitted, all);
-      },
-      session.registry,
-      session.solvers,
-      steps,
-      arguments.max_evaluations,
-      arguments.confidence,
-      [&](const Vector& values) {
-        std::vector<PointFunction> functions;
-        for (Output& output : diracstep::make_scene(arguments.scene, all_of(values)).outputs)
-          functions.push_back(std::move(output.at));
-        return functions;
-      },
-      [] { return !interrupted(); }};
+  FitProblem problem = fit_problem(of, session.registry, session.solvers, steps);
+  problem.max_evaluations = arguments.max_evaluations;
+  problem.confidence = arguments.confidence;
+  problem.go_on = [] { return !interrupted(); };
   if (const std::string doubt = problem.scene(begin).doubt; !doubt.empty()) {
     say(doubt);
     session.exit_status = doubted;
@@ -262,13 +168,8 @@ void run_fit(FitArguments arguments, Session& session) {
   if (!arguments.picture.empty()) draw_residuals(arguments.picture, data, report, entry);
   print(arguments.json ? fit_json(report, parameters_fitted, arguments, entry.scene->name)
                        : fit_text(report, parameters_fitted, arguments, entry.scene->name));
-  constexpr double suspicious = 3.0;  // of the standard deviations given
-  const bool all_given = parameters(arguments.sigma, "--sigma").size() == data.columns.size();
-  if (report.converged && all_given && report.residual > suspicious) {
-    say(fmt::format(
-        "doubted: what is left is {:.3g} times the deviations that --sigma states: another minimum, "
-        "which --from may lead to, or another model",
-        report.residual));
+  if (const std::string doubt = doubt_of_fit(report, data, sigma); !doubt.empty()) {
+    say("doubted: " + doubt);
     session.exit_status = doubted;
   }
   if (report.converged) return;

@@ -4,9 +4,7 @@
 #include <algorithm>
 #include <diracstep/command/arguments.hpp>
 #include <diracstep/command/verbs.hpp>
-#include <diracstep/core/integrator/point_reader.hpp>
-#include <diracstep/core/integrator/prepared_scene.hpp>
-#include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/integrator/solved_start.hpp>
 #include <diracstep/reports/json.hpp>
 #include <diracstep/reports/report.hpp>
 #include <diracstep/scene_format/position_names.hpp>
@@ -22,52 +20,7 @@ struct StartArguments {
   bool json = false;
 };
 
-constexpr int most_shown = 60;   // coordinates or rows on a screen
-constexpr int full_up_to = 200;  // unknowns for which full matrices are taken
-
-/// A start as the first step takes it.
-struct SolvedStart {
-  std::shared_ptr<const Scene> scene;  ///< with its hidden rows, without redundant ones
-  std::vector<std::string> changes;
-  Sample sample;
-  Vector acceleration;  ///< empty where there is none: L is linear in v
-};
-
-SolvedStart solved_start(const CatalogueScene& entry, const Session& session) {
-  PreparedScene prepared_scene =
-      prepared(entry.scene, {.drop_redundant_rows = session.drop_redundant_rows}, session.solvers);
-  SolvedStart solved{std::move(prepared_scene.scene), entry.changes, {}, {}};
-  for (const PlanLine& line : prepared_scene.lines)
-    solved.changes.push_back(fmt::format("{}: {} ({})", line.item, line.decision, line.reason));
-  const Scene& scene = *solved.scene;
-  const Start& start = scene.start;
-  PointReader reader(solved.scene, session.solvers, scene.dimension() + scene.rows() <= full_up_to);
-  Vector force(scene.dimension()), p(scene.dimension());
-  scene.force_and_momentum(start.time, start.q, start.v, start.p, force, p);
-  SolveReport report =
-      reader.read(start.time, {.q = start.q, .p = p, .v = start.v}, Momentum::projected, solved.sample);
-  if (report.ok())
-    report = reader.acceleration(start.time, start.q, solved.sample.v, solved.sample.p, solved.acceleration,
-                                 solved.sample.lambda);
-  if (!report.ok())
-    throw Error(fmt::format("scene '{}': velocities, accelerations and forces of rows at the start: {}",
-                            scene.name, describe(report.status)));
-  return solved;
-}
-
-const char* origin_text(StartOrigin origin) {
-  switch (origin) {
-    case StartOrigin::given:
-      return "given";
-    case StartOrigin::guess:
-      return "guess";
-    case StartOrigin::rate:
-      return "rate";
-    default:
-      return "left out";
-  }
-}
-
+constexpr int most_shown = 60;  // coordinates or rows on a screen
 /// "0.5, given", or "guess, from 0.4".
 std::string cell(double value, const StatedStart* stated, bool position, Eigen::Index i) {
   if (stated == nullptr) return fmt::format("{:.15g}", value);
@@ -75,12 +28,19 @@ std::string cell(double value, const StatedStart* stated, bool position, Eigen::
   const StartOrigin origin = (position ? stated->q : stated->v)[static_cast<std::size_t>(i)];
   if (before.size() == 0) return fmt::format("{:.15g}", value);  // by momenta
   const bool moved = before[i] != value;
-  return fmt::format("{:.15g}, {}{}", value, origin_text(origin),
+  return fmt::format("{:.15g}, {}{}", value, describe(origin),
                      moved ? fmt::format(", from {:.10g}", before[i]) : "");
 }
 
+std::vector<std::string> changes_of(const CatalogueScene& entry, const SolvedStart& solved) {
+  std::vector<std::string> changes = entry.changes;
+  for (const PlanLine& line : solved.prepared.lines)
+    changes.push_back(fmt::format("{}: {} ({})", line.item, line.decision, line.reason));
+  return changes;
+}
+
 std::string start_text(const CatalogueScene& entry, const SolvedStart& solved) {
-  const Scene& scene = *solved.scene;
+  const Scene& scene = *solved.prepared.scene;
   const StatedStart* stated = entry.stated_start ? &*entry.stated_start : nullptr;
   const bool accelerated = solved.acceleration.size() > 0;
   std::vector<std::vector<std::string>> rows{{"coordinate", "q", "v", "p"}};
@@ -109,13 +69,13 @@ std::string start_text(const CatalogueScene& entry, const SolvedStart& solved) {
     text += fmt::format("force of row {}: {:.15g}\n", names[static_cast<std::size_t>(r)],
                         solved.sample.lambda[r]);
   text += fmt::format("energy: {:.15g}\n", solved.sample.energy);
-  for (const std::string& change : solved.changes) text += change + '\n';
+  for (const std::string& change : changes_of(entry, solved)) text += change + '\n';
   return text;
 }
 
 Json origins_json(const std::vector<std::string>& names, const std::vector<StartOrigin>& origins) {
   Json json = Json::object();
-  for (std::size_t i = 0; i < names.size(); ++i) add_member(json, names[i], origin_text(origins[i]));
+  for (std::size_t i = 0; i < names.size(); ++i) add_member(json, names[i], describe(origins[i]));
   return json;
 }
 
@@ -127,7 +87,7 @@ Json column_json(const std::vector<std::string>& names, const Vector& values) {
 }
 
 std::string start_json(const CatalogueScene& entry, const SolvedStart& solved) {
-  const Scene& scene = *solved.scene;
+  const Scene& scene = *solved.prepared.scene;
   Json json{{"scene", scene.name}, {"t", scene.start.time}};
   json["q"] = column_json(position_names(scene), solved.sample.q);
   json["v"] = column_json(scene.coordinates, solved.sample.v);
@@ -147,13 +107,14 @@ std::string start_json(const CatalogueScene& entry, const SolvedStart& solved) {
         {"q", (solved.sample.q - stated.start.q).norm()},
         {"v", stated.start.v.size() > 0 ? Json((solved.sample.v - stated.start.v).norm()) : Json(nullptr)}};
   }
-  json["changes"] = solved.changes;
+  json["changes"] = changes_of(entry, solved);
   return to_text(json, 2) + '\n';
 }
 
 void start(const StartArguments& options, Session& session) {
   const CatalogueScene entry = make_scene(session, options.scene, parameters(options.set));
-  const SolvedStart solved = solved_start(entry, session);
+  const SolvedStart solved =
+      solved_start(entry.scene, {.drop_redundant_rows = session.drop_redundant_rows}, session.solvers);
   print(options.json ? start_json(entry, solved) : start_text(entry, solved));
 }
 

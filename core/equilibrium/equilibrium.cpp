@@ -172,7 +172,7 @@ class EquilibriumSearch {
     double time = 0.1 * masses / forces;
     for (; iterations_ < max_path_steps; ++iterations_) {
       Columns jacobian = here.jacobian;
-      jacobian.topRows(k) += here.mass / time;
+      jacobian.topRows(here.mass.rows()) += here.mass / time;  // more where rows of A depend
       factor(jacobian);
       Point next = evaluate(moved(here, correction(residual_along(here.allowed, here.residual))));
       if (!next.residual.allFinite()) return here;

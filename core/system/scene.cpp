@@ -36,14 +36,24 @@ void require_finite(const Scene& scene, const char* what, const Vector& column) 
   throw InconsistentStart(scene.name, reason.str(), of);
 }
 
+/// Whether each velocity changes the numbers stored: none changes a quaternion of zeros.
+bool can_move(const Space& space, const Vector& q) {
+  return (space.tangent_basis(q).colwise().norm().array() > 0.0).all();
+}
+
 /// A start on the space, to within what a text with a few digits less than a double has.
 void require_on_space(const Scene& scene, const Vector& q) {
   if (!scene.space) return;
   const double off = max_norm(scene.space->normalised(q) - q);
-  if (off <= start_tolerance) return;
+  const bool moves = can_move(*scene.space, q);
+  if (off <= start_tolerance && moves) return;
   std::ostringstream message;
-  message << "scene '" << scene.name << "': the start q is not on " << scene.space->name() << ", by " << off
-          << ": quaternions and (cos, sin) have length 1; Space::normalised() makes them so";
+  message << "scene '" << scene.name << "': the start q is not on " << scene.space->name();
+  if (moves)
+    message << ", by " << off
+            << ": quaternions and (cos, sin) have length 1; Space::normalised() makes them so";
+  else
+    message << ": quaternions and (cos, sin) have length 1, one here has none";
   throw Misuse(message.str());
 }
 

@@ -13,7 +13,7 @@ using Libdl
 
 export load, parse_scene, integrator, step!, state, reset!, save, restore!, Scene, Integrator, Run
 
-const interface_version = Cuint(6)  # DIRACSTEP_VERSION_OF_C_INTERFACE
+const interface_version = Cuint(7)  # DIRACSTEP_VERSION_OF_C_INTERFACE
 const momenta = (projected = 0, plus = 1, minus = 2)
 const library = Ref{String}("libdiracstep.so.0.1")
 
@@ -49,6 +49,7 @@ struct Source
 end
 struct Facts
     dimension::Cint
+    storage::Cint
     rows::Cint
     invariants::Cint
     outputs::Cint
@@ -57,7 +58,7 @@ struct Facts
     start_v::Ptr{Cdouble}
     end_time::Cdouble
     step::Cdouble
-    Facts() = new(0, 0, 0, 0, 0.0, C_NULL, C_NULL, 0.0, 0.0)
+    Facts() = new(0, 0, 0, 0, 0, 0.0, C_NULL, C_NULL, 0.0, 0.0)
 end
 struct Options
     method::Cstring
@@ -131,6 +132,7 @@ end
 mutable struct Scene
     handle::Ptr{Cvoid}
     coordinates::Vector{String}
+    positions::Vector{String}  # of the numbers of q: the coordinates in R^n
     rows::Vector{String}
     start_time::Float64
     until::Float64
@@ -158,7 +160,7 @@ function open_scene(name, text, changes)
     end
     facts = Ref(Facts())
     check(ccall(symbol("read_facts"), Cint, (Ptr{Cvoid}, Ref{Facts}), handle[], facts))
-    scene = Scene(handle[], first.(lines(handle[], 1)), first.(lines(handle[], 2)), facts[].start_time, facts[].end_time,
+    scene = Scene(handle[], first.(lines(handle[], 1)), first.(lines(handle[], 12)), first.(lines(handle[], 2)), facts[].start_time, facts[].end_time,
                   facts[].step)
     finalizer(made -> ccall(symbol("close"), Cvoid, (Ptr{Cvoid},), made.handle), scene)
 end
@@ -193,7 +195,7 @@ step!(made::Integrator, count = 1) = check(ccall(symbol("step"), Cint, (Ptr{Cvoi
 "The current point: t, q, v, p, lambda, energy."
 function state(made::Integrator; momentum = :projected)
     n, m = length(made.scene.coordinates), length(made.scene.rows)
-    q, v, p, lambda = zeros(n), zeros(n), zeros(n), zeros(m)
+    q, v, p, lambda = zeros(length(made.scene.positions)), zeros(n), zeros(n), zeros(m)
     GC.@preserve q v p lambda begin
         read = Ref(ReadState(0.0, 0.0, pointer(q), pointer(v), pointer(p), pointer(lambda), C_NULL, C_NULL))
         check(ccall(symbol("read"), Cint, (Ptr{Cvoid}, Cint, Ref{ReadState}), made.handle, momenta[momentum], read))
@@ -236,7 +238,8 @@ function run(scene::Scene; until = scene.until, every = 1, momentum = :projected
     room = ccall(symbol("expect"), Clong, (Ptr{Cvoid}, Ref{Course}), made.handle, course)
     room > 0 || throw(Misuse("run needs steps of fixed size; step an integrator where they vary"))
     n, m = length(scene.coordinates), length(scene.rows)
-    t, energy, q, v, p, lambda = zeros(room), zeros(room), zeros(n, room), zeros(n, room), zeros(n, room), zeros(m, room)
+    s = length(scene.positions)
+    t, energy, q, v, p, lambda = zeros(room), zeros(room), zeros(s, room), zeros(n, room), zeros(n, room), zeros(m, room)
     GC.@preserve t energy q v p lambda begin
         points = Ref(Points(room, 0, pointer(t), pointer(q), pointer(v), pointer(p), pointer(lambda), C_NULL, C_NULL, pointer(energy),
                             C_NULL, C_NULL))

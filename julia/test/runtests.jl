@@ -19,6 +19,9 @@ using Test
     reset!(made)
     @test state(made).t == 0.0
     @test load("knife_edge"; g_sin_alpha = 0.5) isa Scene
+    top = load("heavy_top_so3")
+    turned = DiracStep.run(top; method = "type1/gl:3", step = 0.001, until = 0.01)
+    @test size(turned.q, 1) == length(top.positions) == 4 && size(turned.v, 1) == length(top.coordinates) == 3
     @test_throws DiracStep.Misuse load("no_such_scene")
     @test_throws DiracStep.Misuse integrator(skate; method = "type9/none")
     spring = "name = \"spring\"\nlagrangian = \"v_x^2/2 - x^2/2\"\n[coordinates]\nx = {}\n[start]\nx = 1\n[span]\nend = 1\nstep = 0.1\n"

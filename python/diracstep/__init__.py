@@ -15,10 +15,11 @@ from __future__ import annotations
 from ._library import version
 from .catalogue import catalogue, load, methods, parse
 from .callbacks import GeneratingFunction
-from .command import Equilibrium, Fit, SolvedStart
 from .command import sweep_of_file as sweep
 from .ends import BoundaryMotion, ControlledMotion
+from .equilibria import Equilibrium, SolvedStart
 from .errors import CallbackCost, Doubt, Error, Failure, Interrupted, Misuse
+from .fits import Fit
 from .integrator import Gradient, Integrator, Jacobian, State
 from .run import Ensemble, Event, Points, Run, Search, Statistics
 from .scene import Scene

@@ -13,13 +13,13 @@ from typing import Any, Callable
 
 from .errors import raised
 
-VERSION = 6  # DIRACSTEP_VERSION_OF_C_INTERFACE
+VERSION = 7  # DIRACSTEP_VERSION_OF_C_INTERFACE
 PLUGIN_VERSION = 1  # DIRACSTEP_PLUGIN_VERSION
 FILE = "libdiracstep.so.0.1"
 
 OK, FAILED, MISUSE, INTERRUPTED = range(4)
 MOMENTA = {"projected": 0, "plus": 1, "minus": 2}
-ABOUT, COORDINATES, ROWS, INVARIANTS, PARAMETERS, METHODS, RULES, SCENES, PLUGINS, OUTPUTS, INPUTS, EVENTS = range(12)
+ABOUT, COORDINATES, ROWS, INVARIANTS, PARAMETERS, METHODS, RULES, SCENES, PLUGINS, OUTPUTS, INPUTS, EVENTS, POSITIONS = range(13)
 
 Numbers = POINTER(c_double)
 
@@ -102,7 +102,7 @@ class Source(Structure):
 
 
 class Facts(Structure):
-    _fields_ = [("dimension", c_int), ("rows", c_int), ("invariants", c_int), ("outputs", c_int), ("start_time", c_double),
+    _fields_ = [("dimension", c_int), ("storage", c_int), ("rows", c_int), ("invariants", c_int), ("outputs", c_int), ("start_time", c_double),
                 ("start_q", Numbers), ("start_v", Numbers), ("end_time", c_double), ("step", c_double)]
 
 
@@ -165,6 +165,30 @@ class Found(Structure):
                 ("varies", c_int), ("solves", c_long), ("method", c_char_p), ("reason", c_char_p),
                 ("warning", c_char_p), ("runs", Table), ("stopped", c_int), ("events", c_long),
                 ("event", POINTER(Event))]
+
+
+class Rest(Structure):
+    _fields_ = [("along", c_int), ("modes", c_int), ("nearby", c_int), ("near", c_double)]
+
+
+class Equilibrium(Structure):
+    _fields_ = [("time", c_double), ("iterations", c_int), ("q", Numbers), ("v", Numbers), ("lambda_", Numbers), ("modes", c_int),
+                ("eigenvalue", Numbers), ("shape", Numbers), ("zeros", c_int), ("stability", c_char_p), ("near", c_double),
+                ("variation", c_double), ("redundant_rows", c_int), ("positions", c_int), ("velocities", c_int),
+                ("of_positions", Numbers), ("of_velocities", Numbers), ("drift", Numbers), ("mass", Numbers), ("damping", Numbers),
+                ("stiffness", Numbers), ("doubt", c_char_p)]
+
+
+class Data(Structure):
+    _fields_ = [("file", c_char_p), ("columns", c_int), ("column", POINTER(c_char_p)), ("rows", c_long), ("time", c_void_p),
+                ("value", c_void_p), ("sigmas", c_int), ("sigma", POINTER(Parameter)), ("parameters", c_int),
+                ("parameter", POINTER(c_char_p)), ("starts", c_int), ("start", POINTER(Parameter)), ("confidence", c_double),
+                ("max_motions", c_int), ("stop", POINTER(c_int))]
+
+
+class Fitted(Structure):
+    _fields_ = [("motions", c_int), ("measured", c_long), ("residual", c_double), ("value", Numbers), ("interval", Numbers),
+                ("covariance", Numbers), ("ending", c_char_p), ("doubt", c_char_p)]
 
 
 class Ensemble(Structure):
@@ -232,6 +256,9 @@ _PROTOTYPES: dict[str, tuple[Any, list[Any]]] = {
     "expect": (c_long, [c_void_p, POINTER(Course)]),
     "solve": (c_int, [c_void_p, POINTER(Options), POINTER(Course), POINTER(ErrorRequest), POINTER(Points),
                       POINTER(Found)]),
+    "solve_start": (c_int, [c_void_p, POINTER(State), c_void_p, POINTER(Table)]),
+    "find_equilibrium": (c_int, [c_void_p, POINTER(Rest), POINTER(Equilibrium)]),
+    "fit": (c_int, [c_void_p, POINTER(Options), POINTER(Data), POINTER(Fitted)]),
     "run_ensemble": (c_int, [c_void_p, POINTER(Options), POINTER(Ensemble), POINTER(Points), POINTER(Table)]),
     "solve_boundary": (c_int, [c_void_p, POINTER(Options), POINTER(Ends), POINTER(Points), POINTER(Boundary)]),
     "solve_control": (c_int, [c_void_p, POINTER(Options), POINTER(Ends), POINTER(Control), POINTER(Points),

@@ -1,4 +1,4 @@
-"""Verbs of the command ``diracstep`` on a scene: what needs references, baselines or searches that libdiracstep does not have.
+"""Verbs of the command ``diracstep`` on a scene: what needs references and baselines that libdiracstep does not have, and sweeps.
 
 The scene goes there as its file's text; answers come as JSON.
 """
@@ -68,7 +68,7 @@ class Verbs:
         if scene:
             for name, value in self._scene._changes.items():
                 call += ["--set", f"{name}={value!r}"]
-        if self._scene._again["drop_redundant"] and verb != "fit":
+        if self._scene._again["drop_redundant"]:
             call += ["--drop-redundant"]
         return call_command(verb, call, self._scene._again["plugins"], self._scene.name, self.folder)
 
@@ -96,82 +96,6 @@ def _told(text: str) -> str:
     lines = [line.removeprefix("diracstep: ") for line in text.strip().splitlines()]
     heading = [index for index, line in enumerate(lines[:6]) if line.startswith("system: ")]
     return spelled("\n".join(lines[heading[0] + 1:] if heading else lines))
-
-
-class Report:
-    """What a verb of the command found: ``document`` is its JSON."""
-
-    def __init__(self, title: str, document: dict[str, Any]) -> None:
-        self.document = document
-        self._title = title
-
-    def __repr__(self) -> str:
-        return f"<{self._title}>"
-
-
-class Equilibrium(Report):
-    """Where a scene rests or moves steadily, and its small motions there.
-
-    q, v: n numbers.  lambda_: forces of the rows.  eigenvalues: complex, 1/time, those of a pair once.
-    """
-
-    def __init__(self, scene: Scene, document: dict[str, Any]) -> None:
-        super().__init__(f"equilibrium of {scene.name}", document)
-        self.q, self.v = (np.array(list(document[what].values())) for what in ("q", "v"))
-        self.lambda_ = np.array(list(document["lambda"].values()))
-        self.eigenvalues = np.array([complex(*mode["eigenvalue"]) for mode in document["modes"]])
-
-
-class SolvedStart(Report):
-    """The start that runs take, guesses moved onto the rows.
-
-    q, v, p, acceleration: n numbers.  lambda_: forces of the rows.  origin: of each value of q and v, "given", "guess" …
-    """
-
-    def __init__(self, scene: Scene, document: dict[str, Any]) -> None:
-        super().__init__(f"start of {scene.name}", document)
-        self.q, self.v, self.p, self.acceleration = (
-            np.array(list((document[what] or {}).values()), dtype=float) for what in ("q", "v", "p", "acceleration"))
-        self.lambda_ = np.array(list(document["lambda"].values()))
-        self.origin: dict[str, dict[str, str]] = document["origin"]
-
-
-class Fit(Report):
-    """Parameters that fit data best: ``parameters`` and the half widths of their confidence intervals, by name."""
-
-    def __init__(self, scene: Scene, document: dict[str, Any]) -> None:
-        super().__init__(f"fit of {scene.name}", document)
-        found = document["parameters"]
-        self.parameters: dict[str, float] = {name: entry["value"] for name, entry in found.items()}
-        self.intervals: dict[str, float] = {
-            name: np.inf if entry["interval"] is None else entry["interval"] for name, entry in found.items()}
-        self.covariance = np.array(document["covariance"], dtype=float)
-        self.converged: bool = document["converged"]
-
-
-def fit(scene: Scene, data: Any, parameters: Sequence[str], start: Mapping[str, float], sigma: Mapping[str, float],
-        options: Sequence[str]) -> Fit:
-    parameters = texts(parameters, "parameters")
-    if not isinstance(data, (str, os.PathLike, Mapping)):
-        raise Misuse(f"data is {type(data).__name__}; the path of a file, or columns by name, 't' among them, are needed")
-    with Verbs(scene) as verbs:
-        file = str(data) if isinstance(data, (str, os.PathLike)) else _data_file(verbs.folder, data)
-        pairs = [text for option, values in (("--from", start), ("--sigma", sigma)) for name, value in values.items()
-                 for text in (option, f"{name}={real(value, name)!r}")]
-        return Fit(scene, verbs.call("fit", file, "--parameters", ",".join(parameters), *pairs, *options))
-
-
-def _data_file(folder: Path, data: Mapping[str, Any]) -> str:
-    """A file of columns by name, of which t is one; NaN stands for what was not measured."""
-    names = list(data)
-    columns = [np.asarray(data[name], dtype=float) for name in names]
-    if "t" not in names or any(column.shape != columns[0].shape or column.ndim != 1 for column in columns):
-        raise Misuse("data needs columns of one length, 't' among them")
-    lines = [",".join(names)]
-    lines += [",".join("" if np.isnan(value) else repr(float(value)) for value in row) for row in zip(*columns)]
-    file = folder / "data.csv"
-    file.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    return str(file)
 
 
 def sweep(scene: Scene, varied: Varied, recorded: Mapping[str, Sequence[str]], settings: Mapping[str, Any],

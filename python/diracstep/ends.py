@@ -110,7 +110,7 @@ def _by_name(scene: Scene, given: Any, what: str) -> dict[str, float]:
         return reals(given, what)
     if isinstance(given, (str, bytes)) or not hasattr(given, "__iter__"):
         raise Misuse(f"{what} is {given!r}; a dictionary of numbers by name, or a place, is needed")
-    return dict(zip(scene._coordinates, column(given, scene._coordinates, what).tolist()))
+    return dict(zip(scene._positions, column(given, scene._positions, what).tolist()))
 
 
 def _put(struct: Any, count: str, values: str, numbers: Mapping[str, float]) -> Any:

@@ -42,6 +42,7 @@ def spelled(text: str) -> str:
     """A text of the library or of the command, with options as they are spelled here: --max-time is max_time."""
     text = text.replace('--drop-redundant, redundant = "drop" in a scene file, or IntegratorOptions::drop_redundant_rows',
                         'drop_redundant=True, or redundant = "drop" in a scene file')
+    text = text.replace("; Space::normalised() makes them so", "")
     text = text.replace("(option `fixed`)", "(adaptive=False)")
     text = re.sub(r"(?:set )?IntegratorOptions::(\w+)", r"\1=True", text)
     return re.sub(r"(?<![\w-])--([a-z][a-z-]*)", lambda option: option[1].replace("-", "_"), text)

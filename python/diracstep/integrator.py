@@ -35,7 +35,7 @@ class State:
     """A point of a motion.  The arrays are copies and own their memory."""
 
     t: float
-    q: np.ndarray  #: n numbers
+    q: np.ndarray  #: s numbers, of ``scene.positions``
     v: np.ndarray  #: n numbers, in the distribution
     p: np.ndarray  #: n numbers, the representative asked for
     lambda_: np.ndarray  #: m numbers: forces of the rows
@@ -149,13 +149,12 @@ class Integrator:
     @property
     def events(self) -> list[Event]:
         """The events of the scene that were met since the start, in the order of time."""
-        n = len(self.scene._coordinates)
         met: list[Event] = []
         with self._lock:
             for k in range(c.lib.count_events(self._handle)):
                 read = c.Event()
                 self._check(c.lib.read_event(self._handle, k, ctypes.byref(read)))
-                met.append(event_from(read, n))
+                met.append(event_from(read, self.scene._widths))
         return met
 
     @property
@@ -240,7 +239,7 @@ class Integrator:
             with self._lock:
                 self._check(c.lib.reset(self._handle, 0.0, None, None))
             return
-        start_q = column(scene.start_q if q is None else q, scene._coordinates, "q")
+        start_q = column(scene.start_q if q is None else q, scene._positions, "q")
         start_v = column(scene.start_v if v is None else v, scene._coordinates, "v")
         start_t = scene.start_time if t is None else real(t, "t")
         with self._lock:

@@ -61,7 +61,7 @@ def search_of(scene: Scene, course: Any, error: float, until: float | None, opti
                            ctypes.byref(found))
         if found.runs.columns:  # texts belong to this thread, and to its last call
             told.append(search_from(found))
-            events.extend(event_from(found.event[k], scene._widths["q"]) for k in range(found.events))
+            events.extend(event_from(found.event[k], scene._widths) for k in range(found.events))
         return code
 
     with Progress(progress, points, 0, scene.start_time, None) as bar:
@@ -79,11 +79,10 @@ def ensemble_of(scene: Scene, q: Any, v: Any, t: Any, until: float | None, steps
                 options: dict[str, Any]) -> Ensemble:
     starts_q = np.asarray(q)
     if starts_q.ndim != 2:
-        raise Misuse(f"q has shape {starts_q.shape}; (members, {len(scene._coordinates)}) is needed: a start in each row")
+        raise Misuse(f"q has shape {starts_q.shape}; (members, {len(scene._positions)}) is needed: a start in each row")
     members = len(starts_q)
-    shape = (members, len(scene._coordinates))
-    starts_q = table(starts_q, shape, "q")
-    starts_v = None if v is None else table(v, shape, "v")
+    starts_q = table(starts_q, (members, len(scene._positions)), "q")
+    starts_v = None if v is None else table(v, (members, len(scene._coordinates)), "v")
     times = None if t is None else table(t, (members,), "t")
     flag, points = stop_flag(), Points(scene._widths, members, grows=False)
     request = c.Ensemble(members=members, q=starts_q.ctypes.data, v=address(starts_v), time=address(times),

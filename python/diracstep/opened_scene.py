@@ -52,11 +52,13 @@ class OpenedScene:
         listed = self._lines(c.COORDINATES)
         # The sizes of what the library writes: not to be changed from outside.
         self._coordinates = tuple(coordinates or (name for name, _, _ in listed))
+        self._positions = self._coordinates if facts.storage == facts.dimension else tuple(
+            name for name, in self._lines(c.POSITIONS))
         self._rows = tuple(name for name, in self._lines(c.ROWS))
         self._invariants = tuple(name for name, _ in self._lines(c.INVARIANTS))
         self._outputs = tuple(name for name, in self._lines(c.OUTPUTS))
-        n = facts.dimension
-        self._widths = {"q": n, "v": n, "p": n, "lambda_": facts.rows, "invariants": facts.invariants, "outputs": facts.outputs}
+        n, stored = facts.dimension, facts.storage
+        self._widths = {"q": stored, "v": n, "p": n, "lambda_": facts.rows, "invariants": facts.invariants, "outputs": facts.outputs}
         self.inputs: dict[str, tuple[float, float]] = {  #: tables of the time, and between which times they have values
             name: (float(first), float(last)) for name, first, last in self._lines(c.INPUTS)}
         self.events: dict[str, str] = {name: what for name, what in self._lines(c.EVENTS)}  #: by name: "record", "stop" or "act"
@@ -65,7 +67,7 @@ class OpenedScene:
         self.about: list[tuple[str, str]] = [(what, text) for what, text in self._lines(c.ABOUT)]  #: what the scene says of itself
         self.name: str = self.about[0][1]
         self.start_time: float = facts.start_time
-        self.start_q = np.ctypeslib.as_array(facts.start_q, (n,)).copy()
+        self.start_q = np.ctypeslib.as_array(facts.start_q, (stored,)).copy()
         self.start_v = np.ctypeslib.as_array(facts.start_v, (n,)).copy()
         self.start_q.flags.writeable = self.start_v.flags.writeable = False
         self.until: float = facts.end_time  #: where a run ends that is given no other end

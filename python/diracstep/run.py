@@ -42,17 +42,17 @@ class Event:
 
     name: str
     t: float
-    q: np.ndarray  #: n numbers, just before it
+    q: np.ndarray  #: s numbers, just before it
     v: np.ndarray  #: n numbers, just before it
     after_q: np.ndarray | None  #: what it made of them; None where it does not act
     after_v: np.ndarray | None
     impulse: float  #: of a contact, momentum over the unit of its row; NaN where there is none
 
 
-def event_from(read: Any, n: int) -> Event:
+def event_from(read: Any, widths: Mapping[str, int]) -> Event:
     """A copy of what the library tells of an event."""
-    q, v, after_q, after_v = (np.ctypeslib.as_array(column, (n,)).copy() if column else None
-                              for column in (read.q, read.v, read.after_q, read.after_v))
+    q, v, after_q, after_v = (np.ctypeslib.as_array(column, (widths[what],)).copy() if column else None
+                              for column, what in ((read.q, "q"), (read.v, "v"), (read.after_q, "q"), (read.after_v, "v")))
     return Event(read.name.decode(), read.time, q, v, after_q, after_v, read.impulse)  # type: ignore[arg-type]
 
 
@@ -84,8 +84,8 @@ def search_from(found: Any) -> Search:
 class Points:
     """Points of one scene: row k of each array is point k.
 
-    ``t``, ``energy``: N numbers.  ``q``, ``v``, ``p``: N × n, a column for each coordinate; v lies in the distribution, p is the
-    representative asked for.  ``lambda_``: N × m, the forces of the rows.  ``invariants``: N × i, what the scene declares as
+    ``t``, ``energy``: N numbers.  ``q``: N × s, a column for each of ``scene.positions``.  ``v``, ``p``: N × n, a column for each
+    coordinate; v lies in the distribution, p is the representative asked for.  ``lambda_``: N × m, the forces of the rows.  ``invariants``: N × i, what the scene declares as
     kept.  ``outputs``: N × o, formulas of the scene's file.  Units are those of the scene.  The arrays own their memory.
     """
 
@@ -112,6 +112,7 @@ class Points:
         for index, name in enumerate(scene.coordinates):
             places["v_" + name] = (self.v, index)
             places["p_" + name] = (self.p, index)
+        for index, name in enumerate(scene.positions):
             places[name] = (self.q, index)
         return places
 
@@ -156,10 +157,10 @@ class Points:
         return pandas.DataFrame(columns)
 
     def plot(self, *names: str, x: str = "t", ax: Any = None, **style: Any) -> Any:
-        """Draws quantities (all coordinates without names) over the time or another quantity; the axes of matplotlib."""
+        """Draws quantities (all of q without names) over the time or another quantity; the axes of matplotlib."""
         if ax is None:
             ax = _pyplot().subplots()[1]
-        for name in names or self.scene.coordinates:
+        for name in names or self.scene.positions:
             ax.plot(self[x], self[name], **{"label": name, **style})
         ax.set_xlabel(_labelled(x, self.scene))
         if len(names) == 1:
@@ -213,9 +214,9 @@ class Run(Points):
 
         q, v: n numbers, or by coordinate; parameters: by name.  A product with jacobian(), which is taken for it.
         """
-        names, moved = self.scene.coordinates, parameters or {}
+        moved = parameters or {}
         direction = np.concatenate([np.zeros(len(names)) if given is None else column(given, names, what)
-                                    for given, what in ((q, "q"), (v, "v"))] + [[real(value, name) for name, value in moved.items()]])
+                                    for given, what, names in ((q, "q", self.scene.positions), (v, "v", self.scene.coordinates))] + [[real(value, name) for name, value in moved.items()]])
         found = self.jacobian(list(moved))
         return {what: getattr(found, what) @ direction for what in "qvp"}
 

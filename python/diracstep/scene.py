@@ -9,9 +9,11 @@ import numpy as np
 
 from .arrays import column, flag, real, reals, text, whole
 from .callbacks import CallbackScene, GeneratingFunction, say_cost
-from .command import Equilibrium, Fit, SolvedStart, Varied, Verbs, fit, sweep
+from .command import Varied, sweep
 from .ends import BoundaryMotion, ControlledMotion, boundary_of, control_of
+from .equilibria import Equilibrium, SolvedStart, equilibrium_of, start_of
 from .errors import Misuse
+from .fits import Fit, fit_of
 from .integrator import Integrator
 from .motions import ensemble_of, run_of, search_of, times_every
 from .opened_scene import OpenedScene
@@ -98,8 +100,14 @@ class Scene(OpenedScene):
 
     @property
     def coordinates(self) -> list[str]:
-        """Names, in the order of columns."""
+        """Names, in the order of the n columns of v and p; of those of q where the scene is in R^n, else see ``positions``."""
         return list(self._coordinates)
+
+    @property
+    def positions(self) -> list[str]:
+        """Names of the s numbers of q, in the order of its columns: the coordinates, or on groups and spheres what is stored, such as
+        ``R_w``, ``R_x``, ``R_y``, ``R_z`` of a rotation whose velocity is ``v_R_1`` … (docs/manifolds.md)."""
+        return list(self._positions)
 
     @property
     def rows(self) -> list[str]:
@@ -180,7 +188,7 @@ class Scene(OpenedScene):
                  threads: int = 0, momentum: str = "projected", **options: Any) -> Ensemble:
         """The ends of many motions, stepped by threads in C++ (0: one for each processor); the same bits for any number.
 
-        q, v: N × n, consistent starts; v is the scene's where it is left out.  t: N starting times, the scene's without;
+        q: N × s, v: N × n, consistent starts; v is the scene's where it is left out.  t: N starting times, the scene's without;
         equal ones where no steps are given.  Events of the scene act, and a motion that one ends is read there.
         Warns with Doubt where the checks of a run, which go along with at most twenty members, find one not to be believed.
         Ctrl-C ends it with KeyboardInterrupt.
@@ -239,36 +247,32 @@ class Scene(OpenedScene):
         return run_study(self, methods=methods, orders=orders, steps=steps, rtols=rtols, until=until, ida=ida, erk=erk,
                          repeat=repeat, budget=budget)
 
-    def equilibrium(self, *, along: bool = False) -> Equilibrium:
+    def equilibrium(self, *, along: bool = False, modes: int | None = None, near: float | None = None) -> Equilibrium:
         """Where the scene rests, from its start as the guess, and its small motions there: eigenvalues and modes.
 
         along: a steady motion, in which coordinates with a velocity at the start keep moving.
-        Made by ``diracstep equilibrium``.  Raises Failure where none is found; warns with Doubt where the linear equations change.
+        modes: so many, by sparse matrices, the nearest to ``near`` or else the slowest; without both all of them, or ten of a scene
+        of more than 2000 coordinates and rows.  Events are not looked for.
+        Raises Failure where none is found; warns with Doubt where the linear equations change until the scene's end.
         """
-        with Verbs(self) as verbs:
-            return Equilibrium(self, verbs.call("equilibrium", *(["--along"] if along else [])))
+        return equilibrium_of(self, along, modes, near)
 
     def start(self) -> SolvedStart:
-        """The start that runs take, with momenta, accelerations and forces of rows, and where each value is from.
-
-        Made by ``diracstep start``.
-        """
-        with Verbs(self) as verbs:
-            return SolvedStart(self, verbs.call("start"))
+        """The start that runs take, with momenta, accelerations and forces of rows, and where each value is from."""
+        return start_of(self)
 
     def fit(self, data: Any, parameters: Sequence[str], *, start: Mapping[str, float] | None = None,
-            sigma: Mapping[str, float] | None = None, confidence: float = 0.95, step: float | None = None,
-            method: str | None = None) -> Fit:
+            sigma: Mapping[str, float] | None = None, confidence: float = 0.95, max_motions: int = 200, **options: Any) -> Fit:
         """Parameters for which the motion is nearest to data, with confidence intervals.
 
-        data: a file, or {"t": …, "x": …, "v_x": …}, columns of one length, NaN where nothing was measured.
-        start: where the search begins, by parameter.  sigma: standard deviations by column, 1 without.
-        Made by ``diracstep fit``.  Raises Failure where the search does not end at a least sum of squares.
+        data: a CSV file, or {"t": …, "x": …, "v_x": …}, columns of one length: coordinates, velocities and outputs; an empty field
+        or NaN where nothing was measured.
+        start: where the search begins, by parameter.  sigma: standard deviations by column, 1 without.  options: method, order,
+        rule, solver, jacobian and step, the largest: between two times so many equal ones are taken.
+        Raises Failure where the search does not end at a least sum of squares; warns with Doubt where what is left is far larger
+        than sigma.  Ctrl-C ends it with KeyboardInterrupt.
         """
-        options = ["--confidence", repr(real(confidence, "confidence"))]
-        options += [] if step is None else ["--step", repr(real(step, "step"))]
-        options += [] if method is None else ["--method", method]
-        return fit(self, data, parameters, start or {}, sigma or {}, options)
+        return fit_of(self, data, parameters, start, sigma, confidence, max_motions, options)
 
     def sweep(self, grid: Mapping[str, Sequence[float]] | None = None, record: Sequence[str] = (), *,
               table: Mapping[str, Sequence[float]] | None = None, random: Mapping[str, Sequence[Any]] | None = None,

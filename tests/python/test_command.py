@@ -1,4 +1,4 @@
-"""Verbs that the command does: equilibrium, start, fit, sweep, study."""
+"""Verbs that the command does: sweep, study."""
 
 import tempfile
 
@@ -6,38 +6,6 @@ import numpy as np
 import pytest
 
 import diracstep as ds
-
-
-def test_an_equilibrium_and_its_eigenvalues(spring):
-    found = spring.with_parameters(k=4.0).equilibrium()
-    assert found.q == pytest.approx([0.0], abs=1e-12)
-    assert found.eigenvalues == pytest.approx([2.0j]) and found.document["status"] == "ok"
-    chain = ds.load("hanging_chain", N=3).equilibrium()
-    assert chain.q[1::2] == pytest.approx(-np.arange(1, 4) / 3, abs=1e-10) and chain.lambda_.shape == (3,)
-    with pytest.raises(ds.Failure, match="no equilibrium"):
-        ds.load("knife_edge").equilibrium()
-
-
-def test_the_start_that_runs_take(skate):
-    start = skate.start()
-    assert np.array_equal(start.q, skate.start_q) and np.array_equal(start.v, skate.start_v)
-    assert start.acceleration[0] == pytest.approx(skate.parameters["g_sin_alpha"]) and start.origin["v"]["ph"] == "given"
-
-
-def test_a_fit_finds_planted_parameters(spring, tmp_path):
-    run = spring.with_parameters(k=2.5).run(step=0.1)
-    noise = np.random.default_rng(1).normal(0.0, 1e-3, len(run))
-    data = {"t": run.t, "x": np.where(np.arange(len(run)) % 7 == 3, np.nan, run["x"] + noise), "v_x": run["v_x"]}
-    found = spring.fit(data, ["k"], start={"k": 2.0}, sigma={"x": 1e-3, "v_x": 1e-3})
-    assert found.converged and abs(found.parameters["k"] - 2.5) < 2 * found.intervals["k"] < 1e-2
-    assert found.covariance.shape == (1, 1)
-    file = tmp_path / "data.csv"
-    file.write_text("t,x\n" + "\n".join(f"{t!r},{x!r}" for t, x in zip(run.t.tolist(), run["x"].tolist())))
-    assert spring.fit(file, ["k"]).parameters["k"] == pytest.approx(2.5, abs=1e-6)
-    with pytest.raises(ds.Misuse, match="'t'"):
-        spring.fit({"x": [1.0]}, ["k"])
-    with pytest.raises(ds.Misuse, match="'m'"):
-        spring.fit(data, ["m"])
 
 
 def test_a_sweep_is_a_table(spring, tmp_path):
@@ -92,7 +60,6 @@ def test_a_scene_with_files_of_its_own_stays_where_it_is(tmp_path):
     file.write_text('name = "driven"\nlagrangian = "v_x^2/2"\n[coordinates]\nx = {}\n[inputs]\nu = { file = "table.csv", column = "u" }\n'
                     '[force]\nx = "u"\n[span]\nend = 1.0\nstep = 0.1\n')
     scene = ds.load(file)
-    assert scene.start().acceleration == pytest.approx([0.0])
     assert len(scene.study(methods=["type1/midpoint"], steps=[0.1], ida=False, erk=False, budget=0.01).rows) >= 1
 
 
@@ -100,7 +67,7 @@ def test_callbacks_are_refused():
     with pytest.warns(ds.CallbackCost):
         scene = ds.Scene(["x"], lambda q, v: v[0] ** 2 / 2, callback=True)
     with pytest.raises(ds.Misuse, match="callbacks"):
-        scene.start()
+        scene.sweep({"x": [1.0]}, ["x"])
 
 
 def test_a_start_by_names():

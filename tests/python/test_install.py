@@ -30,7 +30,8 @@ def test_the_structs_are_those_of_the_header():
     names = {"parameter": c.Parameter, "source": c.Source, "facts": c.Facts, "table": c.Table, "options": c.Options, "state": c.State,
              "statistics": c.Statistics, "points": c.Points, "course": c.Course, "error": c.ErrorRequest, "found": c.Found,
              "ensemble": c.Ensemble, "derivatives": c.Derivatives, "event": c.Event, "ends": c.Ends, "boundary": c.Boundary,
-             "control": c.Control, "controlled": c.Controlled}
+             "control": c.Control, "controlled": c.Controlled, "rest": c.Rest, "equilibrium": c.Equilibrium, "data": c.Data,
+             "fitted": c.Fitted}
     assert set(names) == set(re.findall(r"typedef struct diracstep_(\w+) \{", header))
     for name, struct in names.items():
         body = re.search(r"typedef struct diracstep_%s \{(.*?)\n\}" % name, header, re.DOTALL)[1]

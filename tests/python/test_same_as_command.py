@@ -14,11 +14,14 @@ import diracstep as ds
 SCENES = sorted((Path(__file__).parents[2] / "examples" / "scenes").glob("*.toml"))
 
 
-def of_command(scene, *options):
-    done = subprocess.run([os.environ["DIRACSTEP_COMMAND"], "run", str(scene), "--json", "--out", "run.csv", "--every", "7", *options],
-                          capture_output=True, text=True)
+def of_verb(verb, scene, *options):
+    done = subprocess.run([os.environ["DIRACSTEP_COMMAND"], verb, str(scene), "--json", *options], capture_output=True, text=True)
     assert done.stdout, done.stderr
     return json.loads(done.stdout)
+
+
+def of_command(scene, *options):
+    return of_verb("run", scene, "--out", "run.csv", "--every", "7", *options)
 
 
 # A rectifier: the charge of its capacitor, whose ripple is slow beside what the diode damps.
@@ -63,8 +66,8 @@ def assert_same(run, theirs):
     assert run.statistics.method == theirs["method"] and run.statistics.order == theirs["order"]
     assert run.statistics.steps == theirs["steps"]
     assert run.t[-1] == theirs["end"]["t"] and run.energy[-1] == theirs["end"]["energy"]
-    for what, columns in (("q", run.q), ("v", run.v), ("p", run.p)):
-        assert np.array_equal(columns[-1], [theirs["end"][what][name] for name in run.scene.coordinates], equal_nan=True), what
+    for what, columns, names in (("q", run.q, run.scene.positions), ("v", run.v, run.scene.coordinates), ("p", run.p, run.scene.coordinates)):
+        assert np.array_equal(columns[-1], [theirs["end"][what][name] for name in names], equal_nan=True), what
     assert np.array_equal(run.lambda_[-1], [theirs["end"]["lambda"][name] for name in run.scene.rows])
     assert {name: run[name][-1] for name in run.scene.outputs} == theirs["outputs"]
     assert run.stopped == theirs["stopped"] and run.doubt == (theirs["doubt"] or "")
@@ -77,20 +80,9 @@ def assert_same(run, theirs):
         assert event.get("impulse") is None or event["impulse"] == ours.impulse
 
 
-def loaded_or_refused(name):
-    """None where the configuration space is not R^n, which the interface refuses by name."""
-    try:
-        return ds.load(name)
-    except ds.Misuse as refusal:
-        assert "in R^n only" in str(refusal)
-        return None
-
-
 @pytest.mark.parametrize("name", list(ds.catalogue))
 def test_a_run_without_options_is_that_of_the_command(name):
-    scene = loaded_or_refused(name)
-    if scene is None:
-        return
+    scene = ds.load(name)
     span = scene.until - scene.start_time
     # large scenes, and long motions, take a part of their time
     until = scene.until if abs(span / scene.step) * len(scene.coordinates) < 3000 else scene.start_time + 0.1 * span
@@ -133,3 +125,54 @@ def test_a_search_ends_where_that_of_the_command_does(name):
     assert run.search.method == theirs["method"] and run.search.order == theirs["order"]
     assert run.search.estimate == theirs["error_control"]["estimate"]
     assert list(run.q[-1]) == list(theirs["end"]["q"].values())
+
+
+def matrix(document, what, like):
+    return np.array(document[what]).reshape(like.shape)
+
+
+@pytest.mark.parametrize("name, options, ours", [
+    ("hanging_chain", ["--set", "N=3"], {}), ("flyball_governor", ["--along"], {"along": True}),
+    ("hanging_chain", ["--modes", "3", "--near", "1"], {"modes": 3, "near": 1.0}),
+])
+def test_an_equilibrium_is_that_of_the_command(name, options, ours):
+    scene = ds.load(name, N=3) if "N=3" in options else ds.load(name)
+    found, theirs = scene.equilibrium(**ours), of_verb("equilibrium", name, *options)
+    assert (found.t, found.iterations, found.doubt) == (theirs["t"], theirs["iterations"], theirs["doubt"] or "")
+    for what, values in (("q", found.q), ("v", found.v), ("lambda", found.lambda_)):
+        assert list(values) == list(theirs[what].values()), what
+    assert [[value.real, value.imag] for value in found.eigenvalues] == [mode["eigenvalue"] for mode in theirs["modes"]]
+    assert [[[z.real, z.imag] for z in mode] for mode in found.modes] == [list(mode["mode"].values()) for mode in theirs["modes"]]
+    assert (found.zeros, found.stability, found.variation) == (theirs["zero_eigenvalues"], theirs["stability"], theirs["variation"])
+    assert found.near == theirs.get("near")
+    for what in ("positions", "velocities", "drift", "mass", "damping", "stiffness"):
+        values = getattr(found, what)
+        assert (values is None) == (what not in theirs)
+        assert values is None or np.array_equal(values, matrix(theirs, what, values)), what
+
+
+@pytest.mark.parametrize("name", ["andrews_squeezer", "lotka_volterra_2d", "heavy_top_so3", "lc_circuit"])
+def test_a_start_is_that_of_the_command(name):
+    found, theirs = ds.load(name).start(), of_verb("start", name)
+    for what, values in (("q", found.q), ("v", found.v), ("p", found.p)):
+        assert list(values) == list(theirs[what].values()), what
+    assert [found.lambda_[k] for k, row in enumerate(ds.load(name).rows)] == [theirs["lambda"][row] for row in ds.load(name).rows]
+    assert found.energy == theirs["energy"]
+    assert np.array_equal(found.acceleration, list((theirs["acceleration"] or {"": np.nan}).values()), equal_nan=True) \
+        or np.isnan(found.acceleration).all() and theirs["acceleration"] is None
+    assert list(found.origin.values()) == [*theirs["origin"]["q"].values(), *theirs["origin"]["v"].values()]
+
+
+def test_a_fit_is_that_of_the_command(tmp_path):
+    run = ds.load("chaplygin_sleigh", a=0.22).run(until=4.0)
+    file = tmp_path / "data.csv"
+    lines = [",".join(["" if k % 5 == 2 else repr(x), repr(v)]) for k, (x, v) in enumerate(zip(run["x"].tolist(), run["v_th"].tolist()))]
+    file.write_text("t,x,v_th\n" + "".join(f"{t!r},{line}\n" for t, line in zip(run.t.tolist(), lines)))
+    theirs = of_verb("fit", "chaplygin_sleigh", str(file), "--parameters", "a,J", "--from", "a=0.3", "--sigma", "x=0.5")
+    x = np.where(np.arange(len(run)) % 5 == 2, np.nan, run["x"])
+    for data in (file, {"t": run.t, "x": x, "v_th": run["v_th"]}):
+        found = ds.load("chaplygin_sleigh").fit(data, ["a", "J"], start={"a": 0.3}, sigma={"x": 0.5})
+        assert found.parameters == {name: entry["value"] for name, entry in theirs["parameters"].items()}
+        assert found.intervals == {name: entry["interval"] for name, entry in theirs["parameters"].items()}
+        assert found.covariance.tolist() == theirs["covariance"] and found.ending == theirs["ending"]
+        assert (found.motions, found.measured, found.residual) == (theirs["motions"], theirs["measured"], theirs["residual"])

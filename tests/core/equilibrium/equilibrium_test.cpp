@@ -63,6 +63,24 @@ TEST(Equilibrium, WhereNewtonsPathEndsItRelaxes) {
   EXPECT_NEAR(found.lambda[0], -gravity / 2.0, 1e-12);  // 2 z λ holds the weight
 }
 
+/// Two rows on one circle: off it they are independent, so that the directions allowed change on the way,
+/// which may end there.
+TEST(Equilibrium, RowsThatDependOnTheirSurfaceAloneEndTheWayInWords) {
+  Scene scene = scene_of({"x", "y"}, lagrangian<2>([](const auto& x, const auto& w) {
+                           return 0.5 * (w[0] * w[0] + w[1] * w[1]) - gravity * x[1];
+                         }),
+                         Vector{{1.0, 0.0}}, Vector::Zero(2));
+  scene.constraints = {holonomic<2, 2>(
+      []<class T>(const std::array<T, 2>& x) {
+        const T off = x[0] * x[0] + x[1] * x[1] - 1.0;
+        return std::array<T, 2>{off, off * (2.0 + x[0])};
+      },
+      {"rod", "again"})};
+  const Equilibrium found = find_equilibrium(scene, scene.start);
+  EXPECT_FALSE(found.ok());
+  EXPECT_NE(found.failure.find("is left on 'y'"), std::string::npos) << found.failure;
+}
+
 TEST(Equilibrium, AHugeFirstCorrectionIsNoScale) {
   const Scene scene = pendulum(std::acos(0.0));  // the stiffness is 6e-17 of the force
   const Equilibrium at = find_equilibrium(scene, scene.start);
