@@ -24,9 +24,9 @@ struct ConstraintLevel {
 /// read (Dθ − Dθᵀ) v = −∇H − ∂θ/∂t + f + AᵀΛ; L = v_x²/2 + z v_y − V has y and z of first and x of second
 /// order. The columns of U span what is orthogonal to W: motions with inertia.
 ///
-/// `by_force`: momenta along W are constant, but a force on motions along W that the rows allow is not linear
-/// in v, such as the voltage of a diode in a loop without inductors.  The equations then determine velocities
-/// by ∂f/∂v, at each instant: a differential-algebraic system of index 1, which ordinary steps solve.
+/// `by_force`: momenta along W, here the part of the kernel with A W = 0, are constant, but a force along W
+/// is not linear in v, such as the voltage of a diode in a loop without inductors.  Wᵀ(∂L/∂q + f) = 0 gives
+/// velocities by ∂f/∂v, at each instant (ByForceVelocityProblem in kernel_motions.hpp); ordinary steps do so.
 ///
 /// `hidden`: the kernel moves, or equations along it hold no velocity along it and are constraints
 /// (kernel_motions.hpp); w is the kernel near the start, and momenta of the coordinates `inert` are the
