@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <diracstep/core/system/first_order_motions.hpp>
 #include <memory>
 #include <string>
@@ -109,6 +110,7 @@ class ByForceVelocityProblem final : public MomentumVelocityProblem {
   double unit() const;
   FirstOrderPoint point_;
   ConstraintsAtPoint rows_;
+  std::array<double, 3> first_{};  ///< scales of the blocks at the guess
 };
 
 /// Throws InconsistentStart where a start violates a hidden equation by more than 1e-10 of its terms; names

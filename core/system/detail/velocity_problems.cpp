@@ -79,9 +79,11 @@ void ByForceVelocityProblem::residual(ConstVectorRef x, VectorRef f) {
   f.head(u.cols()) = u.transpose() * (point_.momentum() - momentum);
   f.segment(u.cols(), w.cols()) = -w.transpose() * point_.force();
   f.tail(m_) = point_.row_residual();
+  // By the terms at the guess and here: those in between may be the currents of diodes far beyond any.
   std::size_t b = 0;
   const auto raise = [&](double terms) {
-    blocks_[b].scale = std::max(blocks_[b].scale, scale_of(terms));
+    if (blocks_[b].scale == smallest_scale) first_.at(b) = scale_of(terms);
+    blocks_[b].scale = std::max(first_.at(b), scale_of(terms));
     ++b;
   };
   if (u.cols() > 0) raise(std::max({max_norm(p_), max_norm(momentum), max_norm(point_.momentum())}));
