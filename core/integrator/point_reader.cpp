@@ -1,6 +1,7 @@
 #include <diracstep/core/integrator/point_reader.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/numerics/lu.hpp>
+#include <diracstep/core/system/kernel_motions.hpp>
 #include <diracstep/core/system/multiplier_rows.hpp>
 #include <utility>
 
@@ -94,9 +95,17 @@ SolveReport PointReader::velocity_of_first_order(double t, ConstVectorRef q, Con
   first_order_velocity_->begin(t, q, p);
   unknowns_.head(n) = v;
   unknowns_.tail(scene_->rows()).setZero();
-  const SolveReport report = velocity_solver_->solve(unknowns_);
+  SolveReport report = velocity_solver_->solve(unknowns_);
   velocity_solver_->reset();
-  if (report.ok()) v = unknowns_.head(n);
+  auto* by_force = dynamic_cast<ByForceVelocityProblem*>(first_order_velocity_.get());
+  if (!report.ok() && by_force != nullptr) {  // as where a switch has opened: far from where diodes were
+    unknowns_.head(n) = v;
+    unknowns_.tail(scene_->rows()).setZero();
+    if (by_force->solve_from_afar(unknowns_).empty()) report.status = SolveStatus::ok;
+  }
+  if (!report.ok()) return report;
+  v = unknowns_.head(n);
+  if (by_force != nullptr) unknowns_.tail(scene_->rows()) = by_force->forces(v);
   return report;
 }
 

@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <cmath>
 #include <diracstep/core/numerics/errors.hpp>
-#include <diracstep/core/numerics/monotone_newton.hpp>
 #include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/core/spaces/space.hpp>
 #include <diracstep/core/system/consistent_start.hpp>
@@ -12,6 +11,7 @@
 #include <diracstep/core/system/first_order_motions.hpp>
 #include <diracstep/core/system/hamiltonian_point.hpp>
 #include <diracstep/core/system/hidden_rows.hpp>
+#include <diracstep/core/system/kernel_motions.hpp>
 #include <diracstep/core/system/redundant_rows.hpp>
 #include <diracstep/core/system/saddle_point.hpp>
 #include <functional>
@@ -178,24 +178,14 @@ ProjectedStart project_kernel_start(const Scene& scene, const FirstOrderMotions&
 Vector velocity_by_force(const Scene& scene, const FirstOrderMotions& motions, double t, const Vector& q,
                          const Vector& v) {
   const Eigen::Index n = scene.dimension(), m = scene.rows();
-  Vector lq(n), p(n), x = Vector::Zero(n + m), left(n + m), slopes((n + m) * (n + m));
+  Vector lq(n), p(n), x = Vector::Zero(n + m);
   scene.lagrangian->gradient(t, q, v, lq, p);
   x.head(n) = v;
-  FirstOrderVelocityProblem problem(scene, motions);
+  ByForceVelocityProblem problem(scene, motions);
   problem.begin(t, q, p);
-  const MonotoneNewton end = solve_monotonically(
-      [&](const Vector& at) {
-        problem.residual(at, left);
-        return left;
-      },
-      [&](const Vector& at) -> Columns {
-        problem.jacobian(at, slopes);
-        return slopes.reshaped(n + m, n + m);
-      },
-      x);
-  if (!end.failure.empty())
+  if (const std::string failure = problem.solve_from_afar(x); !failure.empty())
     throw Misuse("scene '" + scene.name +
-                 "': no velocities at the start that its forces determine: " + end.failure);
+                 "': no velocities at the start that its forces determine: " + failure);
   return x.head(n);
 }
 

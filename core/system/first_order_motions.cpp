@@ -53,19 +53,18 @@ struct AtTwoPoints {
   Columns mass, by_q, one_forms;
 };
 
-/// Whether the force on coordinates that move along the columns of `free` is anything but linear in v, near
-/// the start: each component in its own units, and to both sides, since a diode blocks on one.  By unit
-/// velocities as well, since at the small ones of a start a diode is a resistor to round-off.
+/// Whether the force on coordinates that move along the columns of `free` is anything but linear in v: each
+/// component in its own units, and to both sides, since a diode blocks on one.  Near the start and about
+/// rest: a diode that blocks 12 V there is a resistor for 12 V around.  By unit velocities and large ones as
+/// well, since at small ones a diode is a resistor to round-off, and below its breakdown another one.
 bool non_linear_in_velocity(const Scene& scene, const Columns& free) {
-  constexpr double linear_to = 1e-9;
+  constexpr double linear_to = 1e-9, large = 100.0;
   const Start& start = scene.start;
   const Eigen::Index n = start.v.size();
   Vector once(n), twice(n), none(n);
   scene.force->value(start.time, start.q, Vector::Zero(n), none);
   const double size = size_or_one(max_norm(start.v));
-  for (const double step : {size, -size, 1.0, -1.0}) {
-    Vector v = start.v;
-    for (Eigen::Index i = 0; i < n; ++i) v[i] += step * std::cos(0.3 + 2.3 * static_cast<double>(i));
+  const auto shows_at = [&](const Vector& v) {
     scene.force->value(start.time, start.q, v, once);
     scene.force->value(start.time, start.q, 2.0 * v, twice);
     for (Eigen::Index i = 0; i < n; ++i) {
@@ -73,6 +72,12 @@ bool non_linear_in_velocity(const Scene& scene, const Columns& free) {
       const double terms = std::abs(twice[i]) + 2.0 * std::abs(once[i]) + std::abs(none[i]);
       if (!(off <= linear_to * terms) && max_norm(free.row(i).transpose()) > 0.0) return true;
     }
+    return false;
+  };
+  for (const double step : {size, -size, 1.0, -1.0, large, -large}) {
+    Vector beside(n);
+    for (Eigen::Index i = 0; i < n; ++i) beside[i] = step * std::cos(0.3 + 2.3 * static_cast<double>(i));
+    if (shows_at(start.v + beside) || shows_at(beside)) return true;
   }
   return false;
 }
@@ -124,9 +129,10 @@ FirstOrderMotions motions_of_one_level(const Scene& scene) {
   if (FirstOrderMotions motions = kernel_motions(scene, !constant); motions.exist()) return motions;
   if (free.cols() == 0) return {};
   if (constant && !(by_force && non_linear_in_velocity(scene, free))) return {};
-  const Eigen::HouseholderQR<Columns> qr(w);
+  const Columns& along = constant ? free : w;
+  const Eigen::HouseholderQR<Columns> qr(along);
   const Columns q = qr.householderQ() * Columns::Identity(n, n);
-  return {w, q.rightCols(n - w.cols()), constant};
+  return {along, q.rightCols(n - along.cols()), constant};
 }
 
 }  // namespace

@@ -29,9 +29,9 @@ struct ConstraintLevels {
 /// read (Dθ − Dθᵀ) v = −∇H − ∂θ/∂t + f + AᵀΛ; L = v_x²/2 + z v_y − V has y and z of first and x of second
 /// order. The columns of U span what is orthogonal to W: motions with inertia.
 ///
-/// `by_force`: momenta along W are constant, but a force on motions along W that the rows allow is not linear
-/// in v, such as the voltage of a diode in a loop without inductors.  The equations then determine velocities
-/// by ∂f/∂v, at each instant: a differential-algebraic system of index 1, which ordinary steps solve.
+/// `by_force`: momenta along W, here the part of the kernel with A W = 0, are constant, but a force along W
+/// is not linear in v, such as the voltage of a diode in a loop without inductors.  Wᵀ(∂L/∂q + f) = 0 gives
+/// velocities by ∂f/∂v, at each instant (ByForceVelocityProblem in kernel_motions.hpp); ordinary steps do so.
 ///
 /// `hidden`: the kernel moves, or equations along it hold no velocity along it and are constraints
 /// (kernel_motions.hpp); w is the kernel near the start, and momenta of the coordinates `inert` are the
@@ -82,8 +82,6 @@ class FirstOrderPoint {
   const Vector& force() const { return force_; }                ///< ∂L/∂q + f + AᵀΛ
   const Vector& momentum_rate() const { return rate_; }         ///< (∂²L/∂v∂q) v + ∂²L/∂v∂t
   const Vector& row_residual() const { return row_residual_; }  ///< A v + b
-  /// A, at once.
-  Columns rows_here() const { return constraints_.pattern().full(constraints_.coefficients()); }
   Columns mass_here() const { return scene_.lagrangian->pattern().full(l_.vv); }  ///< ∂²L/∂v², at once
   const Columns& mass() const { return mass_; }                                   ///< ∂²L/∂v²
   const Columns& momentum_by_q() const { return by_q_; }                          ///< ∂²L/∂v∂q
@@ -114,7 +112,7 @@ class MomentumVelocityProblem : public NonlinearProblem {
   int size() const final { return n_ + m_; }
   const SparsityPattern& pattern() const final { return pattern_; }
   std::span<const ResidualBlock> blocks() const final { return blocks_; }
-  virtual void begin(double t, ConstVectorRef q, ConstVectorRef p);
+  void begin(double t, ConstVectorRef q, ConstVectorRef p);
   /// From now on what is solved within starts from the last solution: quicker along a motion, but bits depend
   /// on where it was asked before.
   virtual void start_from_last() {}
@@ -131,13 +129,11 @@ class MomentumVelocityProblem : public NonlinearProblem {
   SparsityPattern pattern_;
 };
 
-/// By the equations of FirstOrderPoint.  Steps of motions by_force leave p up to the annihilator of the rows;
-/// since momenta along W are known, it is p + Aᵀμ with Wᵀ(p + Aᵀμ) = Wᵀ ∂L/∂v that counts.
+/// By the equations of FirstOrderPoint.
 class FirstOrderVelocityProblem final : public MomentumVelocityProblem {
  public:
   FirstOrderVelocityProblem(const Scene& scene, const FirstOrderMotions& motions);
 
-  void begin(double t, ConstVectorRef q, ConstVectorRef p) override;
   void residual(ConstVectorRef x, VectorRef f) override;
   void jacobian(ConstVectorRef x, VectorRef values) override;
 

@@ -224,6 +224,15 @@ Columns directions(const Scene& scene, const Point& start, const FullDerivatives
   return constant;
 }
 
+/// Nearer to the start where diodes would conduct so much that all else is round-off beside it.
+Point conducting(const Scene& scene, Point near_start, const FullDerivatives& at_start) {
+  constexpr int halvings = 12;
+  const double most = 1e3 * size_or_one(max_norm(at_start.fv));
+  for (int k = 0; k < halvings && !(max_norm(FullDerivatives(scene, near_start).fv) <= most); ++k)
+    near_start.v = 0.5 * (near_start.v + scene.start.v);
+  return near_start;
+}
+
 Columns hidden_matrix(const Directions& w, const FullDerivatives& d) {
   Columns matrix(w.resisted.cols() + w.free.cols(), d.lqq.cols());
   matrix << w.resisted.transpose() * d.fv, w.free.transpose() * (d.lqq + d.fq);
@@ -246,10 +255,12 @@ ConstraintBlocks hidden_rows(const Scene& scene) {
   if (!at_first.lvv.allFinite()) return {};  // told where the momentum is taken
   const Columns w = directions(scene, first, at_first, other, at_other);
   if (w.cols() == 0) return {};
-  const FullDerivatives& resisting = first_order.by_force ? at_other : at_first;
+  const Point aside = first_order.by_force ? conducting(scene, other, at_first) : other;
+  const FullDerivatives at_aside(scene, aside);
+  const FullDerivatives& resisting = first_order.by_force ? at_aside : at_first;
   Directions parts = split(w, resisting.fv, first_order.by_force);
   if (!first_order.by_force) parts.resisted = with_rows_apart(parts.resisted, resisting.fv, w);
-  require_described(scene, w, parts, other, at_other);
+  require_described(scene, w, parts, aside, at_aside);
   const Columns matrix = hidden_matrix(parts, resisting);
   const Vector units = largest_of_rows(matrix);
   const Columns undetermined = kernel(units.cwiseInverse().asDiagonal() * matrix * w);

@@ -1,7 +1,9 @@
 #pragma once
 
+#include <array>
 #include <diracstep/core/system/first_order_motions.hpp>
 #include <memory>
+#include <string>
 #include <vector>
 
 namespace diracstep {
@@ -82,6 +84,33 @@ class KernelVelocityProblem final : public MomentumVelocityProblem {
  private:
   int inert_;
   KernelPoint point_;
+};
+
+/// Unknowns (v, κ) at given t, q, p of motions by_force (first_order_motions.hpp), W with A W = 0: steps
+/// leave the class of p, as VelocityProblem takes it, and the forces determine v along W,
+///
+///   Uᵀ(∂L/∂v − p − μ Aᵀκ) = 0,   Wᵀ(∂L/∂q + f) = 0,   A v + b = 0,
+///
+/// μ being the largest entry of ∂²L/∂v².
+class ByForceVelocityProblem final : public MomentumVelocityProblem {
+ public:
+  ByForceVelocityProblem(const Scene& scene, const FirstOrderMotions& motions);
+
+  void residual(ConstVectorRef x, VectorRef f) override;
+  void jacobian(ConstVectorRef x, VectorRef values) override;
+
+  /// By solve_monotonically(), from a guess far away; empty, or why there is no solution.
+  std::string solve_from_afar(Vector& x);
+  /// Λ at (t, q) and v, with some acceleration a; what a is along W counts nowhere:
+  ///
+  ///   Uᵀ[(∂²L/∂v²) a + (∂²L/∂v∂q) v + ∂²L/∂v∂t − ∂L/∂q − f − AᵀΛ] = 0,   Wᵀa = 0,   d/dt (A v + b) = 0
+  Vector forces(ConstVectorRef v);
+
+ private:
+  double unit() const;
+  FirstOrderPoint point_;
+  ConstraintsAtPoint rows_;
+  std::array<double, 3> first_{};  ///< scales of the blocks at the guess
 };
 
 /// Throws InconsistentStart where a start violates a hidden equation by more than 1e-10 of its terms; names

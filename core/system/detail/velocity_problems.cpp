@@ -1,8 +1,9 @@
-#include <Eigen/QR>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/numerics/kernel_basis.hpp>
+#include <diracstep/core/numerics/monotone_newton.hpp>
 #include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/core/system/detail/constraint_levels.hpp>
 #include <diracstep/core/system/first_order_motions.hpp>
@@ -27,17 +28,6 @@ void MomentumVelocityProblem::begin(double t, ConstVectorRef q, ConstVectorRef p
   q_ = q;
   p_ = p;
   for (ResidualBlock& block : blocks_) block.scale = smallest_scale;
-}
-
-void FirstOrderVelocityProblem::begin(double t, ConstVectorRef q, ConstVectorRef p) {
-  MomentumVelocityProblem::begin(t, q, p);
-  if (m_ == 0 || !point_.motions().by_force) return;
-  const Vector none = Vector::Zero(n_);
-  point_.evaluate(t, q, none, Vector::Zero(m_));
-  const Columns forms = point_.rows_here(), &w = point_.motions().w;
-  const Columns along = w.transpose() * forms.transpose();
-  p_ += forms.transpose() *
-        along.completeOrthogonalDecomposition().solve(w.transpose() * (point_.momentum() - p));
 }
 
 void FirstOrderVelocityProblem::residual(ConstVectorRef x, VectorRef f) {
@@ -69,10 +59,87 @@ void FirstOrderVelocityProblem::jacobian(ConstVectorRef x, VectorRef values) {
   j.bottomLeftCorner(m_, n_) = point_.rows();
 }
 
+ByForceVelocityProblem::ByForceVelocityProblem(const Scene& scene, const FirstOrderMotions& motions)
+    : MomentumVelocityProblem(scene), point_(scene, motions), rows_(scene.constraints, n_) {
+  const auto inert = static_cast<int>(motions.u.cols());
+  if (inert > 0) blocks_.push_back({"momentum", inert});
+  blocks_.push_back({"force", n_ - inert});
+  if (m_ > 0) blocks_.push_back({"velocity", m_});
+}
+
+double ByForceVelocityProblem::unit() const { return size_or_one(max_norm(point_.mass_here())); }
+
+void ByForceVelocityProblem::residual(ConstVectorRef x, VectorRef f) {
+  point_.evaluate(t_, q_, x.head(n_), Vector::Zero(m_));
+  const Columns &w = point_.motions().w, &u = point_.motions().u;
+  Vector momentum = p_;
+  if (m_ > 0) {
+    rows_.evaluate(t_, q_);
+    rows_.add_annihilator(unit() * x.tail(m_), momentum);
+  }
+  f.head(u.cols()) = u.transpose() * (point_.momentum() - momentum);
+  f.segment(u.cols(), w.cols()) = -w.transpose() * point_.force();
+  f.tail(m_) = point_.row_residual();
+  // By the terms at the guess and here: those in between may be the currents of diodes far beyond any.
+  std::size_t b = 0;
+  const auto raise = [&](double terms) {
+    if (blocks_[b].scale == smallest_scale) first_.at(b) = scale_of(terms);
+    blocks_[b].scale = std::max(first_.at(b), scale_of(terms));
+    ++b;
+  };
+  if (u.cols() > 0) raise(std::max({max_norm(p_), max_norm(momentum), max_norm(point_.momentum())}));
+  raise(max_norm(w.transpose().cwiseAbs() * point_.force().cwiseAbs()));
+  if (m_ > 0) raise(max_norm(x.head(n_)));
+}
+
+void ByForceVelocityProblem::jacobian(ConstVectorRef x, VectorRef values) {
+  point_.evaluate(t_, q_, x.head(n_), Vector::Zero(m_));
+  point_.differentiate();
+  const Columns &w = point_.motions().w, &u = point_.motions().u;
+  const Eigen::Index inert = u.cols();
+  auto j = values.reshaped(n_ + m_, n_ + m_);
+  j.setZero();
+  j.topLeftCorner(inert, n_) = u.transpose() * point_.mass();
+  j.topRightCorner(inert, m_) = -unit() * u.transpose() * point_.rows().transpose();
+  j.block(inert, 0, w.cols(), n_) = -w.transpose() * point_.force_by_v();
+  j.bottomLeftCorner(m_, n_) = point_.rows();
+}
+
+std::string ByForceVelocityProblem::solve_from_afar(Vector& x) {
+  Vector left(size()), slopes(size() * size());
+  const auto residual_at = [&](const Vector& at) {
+    residual(at, left);
+    return left;
+  };
+  const auto jacobian_at = [&](const Vector& at) -> Columns {
+    jacobian(at, slopes);
+    return slopes.reshaped(size(), size());
+  };
+  return solve_monotonically(residual_at, jacobian_at, x).failure;
+}
+
+Vector ByForceVelocityProblem::forces(ConstVectorRef v) {
+  point_.evaluate(t_, q_, v, Vector::Zero(m_));
+  point_.differentiate();
+  const Columns &w = point_.motions().w, &u = point_.motions().u;
+  const Eigen::Index inert = u.cols();
+  const double mass = unit();
+  Columns matrix = Columns::Zero(n_ + m_, n_ + m_);
+  matrix.topLeftCorner(inert, n_) = u.transpose() * point_.mass() / mass;
+  matrix.topRightCorner(inert, m_) = -u.transpose() * point_.rows().transpose();
+  matrix.block(inert, 0, n_ - inert, n_) = w.transpose();
+  matrix.bottomLeftCorner(m_, n_) = point_.rows();
+  Vector right = Vector::Zero(n_ + m_);
+  right.head(inert) = u.transpose() * (point_.force() - point_.momentum_rate()) / mass;
+  right.tail(m_) = -(point_.row_by_q() * v + point_.row_by_t());
+  return mass * matrix.partialPivLu().solve(right).tail(m_);
+}
+
 std::unique_ptr<MomentumVelocityProblem> velocity_problem(const Scene& scene,
                                                           const FirstOrderMotions& motions) {
   if (!motions.levels.empty()) return std::make_unique<LevelledVelocityProblem>(scene, motions);
   if (motions.hide_equations()) return std::make_unique<KernelVelocityProblem>(scene, motions);
+  if (motions.by_force) return std::make_unique<ByForceVelocityProblem>(scene, motions);
   return std::make_unique<FirstOrderVelocityProblem>(scene, motions);
 }
 
