@@ -83,6 +83,7 @@ void RadauRows::plan(Block& block, BlockPattern& layout) {
 void RadauRows::begin(double t, ConstVectorRef q0) {
   if (m_ > 0) start_.evaluate(t, q0);
   if (holonomic_rows() > 0) projection_.evaluate(t, q0);
+  for (Block& block : blocks_) block.derivative.setZero();  // rate_size() depends on this step alone
 }
 
 void RadauRows::project(const double* x, NodePoints& at) const {
@@ -205,6 +206,14 @@ double RadauRows::curvature_size() const {
   return largest;
 }
 
+double RadauRows::rate_size() const {
+  double largest = 0.0;
+  for (const Block& block : blocks_)
+    if (!block.rows->holonomic())
+      largest = std::max(largest, largest_entry(block.derivative.data(), block.derivative.size()));
+  return largest;
+}
+
 void RadauRows::add_impulse_sizes(const double* x, const Vector& q, Vector& sizes) const {
   for (const Block& block : blocks_)
     for (int i = 0; i < s_; ++i) {
@@ -216,11 +225,14 @@ void RadauRows::add_impulse_sizes(const double* x, const Vector& q, Vector& size
     }
 }
 
-void RadauRows::size_velocity_terms(const Vector& v, Vector& sizes) const {
+void RadauRows::size_velocity_terms(const Vector& v, const Vector& q, Vector& sizes) const {
   sizes.setZero(m_);
   for (const Block& block : blocks_) {
-    block.rows->pattern().for_each(
-        [&](Eigen::Index e, int r, int c) { sizes[block.first + r] += std::abs(block.a(e, s_ - 1)) * v[c]; });
+    const bool inside = !block.rows->holonomic();
+    block.rows->pattern().for_each([&](Eigen::Index e, int r, int c) {
+      sizes[block.first + r] += std::abs(block.a(e, s_ - 1)) * v[c];
+      if (inside) sizes[block.first + r] += std::abs(block.derivative(e, s_ - 1)) * q[c];
+    });
     for (Eigen::Index r = 0; r < block.b.rows(); ++r)
       sizes[block.first + r] += block.b.row(r).cwiseAbs().maxCoeff();
   }

@@ -41,10 +41,13 @@ class RadauRows {
   double form_size() const;
   double impulse_size(const double* multipliers) const;
   double curvature_size() const;
+  /// The largest entry of ∂(A v + b)/∂q of the rows that are not holonomic, after add_to_jacobian(): what b
+  /// cancels inside, as (told - x)/lag, it loses to the round-off of positions so many times.
+  double rate_size() const;
   /// sizes += those of the terms of Aᵀλ and of what it loses to the round-off of positions.
   void add_impulse_sizes(const double* x, const Vector& q, Vector& sizes) const;
-  /// sizes = those of the terms of A v + b.
-  void size_velocity_terms(const Vector& v, Vector& sizes) const;
+  /// sizes = those of the terms of A v + b, with what b cancels inside.
+  void size_velocity_terms(const Vector& v, const Vector& q, Vector& sizes) const;
   /// sizes = those of A_h q.
   void size_position_terms(const Vector& q, Vector& sizes) const;
 
