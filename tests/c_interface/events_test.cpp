@@ -105,6 +105,7 @@ TEST_F(CInterface, TimesGoThroughEvents) {
   course.times = 3;
   course.time = times;
   Arrays arrays(2, 1, 2);
+  arrays.points.enlarge = nullptr;
   EXPECT_EQ(diracstep_run(made_, &course, &arrays.points), DIRACSTEP_FAILED);
   expect_message({"room for 2 points"});
   EXPECT_NEAR(arrays.q[0], 1.0 - 0.5 * 9.81 * 0.01, 1e-12);

@@ -6,6 +6,14 @@
 
 namespace diracstep {
 
+namespace {
+
+/// Of terms that cancel inside of b: the residual that they leave is accepted, but no step of Newton's method
+/// is left out for it.
+constexpr double part_that_counts = 1e-3;
+
+}  // namespace
+
 RadauRows::Block::Block(std::shared_ptr<const ConstraintRows> of, int s, int first_row,
                         int first_of_positions)
     : rows(std::move(of)), first(first_row), first_position(first_of_positions) {
@@ -21,6 +29,7 @@ RadauRows::RadauRows(const Scene& scene, const RadauTableau& table)
       table_(table.a),
       start_(scene.constraints, n_),
       projection_(only_holonomic(scene.constraints), n_) {
+  start_rates_.setZero(start_.pattern().nonzeros());
   int row = 0, position = 0;
   for (const auto& rows : scene.constraints) {
     blocks_.emplace_back(rows, s_, row, position);
@@ -81,9 +90,11 @@ void RadauRows::plan(Block& block, BlockPattern& layout) {
 }
 
 void RadauRows::begin(double t, ConstVectorRef q0) {
-  if (m_ > 0) start_.evaluate(t, q0);
+  if (m_ > 0) {
+    start_.evaluate(t, q0);
+    start_.distribution().derivative(t, q0, Vector::Zero(n_), 1.0, start_rates_);
+  }
   if (holonomic_rows() > 0) projection_.evaluate(t, q0);
-  for (Block& block : blocks_) block.derivative.setZero();  // rate_size() depends on this step alone
 }
 
 void RadauRows::project(const double* x, NodePoints& at) const {
@@ -206,11 +217,11 @@ double RadauRows::curvature_size() const {
   return largest;
 }
 
-double RadauRows::rate_size() const {
+double RadauRows::rate_size(const Columns& q) const {
   double largest = 0.0;
-  for (const Block& block : blocks_)
-    if (!block.rows->holonomic())
-      largest = std::max(largest, largest_entry(block.derivative.data(), block.derivative.size()));
+  start_.pattern().for_each([&](Eigen::Index e, int, int c) {
+    largest = std::max(largest, part_that_counts * std::abs(start_rates_[e] * q(c, s_ - 1)));
+  });
   return largest;
 }
 
@@ -225,14 +236,11 @@ void RadauRows::add_impulse_sizes(const double* x, const Vector& q, Vector& size
     }
 }
 
-void RadauRows::size_velocity_terms(const Vector& v, const Vector& q, Vector& sizes) const {
+void RadauRows::size_velocity_terms(const Vector& v, Vector& sizes) const {
   sizes.setZero(m_);
   for (const Block& block : blocks_) {
-    const bool inside = !block.rows->holonomic();
-    block.rows->pattern().for_each([&](Eigen::Index e, int r, int c) {
-      sizes[block.first + r] += std::abs(block.a(e, s_ - 1)) * v[c];
-      if (inside) sizes[block.first + r] += std::abs(block.derivative(e, s_ - 1)) * q[c];
-    });
+    block.rows->pattern().for_each(
+        [&](Eigen::Index e, int r, int c) { sizes[block.first + r] += std::abs(block.a(e, s_ - 1)) * v[c]; });
     for (Eigen::Index r = 0; r < block.b.rows(); ++r)
       sizes[block.first + r] += block.b.row(r).cwiseAbs().maxCoeff();
   }

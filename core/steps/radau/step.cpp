@@ -165,7 +165,7 @@ class RadauStep final : public StepProblem {
     if (m_ == 0) return;
     const double position = largest_entry(points_.gauss.data(), n_ * s_);
     scale_rows(rows_.form_size(), largest_entry(x.data(), n_ * s_), position);
-    blocks_[1].scale = std::max(blocks_[1].scale, scale_of(rows_.rate_size() * position));
+    blocks_[1].scale = std::max(blocks_[1].scale, rows_.rate_size(points_.gauss));
   }
 
   /// For such sizes of A, of velocities and of positions.
@@ -231,7 +231,7 @@ const double* RadauStep::scales_of_unsolved_rows(ConstVectorRef f, double level)
   for (int i = 0; i < s_; ++i) row_scales_.set(n_ * i, sizes_, largest_, blocks_[0].scale);
   if (m_ > 0) {
     v_ = v_.cwiseMax(q_ / h);
-    rows_.size_velocity_terms(v_, q_, rows_sizes_);
+    rows_.size_velocity_terms(v_, rows_sizes_);
     none_.setZero(m_);
     for (int i = 0; i < s_; ++i) row_scales_.set(n_ * s_ + m_ * i, rows_sizes_, none_, blocks_[1].scale);
   }

@@ -107,10 +107,10 @@ TEST_F(ShownTimesOfRuns, TheMotionKeepsItsBitsAndAResumedRunTheBytes) {
       EXPECT_EQ(shown["end"], plain["end"]) << what;
       EXPECT_EQ(shown["events"], plain["events"]) << what;
     }
-    const std::string whole = "run " + what + " --step 0.0005 --every-time 0.0037 --end 2 --out '",
+    const std::string whole = "run " + what + " --step 0.001 --every-time 0.0037 --end 1.2 --out '",
                       parts = whole + path("k.csv") + "' ";
     ASSERT_EQ(run(whole + path("whole.csv") + "'").status, 0);
-    (void)run(parts + "--max-time 0.1 --checkpoint '" + path("c") + "'");  // somewhere on the way
+    (void)run(parts + "--max-time 0.05 --checkpoint '" + path("c") + "'");  // somewhere on the way
     const Outcome rest = run(parts + "--resume '" + path("c") + "'");
     ASSERT_EQ(rest.status, 0) << rest.err;
     EXPECT_EQ(contents(path("k.csv")), contents(path("whole.csv")));
