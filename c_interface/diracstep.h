@@ -302,8 +302,10 @@ typedef struct diracstep_points {
 /* How far a run goes, and what it keeps: the start, each `every`-th point, and the end. */
 typedef struct diracstep_course {
   long steps;         /* above 0: so many steps */
-  int times;          /* above 0: at so many times instead, reached by shorter steps … */
-  const double *time; /* … which run from the current point on */
+  int times;          /* above 0: at so many times instead, reached by shorter steps; at the time of an event as
+                       * it has left the motion … */
+  const double *time; /* … which run from the current point on; those behind an event that ends the motion are
+                       * not shown */
   int ends;           /* 1: to the time `end`; 0: to that of the options or else of the scene */
   double end;
   long every;      /* 0: 1 */
@@ -312,9 +314,8 @@ typedef struct diracstep_course {
                     * has reached is kept */
 } diracstep_course;
 
-/* Runs from the current point, or to an event that ends the motion: its point is then the last one.  What was
- * kept before a failure is valid.  DIRACSTEP_MISUSE for times where steps vary or events act or end the
- * motion. */
+/* Runs from the current point, or to an event that ends the motion: its point is then the last one, but where
+ * times are given.  What was kept before a failure is valid. */
 DIRACSTEP_API int diracstep_run(diracstep_integrator *integrator, const diracstep_course *course,
                                 diracstep_points *points);
 
@@ -345,8 +346,8 @@ typedef struct diracstep_found {
 } diracstep_found;
 
 /* A run with method and steps that the library finds, repeated until the estimated error at the end is below
- * the one asked for.  Of the course, `ends`, `end`, `every`, `momentum` and `stop` count.  Steps are of one
- * size where the scene has events: DIRACSTEP_MISUSE where they are to vary.  DIRACSTEP_FAILED where the
+ * the one asked for.  Of the course, `steps` does not count; times lie before the end, where the error
+ * is.  Steps are of one size where the scene has events: DIRACSTEP_MISUSE where they are to vary.  DIRACSTEP_FAILED where the
  * search is refused: `found` and one point are then the best answer so far. */
 DIRACSTEP_API int diracstep_solve(const diracstep_model *model, const diracstep_options *options,
                                   const diracstep_course *course, const diracstep_error *error,

@@ -3,6 +3,7 @@
 #include <diracstep/c_interface/point_writer.hpp>
 #include <diracstep/core/adaptive/adaptive_run.hpp>
 #include <diracstep/core/runs/run_points.hpp>
+#include <exception>
 
 using namespace diracstep;
 using namespace diracstep::c_interface;
@@ -111,8 +112,12 @@ class Run {
   }
 
   void go() {
-    const StepReport report = motion_.events().empty() ? without_events() : through_events();
+    const StepReport report = at_times() ? shown_at_times()
+                              : motion_.events().empty()
+                                  ? without_events()
+                                  : through_events([this](const Sample& point) { return write(point); });
     handle_.doubt = checked_.text();
+    if (full_) std::rethrow_exception(full_);
     if (report.ok() && !stopped_) return;
     keep_last();
     if (stopped_) throw Interruption("interrupted at t = " + to_text(handle_.time(), 17));
@@ -121,8 +126,8 @@ class Run {
 
  private:
   static double end_of(const diracstep_integrator& handle, const diracstep_course& course) {
-    if (course.times > 0) return course.time[course.times - 1];
-    return course.ends != 0 ? course.end : handle.end;
+    if (course.ends != 0) return course.end;
+    return course.times > 0 ? course.time[course.times - 1] : handle.end;
   }
 
   /// For the checks, which want to know how long a run will be.
@@ -131,58 +136,49 @@ class Run {
     return motion_.time() + static_cast<double>(course_.steps) * next_size(motion_.stepper());
   }
 
+  bool at_times() const { return course_.steps == 0 && course_.times > 0; }
+
   StepReport without_events() {
-    if (course_.times > 0 && motion_.sample(handle_.sample).ok()) checked_.see(handle_.sample);
     const Observer keep = [this](const Sample& point) { return write(point); };
     detail::RunOf<Stepper, WatchedSteps<Stepper>, CheckedMotion<Stepper>> run(
         motion_.stepper(), {checked_, course_.stop, stopped_}, momentum_from(course_.momentum),
         every_of(course_), keep, &checked_);
-    const RunReport report = steps(run, [this] { return next_size(motion_.stepper()); });
+    const RunReport report = course_.steps > 0
+                                 ? run.steps(course_.steps)
+                                 : run.until(end_, [this] { return next_size(motion_.stepper()); });
     if (report.ok()) checked_.finish();
     return report.last;
   }
 
-  template <class Steps, class Size>
-  RunReport steps(Steps& run, Size size) {
-    if (course_.steps > 0) return run.steps(course_.steps);
-    if (course_.times > 0) return run.at({course_.time, static_cast<std::size_t>(course_.times)}, size);
-    return run.until(end_, size);
-  }
-
-  StepReport through_events() {
-    if (course_.times > 0) return at_times_through_events();
+  StepReport through_events(const Observer& observer, ShownTimes* times = nullptr) {
     return run_through_events(
-        checked_, {.steps = course_.steps, .end = end_, .every = every_of(course_)},
-        [this](const Sample& point) { return write(point); },
+        checked_, {.steps = course_.steps, .end = end_, .every = every_of(course_), .times = times}, observer,
         [this] { return !(stopped_ = stopped(course_.stop)); });
   }
 
-  /// Events that only note; the others move the nodes, which the points shown are not to depend on.
-  StepReport at_times_through_events() {
-    const bool moves =
-        std::ranges::any_of(motion_.events(), [](const Event& e) { return e.stop || e.acts(); });
-    if (moves || !detail::Stepping<Stepper>::on_a_grid)
-      throw Misuse(
-          "times go with steps of fixed size and with events that neither stop the motion nor change it; "
-          "`every` shows each so-many-th step");
-    return without_events();
+  /// What the points do not take ends the run behind the step at hand, which is whole then.
+  StepReport shown_at_times() {
+    detail::require_ahead(course_.time[course_.times - 1], end_, next_size(motion_.stepper()));
+    ShownTimes times({course_.time, course_.time + course_.times}, motion_.time(),
+                     next_size(motion_.stepper()), [this](const Sample& point) {
+                       try {
+                         return write(point);
+                       } catch (...) {
+                         full_ = std::current_exception();
+                         return false;
+                       }
+                     });
+    return through_events({}, &times);
   }
 
-  /// Times to show are those asked for, to the bit, also where a node lies there.
   bool write(const Sample& point) {
-    if (course_.times > 0 && detail::Stepping<Stepper>::on_a_grid) {
-      handle_.sample = point;
-      handle_.sample.time = course_.time[shown_++];
-      writer_.write(handle_.sample);
-    } else {
-      writer_.write(point);
-    }
+    writer_.write(point);
     return true;
   }
 
   /// The point that a run which ended early has reached.
   void keep_last() {
-    if (writer_.has(motion_.time()) || course_.times > 0) return;
+    if (writer_.has(motion_.time()) || at_times()) return;
     if (motion_.sample(handle_.sample).ok()) writer_.write(handle_.sample);
   }
 
@@ -192,8 +188,8 @@ class Run {
   double end_;
   CheckedMotion<Stepper> checked_;
   PointWriter writer_;
-  long shown_ = 0;
   bool stopped_ = false;
+  std::exception_ptr full_;  ///< why no more points are taken
 };
 
 }  // namespace

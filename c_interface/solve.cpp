@@ -3,6 +3,8 @@
 #include <diracstep/core/adaptive/error_control.hpp>
 #include <diracstep/core/adaptive/error_with_events.hpp>
 #include <diracstep/core/adaptive/rate_monitor.hpp>
+#include <diracstep/core/runs/run_points.hpp>
+#include <utility>
 
 using namespace diracstep;
 using namespace diracstep::c_interface;
@@ -91,7 +93,7 @@ void take_found_steps(const diracstep_model& model, diracstep_options options,
   options.ends = course.ends = 1;
   options.end = course.end;
   options.eps = 0.0;
-  course.steps = course.times = 0;
+  course.steps = 0;
   const std::shared_ptr<diracstep_integrator> handle = make_integrator(model, options);
   const auto events = std::make_shared<std::vector<diracstep_event>>();
   keep(handle);
@@ -119,6 +121,14 @@ void solve_through_events(const diracstep_model& model, const diracstep_options&
   take_found_steps(model, options, report, course, points, found);
 }
 
+/// Throws Misuse for times out of order or behind the end.
+void require_times(const diracstep_course& course, double start, double end) {
+  double last = start;
+  for (int k = 0; k < course.times; ++k)
+    detail::require_ahead(std::exchange(last, course.time[k]), course.time[k], end - start);
+  detail::require_ahead(last, end, end - start);
+}
+
 void solve(const diracstep_model& model, const diracstep_options& options, diracstep_course course,
            const diracstep_error& error, diracstep_points& points, diracstep_found& found) {
   require_sense(course);
@@ -126,6 +136,7 @@ void solve(const diracstep_model& model, const diracstep_options& options, dirac
   if (course.ends == 0) course.end = end_from(model, options);
   const double end = course.end;
   require_inputs_until(entry, end, "the end");
+  require_times(course, entry.scene->start.time, end);
   points.count = 0;
   if (!entry.events.empty()) return solve_through_events(model, options, course, error, points, found);
   const SolverFactory solvers = solvers_from(options);
@@ -134,12 +145,16 @@ void solve(const diracstep_model& model, const diracstep_options& options, dirac
   found = found_from(report);
   require_found(report, entry, course, points);
   PointWriter writer(points, entry);
-  const RunReport again =
-      run_again(entry.scene, model.registry, solvers, report, momentum_from(course.momentum),
-                course.every > 0 ? course.every : 1, [&](const Sample& point) {
-                  writer.write(point);
-                  return !stopped(course.stop);
-                });
+  const auto write = [&](const Sample& point) {
+    writer.write(point);
+    return !stopped(course.stop);
+  };
+  const Momentum momentum = momentum_from(course.momentum);
+  const RunReport again = course.times > 0
+                              ? run_again_at(entry.scene, model.registry, solvers, report, momentum,
+                                             {course.time, course.time + course.times}, write)
+                              : run_again(entry.scene, model.registry, solvers, report, momentum,
+                                          course.every > 0 ? course.every : 1, write);
   if (!again.ok()) throw Failure(again.last.failure);
   if (stopped(course.stop) && !writer.has(report.end.time))
     throw Interruption("interrupted on the way to t = " + to_text(end, 17));

@@ -46,17 +46,21 @@ class Run {
                  [&motion, steps] { return RunChecks(motion.stepper(), steps - motion.work().steps); }) {
     if (taken() > 0 && std::ranges::none_of(motion.events(), &Event::acts))
       checked_.see(start_of(motion.scene()));
-    const auto before_here = [&](double t) { return ahead_of_here(t) < -same_time; };
-    next_time_ = std::ranges::find_if_not(keeping.times, before_here);
   }
 
   void go() {
     const long first = taken();
     if (first == 0 || wanted(first)) keep();
-    keep_chosen_times();
-    const StepReport last = step_while(
+    ShownTimes times(times_ahead(), motion_.time(), integrator().options().step, [&](const Sample& sample) {
+      keeping_.file->write(sample);
+      return true;
+    });
+    if (keeping_.file != nullptr) motion_.show_at(&times);
+    StepReport last = step_while(
         *this, [&](long k) { return first + k < steps_ && result_.failure.empty(); },
         [&](long k) { return visit(first + k); });
+    if (last.ok()) last = motion_.show_node();
+    motion_.show_at(nullptr);
     if (!last.ok())
       result_.failure = last.failure;
     else if (result_.failure.empty() && !motion_.stopped() && taken() < steps_)
@@ -89,7 +93,6 @@ class Run {
       keep();
     else if (k % every_look_ == 0)
       look();
-    keep_chosen_times();
     if (k % steps_between_looks == 0) show(k);
     return !stopped;
   }
@@ -101,32 +104,17 @@ class Run {
   long taken() const { return motion_.work().steps; }
   const Integrator& integrator() const { return motion_.stepper(); }
 
-  /// The point at which an event ends the run is the last one of its file.
+  /// The point at which an event ends the run is the last one of its file, but where times are chosen.
   void end_at(const Sample& end) {
-    if (keeping_.file != nullptr) keeping_.file->write(end);
+    if (keeping_.file != nullptr && keeping_.times.empty()) keeping_.file->write(end);
     result_.end = end;
   }
 
-  /// In steps of this run.
-  double ahead_of_here(double t) const { return (t - motion_.time()) / integrator().options().step; }
-
-  /// The chosen times from this node to the next one; those at the next one are read there.
-  void keep_chosen_times() {
-    if (keeping_.file == nullptr) return;
-    const bool last = taken() >= steps_;
-    for (; next_time_ != keeping_.times.end() && result_.failure.empty(); ++next_time_) {
-      if (ahead_of_here(*next_time_) >= 1.0 - same_time && !last) return;
-      const bool at_node = std::abs(ahead_of_here(*next_time_)) <= same_time;
-      Sample sample;
-      const StepReport report =
-          sample_at(motion_.stepper(), at_node ? motion_.time() : *next_time_, keeping_.momentum, sample);
-      if (!report.ok()) {
-        result_.failure = report.failure;
-        return;
-      }
-      sample.time = *next_time_;
-      keeping_.file->write(sample);
-    }
+  /// Without those that were shown before a checkpoint.
+  std::vector<double> times_ahead() const {
+    const double step = integrator().options().step;
+    const auto ahead = [&](double t) { return (t - motion_.time()) / step >= -same_time; };
+    return {std::ranges::find_if(keeping_.times, ahead), keeping_.times.end()};
   }
 
   bool checkpoint_due(long k) const {
@@ -176,7 +164,6 @@ class Run {
   RunResult& result_;
   long every_look_;
   Sample looked_at_;
-  std::vector<double>::const_iterator next_time_;
   double kept_time_ = std::nan("");
   Clock::time_point next_checkpoint_;
   Progress progress_;

@@ -34,6 +34,7 @@ struct RunResult {
   std::vector<EventHit> hits;                           ///< where they were met
   std::shared_ptr<const Scene> scene_at_end;            ///< of the rows that are on there
   bool stopped = false;                                 ///< by the last of these
+  std::vector<std::string> notes;                       ///< of the start
   std::string out;                                      ///< the file written, if any
   long lines = 0;                                       ///< points in it
 
@@ -45,6 +46,7 @@ void take_events(const EventSteps<Stepper>& motion, RunResult& result) {
   result.events = motion.events();
   result.hits = motion.hits();
   result.stopped = motion.stopped();
+  result.notes = motion.notes();
   if (!result.events.empty()) result.scene_at_end = std::make_shared<const Scene>(motion.scene());
 }
 

@@ -5,6 +5,7 @@
 #include <diracstep/core/adaptive/adaptive_run.hpp>
 #include <diracstep/core/adaptive/damping_survey.hpp>
 #include <diracstep/core/adaptive/error_control.hpp>
+#include <diracstep/core/adaptive/error_with_events.hpp>
 #include <diracstep/core/adaptive/variable_run_checks.hpp>
 #include <diracstep/core/numerics/near_names.hpp>
 #include <diracstep/core/runs/event_steps.hpp>
@@ -288,8 +289,8 @@ MemberResult MemberRuns::run_through_events(const CatalogueScene& entry, const I
   return result_of(failure, "", entry, end, recorded);
 }
 
+/// The run that is accepted is taken once more where each of its points is wanted, or the events on its way.
 MemberResult MemberRuns::search(const CatalogueScene& entry) const {
-  if (!entry.events.empty()) throw Misuse("'error' does not go with the events of the scene: give a step");
   ErrorControlOptions wanted;
   wanted.error = *sweep_.error;
   wanted.method = sweep_.method;
@@ -297,11 +298,34 @@ MemberResult MemberRuns::search(const CatalogueScene& entry) const {
   wanted.integrator = options_;
   wanted.max_time =
       std::numeric_limits<double>::infinity();  // solves alone, so that the answer is the same anywhere
-  const ErrorControlReport found = solve_to_error(entry.scene, registry_, solvers_, *sweep_.end, wanted);
+  const double end = *sweep_.end;
+  const bool through_events = !entry.events.empty();
+  if (through_events) wanted.first_step = std::abs(entry.natural_step);
+  const ErrorControlReport found =
+      through_events
+          ? solve_events_to_error(entry.scene, entry.all_rows, entry.events, registry_, solvers_, end, wanted)
+          : solve_to_error(entry.scene, registry_, solvers_, end, wanted);
   if (!found.ok())  // no answer, though runs may have come some way
     return {MemberResult::Status::failed, found.refusal, unknown_number, {}};
+  Recorded recorded(sweep_, entry);
+  if (through_events) {
+    IntegratorOptions options = found.steps.integrator;
+    options.method = found.method;
+    options.order = found.order;
+    options.step = found.step;
+    return run_through_events(entry, options, fit_steps(entry.scene->start.time, end, found.step).steps,
+                              recorded);
+  }
+  if (recorded.needs_every_point()) {
+    const auto see = [&](const Sample& node) {
+      recorded.see(entry, node);
+      return true;
+    };
+    const RunReport again = run_again(entry.scene, registry_, solvers_, found, Momentum::projected, 1, see);
+    if (!again.ok()) return {MemberResult::Status::failed, again.last.failure, unknown_number, {}};
+  }
   return {found.warning.empty() ? MemberResult::Status::ok : MemberResult::Status::doubted, found.warning,
-          found.end.time, Recorded(sweep_, entry).numbers(entry, found.end)};
+          found.end.time, recorded.numbers(entry, found.end)};
 }
 
 }  // namespace diracstep

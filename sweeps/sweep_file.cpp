@@ -207,9 +207,6 @@ class SweepReader : TableReader {
     sweep_.extrema = texts(record, "extrema");
     sweep_.events = texts(record, "events");
     sweep_.derivatives = texts(record, "derivatives");
-    if (sweep_.error && (!sweep_.extrema.empty() || !sweep_.events.empty()))
-      fail(place_of(node->source()),
-           "extrema and events are taken from runs of fixed steps: leave out 'error'");
   }
 
   void require_members(const toml::table& root) const {

@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 
 #include <CLI/App.hpp>
-#include <algorithm>
 #include <cmath>
 #include <diracstep/command/arguments.hpp>
 #include <diracstep/command/interrupt.hpp>
@@ -18,6 +17,8 @@
 #include <diracstep/files/file_lock.hpp>
 #include <memory>
 #include <optional>
+#include <utility>
+#include <vector>
 
 namespace diracstep::command {
 
@@ -70,12 +71,19 @@ IntegratorOptions take_found(const RunArguments& options, const CatalogueScene& 
   if (!found.ok() || (options.out.empty() && result.momentum == Momentum::projected)) return used;
   std::optional<TrajectoryFile> file;
   open_trajectory(file, options, entry, std::nullopt);
-  const RunReport again = run_again(entry.scene, session.registry, session.solvers, found, result.momentum,
-                                    options.every, [&](const Sample& sample) {
-                                      if (file) file->write(sample);
-                                      result.end = sample;
-                                      return !interrupted();
-                                    });
+  std::vector<double> times = chosen_times(options, entry, end);
+  const std::size_t chosen = times.size();
+  std::size_t shown = 0;
+  const auto show = [&](const Sample& sample) {
+    if (file && (chosen == 0 || shown++ < chosen)) file->write(sample);
+    result.end = sample;
+    return !interrupted();
+  };
+  times.push_back(end);
+  const RunReport again = chosen == 0 ? run_again(entry.scene, session.registry, session.solvers, found,
+                                                  result.momentum, options.every, show)
+                                      : run_again_at(entry.scene, session.registry, session.solvers, found,
+                                                     result.momentum, std::move(times), show);
   result.failure = again.last.failure;
   if (result.failure.empty() && interrupted())
     result.failure = fmt::format("{} at t = {:.10g}", interruption(), result.end.time);
@@ -88,12 +96,9 @@ void require_events_found(const CatalogueScene& entry, const RunArguments& optio
   if (entry.events.empty()) return;
   if (options.error && options.adaptive)
     throw Misuse("--error takes fixed steps through the events of the scene: leave --adaptive out");
-  const bool times = !options.at.empty() || options.every_time,
-             ends = std::ranges::any_of(entry.events, [](const Event&e) { return e.stop || e.acts(); });
-  if (times && (options.adaptive || ends))
+  if (!options.sensitivities.empty())
     throw Misuse(
-        "--at and --every-time go with fixed steps and with events that neither stop the run nor change its "
-        "motion; --every N shows each N-th step");
+        "--sensitivities do not go with the events of the scene: when one is met is not differentiated");
 }
 
 void take_outputs(const CatalogueScene& entry, RunResult& result) {
@@ -114,6 +119,7 @@ void report(const RunResult& result, const RunArguments& options, const Catalogu
     say("the run whose points went to standard output:\n" + run_text(result, entry, used));
   else if (options.json || result.out.empty() || output_is_open())  // with a file the summary is an extra
     print(options.json ? run_json(result, entry, used) : run_text(result, entry, used));
+  for (const std::string& note : result.notes) say(note);
   if (!result.doubt.empty()) say(result.doubt);
   if (!result.doubt.empty() && options.doubt == "report") session.exit_status = doubted;
   if (result.failure.empty()) return;
@@ -131,9 +137,8 @@ void choose_method(RunArguments& options, const CatalogueScene& entry, const Ses
                                {used.order, 0.0, used.constraint_rule, large_from(used.dense_limit)});
   if (!session.registry.method(choice.method).info.damped) return;
   used.method = choice.method;
-  const bool times_with_events = !entry.events.empty() && (!options.at.empty() || options.every_time);
   const bool fixed = step_given || options.fixed || !options.sensitivities.empty() || options.substeps > 1 ||
-                     times_with_events || !checkpoint_path(options).empty();
+                     !checkpoint_path(options).empty();
   if (!fixed) options.adaptive = true;
   if (!fixed && !options.eps) options.eps = choice.local_error;
   say(fmt::format("{}; {}{}", choice.method, choice.reason,
@@ -161,13 +166,12 @@ void run(const RunArguments& given, Session& session) {
   }
   require_inputs_until(entry, end, "--end");
   require_events_found(entry, options);
-  if (!options.sensitivities.empty() && !entry.events.empty())
-    throw Misuse(
-        "--sensitivities do not go with the events of the scene: when one is met is not differentiated");
   IntegratorOptions used = integrator_options(session, options.method);
   used.step = options.step.value_or(std::copysign(entry.natural_step, end - entry.scene->start.time));
   used.substeps = options.substeps;
   if (options.error) {
+    require_within(chosen_times(options, entry, end), entry.scene->start.time, end,
+                   std::copysign(entry.natural_step, end - entry.scene->start.time));
     result.search = search(options, entry, session, end, used);
     used = take_found(options, entry, session, end, result);
   } else {

@@ -82,9 +82,11 @@ void add_run_arguments(CLI::App& verb, Session& session, RunArguments& options) 
   verb.add_option("--control", options.control,
                   "How its size is found: integrating (without), in-step, or irreversible (for comparison);\n"
                   "for damped/radau:S always local-error");
-  verb.add_option("--at", options.at,
-                  "Times T1,T2,… to show instead of the steps, each by a step of the method from the last\n"
-                  "node; the motion keeps its bits.  With --adaptive the last of them ends the run")
+  verb.add_option(
+          "--at", options.at,
+          "Times T1,T2,… to show instead of the steps, each by a step of the method from the last\n"
+          "node, and behind an event at its time; the motion keeps its bits.  With --adaptive the last\n"
+          "of them ends the run")
       ->type_name("T1,T2,…");
   verb.add_option("--sensitivities", options.sensitivities,
                   "Exact derivatives of the motion by parameters of the scene and by q0, v0, p0, its start:\n"
@@ -130,8 +132,6 @@ void require_sense(const RunArguments& options) {
     throw Misuse(fmt::format("--every-time = {}; a number above 0 is needed", *options.every_time));
   if (chosen_times && options.every != 1)
     throw Misuse("--every counts steps; it does not go with --at and --every-time");
-  if (chosen_times && options.error)
-    throw Misuse("--at and --every-time do not go with --error: name the method and the step that it finds");
   if (options.eps && std::isnan(*options.eps)) throw Misuse("--eps is not a number");
   if (!options.sensitivities.empty() && (options.adaptive || options.error || chosen_times || checkpoints))
     throw Misuse(

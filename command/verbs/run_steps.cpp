@@ -94,9 +94,10 @@ void run_fixed(const RunArguments& options, const CatalogueScene& entry, const S
                RunResult& result) {
   const Integrator& integrator = motion.stepper();
   Keeping keeping{.momentum = result.momentum, .every = options.every};
-  keeping.times = chosen_times(
-      options, entry, entry.scene->start.time + static_cast<double>(steps) * integrator.options().step);
-  require_within(keeping.times, integrator, steps);
+  const double start = entry.scene->start.time, step = integrator.options().step,
+               end = start + static_cast<double>(steps) * step;
+  keeping.times = chosen_times(options, entry, end);
+  require_within(keeping.times, start, end, step);
   keeping.checkpoint = checkpoint_path(options);
   keeping.checkpoint_every = options.checkpoint_every;
   if (!keeping.checkpoint.empty())  // else nothing is saved or compared, and no plugin has to be read for it
@@ -120,7 +121,7 @@ void run_fixed(const RunArguments& options, const CatalogueScene& entry, const S
   if (derivatives) result.doubt = joined_doubts({result.doubt, derivatives->doubt()});
 }
 
-/// Variable steps to the end, or to the last of the times given.
+/// Variable steps to the end of a motion without events.
 void run_variable(const RunArguments& options, const CatalogueScene& entry, AdaptiveIntegrator& integrator,
                   VariableRunChecks& checks, double end, TrajectoryFile* file, RunResult& result) {
   Progress progress;
@@ -131,11 +132,7 @@ void run_variable(const RunArguments& options, const CatalogueScene& entry, Adap
     progress.show((sample.time - start) / (end - start), fmt::format("t = {:g}", sample.time));
     return !interrupted();
   };
-  const std::vector<double> times = chosen_times(options, entry, end);
-  const RunReport report = times.empty()
-                               ? run_until(integrator, end, result.momentum, options.every, keep, &checks)
-                               : run_at(integrator, times, result.momentum, keep, &checks);
-  result.failure = report.last.failure;
+  result.failure = run_until(integrator, end, result.momentum, options.every, keep, &checks).last.failure;
   if (result.failure.empty() && interrupted())
     result.failure = fmt::format("{} at t = {:.10g}", interruption(), integrator.time());
   result.work = integrator.work();
@@ -144,20 +141,26 @@ void run_variable(const RunArguments& options, const CatalogueScene& entry, Adap
 
 using VariableMotion = EventSteps<AdaptiveIntegrator>;
 
-/// Variable steps through the events of a scene, to the end.
-void run_variable(const RunArguments& options, VariableMotion& motion,
+/// Variable steps through the events of a scene, to the end; the file gets each point, or the times chosen.
+void run_variable(const RunArguments& options, const std::vector<double>& times, VariableMotion& motion,
                   const std::function<Integrator()>& side, double end, TrajectoryFile* file,
                   RunResult& result) {
   CheckedMotion<AdaptiveIntegrator> checked(motion,
                                             [&] { return VariableRunChecks(motion.stepper(), side()); });
-  const auto keep = [&](const Sample& sample) {
+  const auto write = [&](const Sample& sample) {
     if (file != nullptr) file->write(sample);
+    return true;
+  };
+  ShownTimes shown(times, motion.time(), motion.stepper().next_size(), write);
+  const auto keep = [&](const Sample& sample) {
+    if (times.empty()) write(sample);
     result.end = sample;
     return true;
   };
-  result.failure = run_through_events(checked, {.end = end, .every = options.every}, keep, [] {
-                     return !interrupted();
-                   }).failure;
+  result.failure =
+      run_through_events(checked, {.end = end, .every = options.every, .times = &shown}, keep, [] {
+        return !interrupted();
+      }).failure;
   if (result.failure.empty() && interrupted())
     result.failure = fmt::format("{} at t = {:.10g}", interruption(), motion.time());
   take_events(motion, result);
@@ -193,13 +196,15 @@ IntegratorOptions run_once(const RunArguments& options, const CatalogueScene& en
       return {std::make_shared<const Scene>(motion.scene()), session.registry, session.solvers,
               motion.stepper().options()};
     };
+    const std::vector<double> times = chosen_times(options, entry, end);
+    require_within(times, entry.scene->start.time, end, motion.stepper().next_size());
     open_trajectory(file, options, entry, std::nullopt);
     TrajectoryFile* const points = file ? &*file : nullptr;
-    if (entry.events.empty()) {
+    if (entry.events.empty() && times.empty()) {
       VariableRunChecks checks(motion.stepper(), side());
       run_variable(options, entry, motion.stepper(), checks, end, points, result);
     } else {
-      run_variable(options, motion, side, end, points, result);
+      run_variable(options, times, motion, side, end, points, result);
     }
     tell_control(motion.stepper(), result);
     chosen = motion.stepper().options();

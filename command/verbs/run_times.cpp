@@ -27,9 +27,7 @@ std::vector<double> chosen_times(const RunArguments& options, const CatalogueSce
   return times;
 }
 
-void require_within(const std::vector<double>& times, const Integrator& integrator, long steps) {
-  const double step = integrator.options().step, start = integrator.scene().start.time;
-  const double end = start + static_cast<double>(steps) * step;
+void require_within(const std::vector<double>& times, double start, double end, double step) {
   double last = start;
   for (const double t : times) {
     if (!((t - last) * step >= -1e-9 * step * step && (end - t) * step >= -1e-9 * step * step))

@@ -74,16 +74,35 @@ class CheckedMotion {
   std::string doubt_;
 };
 
+namespace detail {
+
+/// Lets a motion be shown at times until the end of a scope.
+template <class Stepper>
+class ShownWhile {
+ public:
+  ShownWhile(EventSteps<Stepper>& motion, ShownTimes* times) : motion_(motion) { motion.show_at(times); }
+  ShownWhile(const ShownWhile&) = delete;
+  ShownWhile& operator=(const ShownWhile&) = delete;
+  ~ShownWhile() { motion_.show_at(nullptr); }
+
+ private:
+  EventSteps<Stepper>& motion_;
+};
+
+}  // namespace detail
+
 /// How far a run through events goes, and what it shows.
 struct EventCourse {
-  long steps = 0;    ///< so many, or 0: to the time `end`
-  double end = 0.0;  ///< which must lie ahead
-  long every = 1;    ///< besides the start and the end
+  long steps = 0;               ///< so many, or 0: to the time `end`
+  double end = 0.0;             ///< which must lie ahead
+  long every = 1;               ///< besides the start and the end
+  ShownTimes* times = nullptr;  ///< shown beside these points, to their own observer; it may end the run
 };
 
 /// Runs until the end, an event that stops the motion, a failure or `goes_on` returning false, and shows
-/// points to the observer; false from that ends it too.  Where an event stops the motion its point is the
-/// last one.  Where `end` lies between two nodes the motion is read there, as by EventSteps::read_up_to().
+/// points to the observer, if there is one; false from that ends it too.  Where an event stops the motion its
+/// point is the last one.  Where `end` lies between two nodes the motion is read there, as by
+/// EventSteps::read_up_to().
 template <class Stepper>
 StepReport run_through_events(CheckedMotion<Stepper>& checked, const EventCourse& course,
                               const Observer& observer, const std::function<bool()>& goes_on) {
@@ -94,8 +113,12 @@ StepReport run_through_events(CheckedMotion<Stepper>& checked, const EventCourse
   bool wanted = true, at_end = false;
   const auto show = [&] {
     checked.see(here);
-    wanted = observer(here);
+    wanted = !observer || observer(here);
   };
+  const auto goes = [&] {
+    return wanted && (course.times == nullptr || course.times->wanted()) && goes_on();
+  };
+  const detail::ShownWhile<Stepper> shown(motion, course.times);
   // In steps of the next one's size.
   const auto left = [&] {
     return (course.end - motion.time()) / detail::Stepping<Stepper>::size(motion.stepper());
@@ -103,7 +126,7 @@ StepReport run_through_events(CheckedMotion<Stepper>& checked, const EventCourse
   StepReport report;
   report.solve = motion.sample(here);
   if (report.ok()) show();
-  for (long taken = 0; report.ok() && wanted && !motion.stopped() && !at_end && goes_on();) {
+  for (long taken = 0; report.ok() && !motion.stopped() && !at_end && goes();) {
     const bool read = course.steps == 0 && left() < 1.0 - same_time;
     report = read ? checked.read_up_to(course.end, here, at_end) : checked.step();
     if (!report.ok() || motion.stopped()) break;
@@ -117,6 +140,7 @@ StepReport run_through_events(CheckedMotion<Stepper>& checked, const EventCourse
   } else if (at_end && report.ok()) {
     checked.finish();
   }
+  if (report.ok()) report = motion.show_node();
   if (!report.ok() && report.failure.empty()) report.failure = describe(report.solve.status);
   return report;
 }

@@ -48,7 +48,7 @@ std::string not_surveyed(const Scene& scene) {
   const PhaseStructure& structure = scene.lagrangian->structure();
   if (structure.phase_space()) return "L is linear in v";
   if (structure.y_hessian_zero) return scene.rows() > 0 ? "" : "nothing has mass";
-  if (!scene.force) return "the scene has no force";
+  if (!scene.force && !has_states(scene)) return "the scene has no force";
   if (first_order_motions(scene).hide_equations()) return "the kernel of ∂²L/∂v² moves or hides equations";
   if (scene.dimension() > MotionRates::most_coordinates)
     return "more than " + std::to_string(MotionRates::most_coordinates) + " coordinates";

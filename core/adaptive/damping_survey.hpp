@@ -54,8 +54,9 @@ struct DampingSurvey {
 /// run, at most a fiftieth of the motion.  Points before anything has moved have no sizes to difference by
 /// and are left out.
 ///
-/// Nothing is measured for a phase-space Lagrangian, and, where there is mass, without a force, since nothing
-/// but a force damps there, and for more than 60 coordinates.  Throws Misuse as AdaptiveIntegrator does.
+/// Nothing is measured for a phase-space Lagrangian, and, where there is mass, without a force and without
+/// states (has_states()), since nothing else damps there, and for more than 60 coordinates.  Throws Misuse as
+/// AdaptiveIntegrator does.
 DampingSurvey survey_damping(const std::shared_ptr<const Scene>& scene, const Registry& registry,
                              const SolverFactory& solvers, double end, double step,
                              const IntegratorOptions& options = {});

@@ -6,6 +6,8 @@
 #include <diracstep/core/adaptive/refinement_search.hpp>
 #include <diracstep/core/methods/default_method.hpp>
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/runs/shown_times.hpp>
+#include <utility>
 
 namespace diracstep {
 namespace {
@@ -183,6 +185,50 @@ RunReport run_again(const std::shared_ptr<const Scene>& scene, const Registry& r
   done.last = detail::run_steps_of(completed(scene), registry, solvers, report.steps, report.adaptive,
                                    report.end.time, work, at_node)
                   .last;
+  return done;
+}
+
+RunReport run_again_at(const std::shared_ptr<const Scene>& scene, const Registry& registry,
+                       const SolverFactory& solvers, const ErrorControlReport& report, Momentum momentum,
+                       std::vector<double> times, const Observer& observer) {
+  const std::shared_ptr<const Scene> stepped = completed(scene);
+  IntegratorOptions options = report.steps.integrator;
+  options.method = report.method;
+  options.order = report.order;
+  if (!report.adaptive) options.step = report.step;
+  Integrator beside(stepped, registry, solvers, options);
+  ShownTimes shown(std::move(times), stepped->start.time, options.step, observer);
+  Work work;
+  RunReport done;
+  Sample from, last, here;
+  StepReport reading;
+  long steps = 0;
+  const auto between = [&](double t, Sample& sample) {
+    beside.restart(from.time, from.q, from.p, from.v);
+    StepReport step = beside.step(t - from.time);
+    if (step.ok()) step.solve = beside.sample(momentum, sample);
+    return step;
+  };
+  const auto at_node = [&](const detail::ReadNode& read, bool ends) {
+    reading.solve = read(Momentum::projected, here);
+    // Points of one step are the kinks that it crosses and its end; the last variable one is not taken.
+    const bool begun = last.q.size() > 0, of_a_new_step = work.steps != steps || (ends && report.adaptive);
+    steps = work.steps;
+    if (begun && of_a_new_step) from = last;
+    if (begun && reading.ok()) reading = shown.before(here.time, options.step, between);
+    if (reading.ok())
+      reading = shown.up_to(here.time, options.step, [&](double, Sample& sample) {
+        StepReport point;
+        point.solve = read(momentum, sample);
+        return point;
+      });
+    std::swap(last, here);
+    return reading.ok() && shown.wanted();
+  };
+  done.last = detail::run_steps_of(stepped, registry, solvers, report.steps, report.adaptive, report.end.time,
+                                   work, at_node)
+                  .last;
+  if (done.ok()) done.last = reading;
   return done;
 }
 

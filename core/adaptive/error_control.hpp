@@ -106,4 +106,11 @@ RunReport run_again(const std::shared_ptr<const Scene>& scene, const Registry& r
                     const SolverFactory& solvers, const ErrorControlReport& report, Momentum momentum,
                     long every, const Observer& observer);
 
+/// Repeats it and shows the motion at these times instead, those between two nodes by a step of the method
+/// from the first of both: the error that was asked for is that of the end.  Throws Misuse for times out of
+/// order.
+RunReport run_again_at(const std::shared_ptr<const Scene>& scene, const Registry& registry,
+                       const SolverFactory& solvers, const ErrorControlReport& report, Momentum momentum,
+                       std::vector<double> times, const Observer& observer);
+
 }  // namespace diracstep

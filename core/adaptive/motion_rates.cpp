@@ -8,6 +8,7 @@
 #include <diracstep/core/numerics/kernel_basis.hpp>
 #include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/core/system/constraint_distribution.hpp>
+#include <vector>
 
 namespace diracstep {
 
@@ -57,8 +58,10 @@ class PointwiseLinearisation {
 
  private:
   /// A force without velocities dissipates nothing, although a motion that it drives has rates with real
-  /// parts.
+  /// parts; a state may, whatever it drives.
   bool damps(const Sample& at) {
+    if (has_states(scene_)) return true;
+    if (!scene_.force) return false;
     by_position_.setZero(scene_.force->pattern().nonzeros());
     by_velocity_.setZero(by_position_.size());
     scene_.force->derivatives(at.time, at.q, at.v, by_position_, by_velocity_);
@@ -195,6 +198,21 @@ class MasslessMotion {
   PointReader reader_;
   Vector sizes_, units_, mode_;
 };
+
+bool has_states(const Scene& scene) {
+  if (!scene.lagrangian) return false;
+  std::vector<bool> in_lagrangian(static_cast<std::size_t>(scene.dimension()), false);
+  scene.lagrangian->pattern().for_each([&](Eigen::Index, int r, int c) {
+    in_lagrangian[static_cast<std::size_t>(r)] = in_lagrangian[static_cast<std::size_t>(c)] = true;
+  });
+  bool found = false;
+  for (const auto& rows : scene.constraints) {
+    if (rows->holonomic() || rows->constant()) continue;
+    rows->pattern().for_each(
+        [&](Eigen::Index, int, int c) { found = found || !in_lagrangian[static_cast<std::size_t>(c)]; });
+  }
+  return found;
+}
 
 MotionRates::MotionRates(const Scene& scene, const SolverFactory& solvers) {
   if (has_accelerations(scene))

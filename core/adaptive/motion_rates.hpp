@@ -10,6 +10,10 @@ namespace diracstep {
 class PointwiseLinearisation;
 class MasslessMotion;
 
+/// Whether rows that are no positions, and not constant, are on coordinates that L does not hold: the states
+/// of a controller or a filter, whose rates may damp without any force.
+bool has_states(const Scene& scene);
+
 /// How fast a motion linearised about its points decays and oscillates, as survey_damping() says.
 class MotionRates {
  public:

@@ -188,7 +188,10 @@ void Integrator::accept_step(double h, std::size_t pieces) {
   ++work_.steps;
 }
 
-void Integrator::end_steps_at_kinks() { division_->end_at_kinks(); }
+void Integrator::end_steps_at_kinks() {
+  division_->end_at_kinks();
+  sequence_->leave_hard_steps();  // who asks for it varies the steps
+}
 bool Integrator::met_kinks() const { return division_->divided(); }
 std::span<const KinkPassed> Integrator::kinks_passed() const { return division_->passed(); }
 const std::string& Integrator::stuck_at_kink() const { return division_->stuck(); }

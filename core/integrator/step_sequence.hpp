@@ -44,6 +44,9 @@ class StepSequence {
   /// unknowns.
   void withdraw_step();
   void clear_history(Origin origin);
+  void leave_hard_steps() {
+    for (StepSolver& part : parts_) part.leave_hard_steps();
+  }
 
   /// The impulse λ that enters at the start of the next step, by solving its first stage on a copy.
   SolveReport impulse_ahead(Interval step, const State& start, Vector& impulse);

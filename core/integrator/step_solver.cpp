@@ -16,6 +16,8 @@ constexpr int old_jacobian_iterations = 3;
 constexpr double far_from_guess = 0.1;
 /// Solutions so far apart are different ones.
 constexpr double another_solution = 1e-6;
+/// So many hard steps in a row are left to shorter ones.
+constexpr int most_left = 4;
 
 }  // namespace
 
@@ -43,6 +45,7 @@ SolveReport StepSolver::solve(const Task& task, Vector& x, Work& work) {
   SolveReport report;
   if (solver_) report = find(task, x, work);
   if (!report.ok()) return report;
+  left_ = 0;
   problem_->finish(x, end_);
   if (predicted) prefer_smaller_turn(task, x, report, work);
   if (!(all_finite(end_.at.q.data(), end_.at.q.size()) && all_finite(end_.at.p.data(), end_.at.p.size())))
@@ -106,6 +109,7 @@ SolveReport StepSolver::rescue(const Task& task, Guess guess, Vector& x, SolveRe
     (void)attempt(x, total, work);
   }
   if (damped_ && total.ok()) return total;
+  if (leaves_hard_ && ++left_ <= most_left) return total;
   return follow(task, x, total, work);
 }
 

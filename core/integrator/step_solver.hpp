@@ -43,6 +43,11 @@ class StepSolver {
   /// Drops what the solver keeps: pivots chosen for a matrix that led nowhere.
   void drop_factors();
 
+  /// From now on a damping method fails at first where no guess leads to the solution: a shorter step is
+  /// cheaper than following it from small steps on, in up to 100 solves.  That is done where a few steps in a
+  /// row have failed.
+  void leave_hard_steps() { leaves_hard_ = damped_; }
+
   /// Goes on from where another solver of the same step stands, with the same bits.
   void take_over(const StepSolver& other);
 
@@ -77,6 +82,8 @@ class StepSolver {
   StepMemory memory_;
   StepEnd end_;
   bool damped_;  ///< see StepTraits
+  bool leaves_hard_ = false;
+  int left_ = 0;  ///< in a row
   double reached_ = 1.0;
   Vector guess_, start_velocity_;
 };

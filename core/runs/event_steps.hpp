@@ -5,9 +5,9 @@
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/runs/event_actions.hpp>
 #include <diracstep/core/runs/event_search.hpp>
+#include <diracstep/core/runs/shown_times.hpp>
 #include <diracstep/core/runs/step_loop.hpp>
 #include <diracstep/core/runs/stepping.hpp>
-#include <diracstep/core/runs/zeno_watch.hpp>
 #include <functional>
 #include <map>
 #include <memory>
@@ -77,11 +77,19 @@ class EventSteps {
   /// Of all steppers; parts of a fixed step count as one.
   Work work() const;
 
+  /// From here on the motion is shown at these times too, which the caller keeps, by step() and
+  /// read_up_to(); null: no more.  It has the same bits with and without.
+  void show_at(ShownTimes* times) { shown_ = times; }
+  /// Those where the motion stands; step() shows those where it begins.
+  StepReport show_node();
+
   /// How points are read from here on.
   void read_momentum(Momentum momentum) { momentum_ = momentum; }
 
   const std::vector<Event>& events() const { return search_.events(); }
   const std::vector<EventHit>& hits() const { return hits_; }
+  /// From the first step on, what may not be meant of the start.
+  const std::vector<std::string>& notes() const { return notes_; }
   /// The last hit ends the run; it is where the motion ends.
   bool stopped() const { return stopped_; }
   const Sample& end_of_stopped() const {
@@ -124,8 +132,14 @@ class EventSteps {
     if (report.ok()) show_all_rows(sample);
     return report;
   }
+  StepReport show_piece(const detail::Node& from, double end) {
+    if (shown_ == nullptr) return {};
+    return shown_->before(end, Stepping::size(stepper()),
+                          [&](double t, Sample& sample) { return read(from, t, sample); });
+  }
   StepReport begin();
   std::string releases_late(const Sample& here) const;
+  void note_start(const Sample& here);
   StepReport look(const detail::Node& from, const Sample& point);
   StepReport act(std::vector<EventHit> met);
   StepReport make_true(EventHit hit, std::vector<EventSearch::Left>& left);
@@ -146,10 +160,12 @@ class EventSteps {
   std::map<std::vector<bool>, Mode> modes_;
   Mode* current_ = nullptr;
   std::vector<EventHit> hits_;
+  std::vector<std::string> notes_;
   double began_at_ = 0.0;
   bool begun_ = false, acted_ = false, stopped_ = false;
   long steps_ = 0, acts_ = 0;
   Sample after_;  ///< the last event that acted
+  ShownTimes* shown_ = nullptr;
 };
 
 /// For EventSteps of one size: integrators of a method and a step.  The registry must outlive it.
@@ -164,19 +180,21 @@ inline EventSteps<Integrator>::Make integrators(const Registry& registry, Solver
 template <class Stepper>
 StepReport EventSteps<Stepper>::step(double size) {
   acted_ = false;
-  if (search_.empty()) return Stepping::step(stepper(), size);
-  if (!begun_)
+  if (search_.empty() && shown_ == nullptr) return Stepping::step(stepper(), size);
+  if (!begun_ && !search_.empty())
     if (StepReport report = begin(); !report.ok()) return report;
   const double end = time() + size;
   const long acts_at_start = acts_;
   for (bool first = true;; first = false) {
+    StepReport report = show_node();
+    if (!report.ok()) return report;
     const detail::Node from = node();
-    StepReport report;
     if constexpr (Stepping::on_a_grid)
       report = first ? Stepping::step(stepper(), size) : Stepping::step_to(stepper(), end);
     else
       report = Stepping::step(stepper(), size);
     if (!report.ok()) return report;
+    if (search_.empty()) return show_piece(from, time());
     Sample here;
     report.solve = sample(here);
     if (!report.ok()) return failed(std::string("reading the state: ") + describe(report.solve.status));
@@ -219,12 +237,31 @@ StepReport EventSteps<Stepper>::read_up_to(double t, Sample& sample, bool& reach
   StepReport report;
   if (!begun_ && !search_.empty())
     if (report = begin(); !report.ok()) return report;
+  if (report = show_node(); !report.ok()) return report;
   const detail::Node from = node();
-  if (report = read(from, t, sample); !report.ok() || search_.empty()) return report;
+  if (report = read(from, t, sample); !report.ok()) return report;
   const long before = acts_;
-  report = look(from, sample);
+  report = search_.empty() ? show_piece(from, t) : look(from, sample);
   reached = !stopped_ && acts_ == before;
-  return report;
+  if (!report.ok() || !reached || shown_ == nullptr) return report;
+  return shown_->up_to(t, Stepping::size(stepper()), [&](double, Sample& there) {
+    there = sample;
+    return StepReport{};
+  });
+}
+
+template <class Stepper>
+StepReport EventSteps<Stepper>::show_node() {
+  if (shown_ == nullptr) return {};
+  const double node = stopped_ ? end_of_stopped().time : time();
+  return shown_->up_to(node, Stepping::size(stepper()), [&](double, Sample& there) {
+    StepReport report;
+    if (stopped_)
+      there = end_of_stopped();
+    else
+      report.solve = sample(there);
+    return report;
+  });
 }
 
 /// For events from a node to a point; those that are met are made true.
@@ -236,7 +273,11 @@ StepReport EventSteps<Stepper>::look(const detail::Node& from, const Sample& poi
     report.failure = "looking for events before t = " + to_text(point.time) + ": " + report.failure;
     return report;
   }
-  if (search_.met().empty()) return {};
+  const auto ends = std::ranges::find_if(search_.met(), [&](const EventHit& hit) {
+    return events()[hit.event].acts() || events()[hit.event].stop;
+  });
+  const double end = ends != search_.met().end() ? ends->sample.time : point.time;
+  if (StepReport report = show_piece(from, end); !report.ok()) return report;
   const auto acts = [&](const EventHit& hit) { return events()[hit.event].acts(); };
   if (std::ranges::any_of(search_.met(), acts)) return act(std::move(search_.met()));
   for (EventHit& hit : search_.met()) {
@@ -245,52 +286,6 @@ StepReport EventSteps<Stepper>::look(const detail::Node& from, const Sample& poi
     if (stopped_) break;
   }
   return {};
-}
-
-template <class Stepper>
-Work EventSteps<Stepper>::work() const {
-  Work work;
-  for (const auto& [on, mode] : modes_)
-    if (mode.stepper) work.add(mode.stepper->work());
-  if (Stepping::on_a_grid && !search_.empty()) work.steps = steps_;
-  return work;
-}
-
-template <class Stepper>
-void EventSteps<Stepper>::save(Snapshot& to) const {
-  if (search_.empty()) return stepper().save(to);
-  to.section("events");
-  to.put("begun", begun_);
-  to.put("steps to nodes", static_cast<double>(steps_));
-  to.put("began at", began_at_);
-  for (const bool on : actions_.on()) to.put("row is on", on);
-  const Start& start = scene().start;
-  to.put("start of the rows' time", start.time);
-  to.put("start of the rows' position", start.q);
-  to.put("start of the rows' velocity", start.v);
-  search_.save(to);
-  stepper().save(to);
-}
-
-template <class Stepper>
-void EventSteps<Stepper>::restore(SnapshotReader& from) {
-  if (search_.empty()) return stepper().restore(from);
-  from.section("events");
-  begun_ = from.flag("begun");
-  steps_ = from.whole_number("steps to nodes", 1L << 53);
-  began_at_ = from.number("began at");
-  std::vector<bool> on = actions_.on();
-  const std::vector<bool> at_start = on;
-  for (auto&& row : on) row = from.flag("row is on");
-  actions_.set_on(on);
-  Start start = scene().start;
-  start.time = from.number("start of the rows' time");
-  from.read("start of the rows' position", start.q);
-  from.read("start of the rows' velocity", start.v);
-  if (on != at_start) take(actions_.scene_from(start.time, start.q, start.v));
-  search_.restore(from, actions_.awake());
-  stepper().restore(from);
-  if (Sample here; begun_ && sample(here).ok()) search_.stand_at(here);
 }
 
 }  // namespace diracstep

@@ -2,7 +2,7 @@
 
 #include <diracstep/core/runs/event_steps.hpp>
 
-/// How EventSteps makes events true.
+/// How EventSteps makes events true, and what it tells and saves.
 namespace diracstep {
 
 template <class Stepper>
@@ -40,6 +40,39 @@ std::string EventSteps<Stepper>::releases_late(const Sample& here) const {
   return {};
 }
 
+/// A zero at the start is no change of sign, which matters where the function goes from there as the event
+/// waits for; and without a direction either side may be the one on which a row is to be off.
+template <class Stepper>
+void EventSteps<Stepper>::note_start(const Sample& here) {
+  constexpr double soon = 1e-3;  // of a step
+  const std::vector<bool> awake = actions_.awake();
+  Sample then;
+  for (std::size_t k = 0; k < events().size(); ++k) {
+    const Event& event = events()[k];
+    if (!event.at || event.restitution || !awake[k] || !(event.acts() || event.stop)) continue;
+    if (event.condition && !(event.condition(here.point()) > 0.0)) continue;
+    const double value = event.at(here.point());
+    const std::string its = "event '" + event.name + "': its function is " + to_text(value) + " at the start";
+    if (value == 0.0) {
+      if (then.q.size() == 0 && !read(node(), here.time + soon * Stepping::size(stepper()), then).ok())
+        return;
+      const double side = event.at(then.point());
+      const bool as_told = event.direction == Event::Direction::both      ? side != 0.0
+                           : event.direction == Event::Direction::falling ? side < 0.0
+                                                                          : side > 0.0;
+      if (as_told)
+        notes_.push_back(its +
+                         ", which is no change of its sign: it does not happen there, but where the "
+                         "function vanishes again");
+    } else if (!event.off.empty() && event.direction == Event::Direction::both) {
+      notes_.push_back(its + ", and row '" + event.off.front() +
+                       "' stays on until it changes its sign; direction = \"" +
+                       (value < 0.0 ? "rising" : "falling") +
+                       "\" if that is meant, the other one if the row should be off there already");
+    }
+  }
+}
+
 /// Clocks act at the start.
 template <class Stepper>
 StepReport EventSteps<Stepper>::begin() {
@@ -55,6 +88,7 @@ StepReport EventSteps<Stepper>::begin() {
                       " at the start, behind the contact; it is positive where there is none (direction)");
   if (report = search_.see(here, {}); !report.ok()) return report;
   if (std::string late = releases_late(here); !late.empty()) return failed(std::move(late));
+  note_start(here);
   (void)search_.go_on(here, at_rest_in_contact(here), actions_.awake(), false);
   std::vector<EventHit> due;
   add_closing(here, due);
@@ -187,6 +221,52 @@ StepReport EventSteps<Stepper>::make_true(EventHit hit, std::vector<EventSearch:
   hit.after = after_;
   hits_.push_back(std::move(hit));
   return {};
+}
+
+template <class Stepper>
+void EventSteps<Stepper>::save(Snapshot& to) const {
+  if (search_.empty()) return stepper().save(to);
+  to.section("events");
+  to.put("begun", begun_);
+  to.put("steps to nodes", static_cast<double>(steps_));
+  to.put("began at", began_at_);
+  for (const bool on : actions_.on()) to.put("row is on", on);
+  const Start& start = scene().start;
+  to.put("start of the rows' time", start.time);
+  to.put("start of the rows' position", start.q);
+  to.put("start of the rows' velocity", start.v);
+  search_.save(to);
+  stepper().save(to);
+}
+
+template <class Stepper>
+void EventSteps<Stepper>::restore(SnapshotReader& from) {
+  if (search_.empty()) return stepper().restore(from);
+  from.section("events");
+  begun_ = from.flag("begun");
+  steps_ = from.whole_number("steps to nodes", 1L << 53);
+  began_at_ = from.number("began at");
+  std::vector<bool> on = actions_.on();
+  const std::vector<bool> at_start = on;
+  for (auto&& row : on) row = from.flag("row is on");
+  actions_.set_on(on);
+  Start start = scene().start;
+  start.time = from.number("start of the rows' time");
+  from.read("start of the rows' position", start.q);
+  from.read("start of the rows' velocity", start.v);
+  if (on != at_start) take(actions_.scene_from(start.time, start.q, start.v));
+  search_.restore(from, actions_.awake());
+  stepper().restore(from);
+  if (Sample here; begun_ && sample(here).ok()) search_.stand_at(here);
+}
+
+template <class Stepper>
+Work EventSteps<Stepper>::work() const {
+  Work work;
+  for (const auto& [on, mode] : modes_)
+    if (mode.stepper) work.add(mode.stepper->work());
+  if (Stepping::on_a_grid && !search_.empty()) work.steps = steps_;
+  return work;
 }
 
 }  // namespace diracstep

@@ -28,8 +28,7 @@ def run_of(scene: Scene, course: Any, times: np.ndarray, until: float | None, op
     """A run along a course, which shows these times if there are any."""
     counted, at_times = course.steps > 0, times.size > 0
     end = None if counted else _end(scene, until, times, options)
-    fixed = counted or at_times and bool(scene.events)
-    integrator = Integrator(scene, end, False, options, fixed)
+    integrator = Integrator(scene, end, False, options, counted)
     room = c.lib.expect(integrator._handle, ctypes.byref(course))
     if room > 2**40:
         raise Misuse(f"{room} points would be kept; take a larger every")
@@ -42,7 +41,7 @@ def run_of(scene: Scene, course: Any, times: np.ndarray, until: float | None, op
                      again=None if at_times else (end, options, taken.steps))
 
 
-def search_of(scene: Scene, course: Any, error: float, until: float | None, options: dict[str, Any], max_solves: int,
+def search_of(scene: Scene, course: Any, times: np.ndarray, error: float, until: float | None, options: dict[str, Any], max_solves: int,
               max_time: float, progress: bool | None) -> Run:
     for name in ("eps", "smallest_step", "max_steps"):
         if options.get(name) is not None:
@@ -51,6 +50,8 @@ def search_of(scene: Scene, course: Any, error: float, until: float | None, opti
     kind = None if kind is None else flag(kind, "adaptive")
     request = c.ErrorRequest(error=real(error, "error"), steps=0 if kind is None else 2 if kind else 1,
                              max_solves=whole(max_solves, "max_solves"), max_time=real(max_time, "max_time"))
+    if times.size:
+        until = _end(scene, until, times, {})
     chosen, found = options_from(options, until), c.Found()
     points = Points(scene._widths, _ROOM)
     told: list[Search] = []
@@ -68,7 +69,7 @@ def search_of(scene: Scene, course: Any, error: float, until: float | None, opti
         code, message = c.call_interruptibly(call, course.flag, bar.show)
     search = told[0] if told else None
     again = None
-    if search and not search.varies and not scene.events:
+    if search and not search.varies and not scene.events and not times.size:
         found_steps = {**options, "method": search.method, "order": search.order, "step": search.step}
         again = scene.until if until is None else real(until, "until"), found_steps, None
     return _finished(scene, points, code, message, search=search, doubt=search.warning if search else "", events=events,

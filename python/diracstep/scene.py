@@ -152,7 +152,8 @@ class Scene(OpenedScene):
 
         until: time of the end, the scene's own without it; a fixed ``step`` is made so much smaller that whole steps lead there.
         steps: so many steps instead.  at: times to show instead of the steps, in their order; every_time: the start and each so
-        much time later.  Values between steps have the order of the method, and the motion keeps its bits.
+        much time later.  Values between steps have the order of the method, and the motion keeps its bits; at the time of an event
+        they are those behind it.
         error: a relative error at the end; the library finds method and steps, repeating the run until its estimate is below
         (``max_solves`` and ``max_time`` in seconds limit that; ``adaptive=True`` or ``False`` decides whether steps vary, which
         they do not through events).
@@ -168,8 +169,9 @@ class Scene(OpenedScene):
         Warns with Doubt where the library's checks find the result not to be believed.  Raises Misuse, or Failure, which holds
         what was computed in ``run``.  Ctrl-C ends the run and keeps what is computed.
         """
-        if sum(choice is not None for choice in (steps, at, every_time, error)) > 1 or steps is not None and until is not None:
-            raise Misuse("steps, at, every_time and error exclude each other, and steps goes with no until")
+        counted = steps is not None
+        if counted + (at is not None) + (every_time is not None) > 1 or counted and (until is not None or error is not None):
+            raise Misuse("steps, at and every_time exclude each other, and steps goes with no until and no error")
         if error is None and (max_solves or max_time):
             raise Misuse("max_solves and max_time limit the search for an error, and go with error")
         if tolerances is not None:
@@ -181,7 +183,7 @@ class Scene(OpenedScene):
         progress = None if progress is None else flag(progress, "progress")
         course, times = course_of(every, momentum, steps, at)
         if error is not None:
-            return search_of(self, course, error, until, options, max_solves, max_time, progress)
+            return search_of(self, course, times, error, until, options, max_solves, max_time, progress)
         return run_of(self, course, times, until, options, progress)
 
     def ensemble(self, q: Any, v: Any = None, *, t: Any = None, until: float | None = None, steps: int | None = None,

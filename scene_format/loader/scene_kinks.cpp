@@ -4,6 +4,7 @@
 #include <diracstep/scene_format/loader/loaded_function.hpp>
 #include <diracstep/scene_format/loader/scene_kinks.hpp>
 #include <limits>
+#include <mutex>
 #include <numbers>
 #include <set>
 
@@ -59,8 +60,25 @@ class FileKinks final : public Kinks {
     ramps_.evaluate(t, q.data(), v.data(), g.data() + kinks_.rows());
   }
 
+  /// The integrators of a run look at the same times one after the other: what was found last is kept.
   std::vector<Instant> instants(double first, double last) const override {
     if (first > last) std::swap(first, last);
+    const std::lock_guard<std::mutex> lock(access_);
+    const auto known = std::ranges::find_if(
+        known_, [&](const Look& look) { return look.first == first && look.last == last; });
+    if (known != known_.end()) return known->found;
+    if (known_.size() == most_known) known_.erase(known_.begin());
+    return known_.emplace_back(Look{first, last, found_instants(first, last)}).found;
+  }
+
+ private:
+  struct Look {
+    double first, last;
+    std::vector<Instant> found;
+  };
+  static constexpr std::size_t most_known = 8;
+
+  std::vector<Instant> found_instants(double first, double last) const {
     std::vector<Instant> found;
     if (!(last > first)) return found;
     if (events_.rows() > 0) look_for_events(first, last, found);
@@ -74,7 +92,6 @@ class FileKinks final : public Kinks {
     return found;
   }
 
- private:
   void look_for_events(double first, double last, std::vector<Instant>& found) const {
     const auto changes = [&](Eigen::Index r, double a, double b) {
       if (found.size() < most_instants) add(found, r, zero(r, a, events_.at(a)[r], b, events_.at(b)[r]));
@@ -126,6 +143,8 @@ class FileKinks final : public Kinks {
 
   Values kinks_, ramps_, events_, widths_, phase_rates_;
   const std::set<double>& knots_;  ///< of the program, which the functions above keep
+  mutable std::mutex access_;      ///< to known_
+  mutable std::vector<Look> known_;
 };
 
 }  // namespace

@@ -92,12 +92,30 @@ TEST_F(CInterface, WhatDoesNotGoWithEventsIsRefused) {
   derivatives.steps = 3;
   EXPECT_EQ(diracstep_differentiate(model_, made_, &derivatives), DIRACSTEP_MISUSE);
   expect_message({"events"});
-  const double times[] = {0.1, 0.2};
+}
+
+/// Falls freely from 1 and bounces; what finds no room ends the run behind its step.
+TEST_F(CInterface, TimesGoThroughEvents) {
+  diracstep_source source{};
+  source.text = ball;
+  ASSERT_EQ(open(source), DIRACSTEP_OK);
+  ASSERT_EQ(create(), DIRACSTEP_OK);
+  const double falls = std::sqrt(2.0 / 9.81), times[] = {0.1, falls, 0.6};
   diracstep_course course{};
-  course.times = 2;
+  course.times = 3;
   course.time = times;
+  Arrays arrays(2, 1, 2);
+  arrays.points.enlarge = nullptr;
+  EXPECT_EQ(diracstep_run(made_, &course, &arrays.points), DIRACSTEP_FAILED);
+  expect_message({"room for 2 points"});
+  EXPECT_NEAR(arrays.q[0], 1.0 - 0.5 * 9.81 * 0.01, 1e-12);
+  EXPECT_NEAR(arrays.q[2], 0.0, 1e-12);
+  EXPECT_NEAR(arrays.v[0], -0.981, 1e-12);
+  EXPECT_GT(arrays.v[2], 0.0) << "behind the impact";
+  course.time = times + 1;
+  course.times = 2;
   EXPECT_EQ(diracstep_run(made_, &course, &arrays.points), DIRACSTEP_MISUSE);
-  expect_message({"times"});
+  expect_message({"does not lie ahead"});
 }
 
 /// y = 3 cos t - 2 to the floor, then up with half of the speed.

@@ -115,7 +115,6 @@ TEST_F(ChosenTimes, TimesThatCannotBeShownAreMisuse) {
   expect_misuse("run knife_edge --at 0.5 --every 2", {"--every"});
   expect_misuse("run knife_edge --every-time 0", {"--every-time"});
   expect_misuse("run knife_edge --every-time 1e-12", {"--every-time", "points"});
-  expect_misuse("run knife_edge --at 1 --error 1e-6", {"--error"});
 }
 
 TEST_F(ChosenTimes, OutputsAreColumnsAndEndValues) {

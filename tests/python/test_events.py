@@ -135,9 +135,8 @@ def test_an_error_asked_for_goes_through_events():
 
 
 def test_what_does_not_go_with_events_is_refused(ball):
-    for options, words in (({"error": 1e-6, "adaptive": True}, "events"), ({"at": [0.1, 0.2]}, "times"), ({"every_time": 0.1}, "times")):
-        with pytest.raises(ds.Misuse, match=words):
-            ball.run(**options)
+    with pytest.raises(ds.Misuse, match="events"):
+        ball.run(error=1e-6, adaptive=True)
     with pytest.raises(ds.Misuse, match="events"):
         ball.run(steps=3).gradient({"q": [1.0, 0.0]})
     with pytest.raises(ds.Misuse, match="events"):
@@ -224,6 +223,20 @@ def test_times_of_ones_own_are_those_of_the_command(tmp_path):
     for wrong in (0.0, -1.0, np.nan, 1e-12):
         with pytest.raises(ds.Misuse):
             ds.load(file).run(every_time=wrong)
+
+
+def test_times_of_ones_own_go_through_events(tmp_path):
+    file = tmp_path / "ball.toml"
+    file.write_text(BALL)
+    out = tmp_path / "out.csv"
+    at = [0.1, 0.3, 0.5, 0.8]  # the last is behind the end
+    for options, ours in (([], {}), (["--adaptive"], {"adaptive": True}), (["--error", "1e-8"], {"error": 1e-8})):
+        command = [os.environ["DIRACSTEP_COMMAND"], "run", str(file), *options, "--at", ",".join(map(str, at)), "--out", str(out)]
+        subprocess.run(command, check=True, capture_output=True)
+        theirs = np.loadtxt(out, delimiter=",", skiprows=1, comments="#")
+        run = ds.load(file).run(at=at, **ours)
+        assert np.array_equal(theirs[:, 0], run.t) and np.array_equal(theirs[:, 1], run["y"]), options
+        assert run["y"][0] == pytest.approx(1 - 9.81 * 0.01 / 2, abs=1e-10) and list(run["count"]) == [0.0, 0.0, 1.0]
 
 
 def test_steps_by_hand_and_ensembles_warn_of_doubts():

@@ -113,26 +113,44 @@ action = "stop"
 end = 5
 step = 0.1
 )");
-  const Sweep sweep = read_sweep(write("falls.toml", R"(scene = "fall.toml"
+  const std::string falls = R"(
 [grid]
 g = [10, 20]
 "start.y" = [1, 4]
 [record]
 events = ["ground"]
 values = ["y", "v_y"]
-)"));
-  (void)run(sweep, {.folder = path("out")});
-  EXPECT_EQ(rows("out")[0], "member,g,start.y,status,t,y,v_y,ground_time,ground_count,reason");
-  for (std::size_t k = 0; k < 4; ++k) {
-    const std::vector<std::string> line = fields(rows("out")[1 + k]);
-    const double g = std::stod(line[1]), h = std::stod(line[2]), fall = std::sqrt(2.0 * h / g);
-    EXPECT_EQ(line[3], "ok") << rows("out")[1 + k];
-    EXPECT_NEAR(std::stod(line[4]), fall, 1e-13);
-    EXPECT_NEAR(std::stod(line[5]), 0.0, 1e-13);
-    EXPECT_NEAR(std::stod(line[6]), -g * fall, 1e-12);
-    EXPECT_EQ(line[7], line[4]);
-    EXPECT_EQ(line[8], "1");
+extrema = ["y"]
+)";
+  for (const char* steps : {"", "error = 1e-9"}) {
+    const Sweep sweep =
+        read_sweep(write("falls.toml", std::string("scene = \"fall.toml\"\n") + steps + falls));
+    (void)run(sweep, {.folder = path(std::string("out") + steps)});
+    const auto out = rows(std::string("out") + steps);
+    EXPECT_EQ(out[0], "member,g,start.y,status,t,y,v_y,min_y,max_y,ground_time,ground_count,reason");
+    for (std::size_t k = 0; k < 4; ++k) {
+      const std::vector<std::string> line = fields(out[1 + k]);
+      const double g = std::stod(line[1]), h = std::stod(line[2]), fall = std::sqrt(2.0 * h / g);
+      EXPECT_EQ(line[3], "ok") << out[1 + k];
+      EXPECT_NEAR(std::stod(line[4]), fall, 1e-13);
+      EXPECT_NEAR(std::stod(line[5]), 0.0, 1e-13);
+      EXPECT_NEAR(std::stod(line[6]), -g * fall, 1e-12);
+      EXPECT_EQ(std::stod(line[8]), h);
+      EXPECT_EQ(line[9], line[4]);
+      EXPECT_EQ(line[10], "1");
+    }
   }
+}
+
+/// -1/(2 a) with a = 1.
+TEST_F(SweepMembers, ExtremaAreTakenFromTheRunThatMeetsAnErrorAskedFor) {
+  const Sweep sweep = read_sweep(write("s.toml",
+                                       "scene = \"kepler_e06\"\nerror = 1e-7\nend = 6.3\n[grid]\ne = "
+                                       "[0.3]\n[record]\nextrema = [\"energy\"]\n"));
+  (void)run(sweep, {.folder = path("out")});
+  const std::vector<std::string> line = fields(rows("out")[1]);
+  EXPECT_EQ(line[2], "ok") << rows("out")[1];
+  for (const std::size_t k : {4U, 5U}) EXPECT_NEAR(std::stod(line[k]), -0.5, 1e-6) << rows("out")[1];
 }
 
 /// A charge behind a resistor that lets it through in a nanosecond: fixed steps of the default would not.

@@ -32,6 +32,9 @@ constexpr double ladders_of_baselines = 3.0;  // times the length of one of ours
 
 struct Interrupted {};
 
+/// Ends a reference by IDA from within.
+struct OutOfTime {};
+
 class StudyInProgress {
  public:
   StudyInProgress(const CatalogueScene& scene, const Registry& registry, const SolverFactory& solvers,
@@ -110,8 +113,17 @@ class StudyInProgress {
     ReferenceEnd ours = converged_reference(
         entry_, registry_, solvers_, study_.t_end, options_.reference_budget,
         [&] { look(0.0, "a converged reference"); }, damped());
-    const bool by_ida = !ours.missing.empty() && entry_.events.empty();  // which knows no events
-    return by_ida ? reference_end(entry_, study_.t_end, [&] { look(0.0, "a reference by IDA"); }) : ours;
+    if (ours.missing.empty() || !entry_.events.empty()) return ours;  // IDA knows no events
+    const double begin = thread_seconds(), seconds = std::max(options_.reference_budget, options_.run_budget);
+    try {
+      return reference_end(entry_, study_.t_end, [&] {
+        look(0.0, "a reference by IDA");
+        if (thread_seconds() - begin > seconds) throw OutOfTime{};
+      });
+    } catch (const OutOfTime&) {
+      ours.missing += fmt::format("; IDA has not come to the end within {:g} s", seconds);
+      return ours;
+    }
   }
 
   /// CPU seconds that the ladder which begins now may take: an even share of what is left.

@@ -35,7 +35,8 @@ struct StudyOptions {
   std::optional<StepRule> constraint_rule = {};  ///< instead of the method's own
   double run_budget = 1.0;      ///< CPU seconds: a ladder ends where its next run is expected to take longer
   double smallest_error = 0.0;  ///< ladders end below it: what is smaller is of no interest
-  double reference_budget = 20.0;  ///< CPU seconds for a reference of our own, see converged_reference()
+  double reference_budget = 20.0;  ///< CPU seconds for a reference of our own, see converged_reference(), and
+                                   ///< as many for one by IDA where there is none, at least those of a run
   /// CPU seconds for the whole study, shared out evenly over its ladders as they come: what one
   /// does not need the others have.  A ladder whose next rows would take longer ends there.
   double time_limit = std::numeric_limits<double>::infinity();

@@ -6,6 +6,14 @@
 
 namespace diracstep {
 
+namespace {
+
+/// Of terms that cancel inside of b: the residual that they leave is accepted, but no step of Newton's method
+/// is left out for it.
+constexpr double part_that_counts = 1e-3;
+
+}  // namespace
+
 RadauRows::Block::Block(std::shared_ptr<const ConstraintRows> of, int s, int first_row,
                         int first_of_positions)
     : rows(std::move(of)), first(first_row), first_position(first_of_positions) {
@@ -21,6 +29,7 @@ RadauRows::RadauRows(const Scene& scene, const RadauTableau& table)
       table_(table.a),
       start_(scene.constraints, n_),
       projection_(only_holonomic(scene.constraints), n_) {
+  start_rates_.setZero(start_.pattern().nonzeros());
   int row = 0, position = 0;
   for (const auto& rows : scene.constraints) {
     blocks_.emplace_back(rows, s_, row, position);
@@ -81,7 +90,10 @@ void RadauRows::plan(Block& block, BlockPattern& layout) {
 }
 
 void RadauRows::begin(double t, ConstVectorRef q0) {
-  if (m_ > 0) start_.evaluate(t, q0);
+  if (m_ > 0) {
+    start_.evaluate(t, q0);
+    start_.distribution().derivative(t, q0, Vector::Zero(n_), 1.0, start_rates_);
+  }
   if (holonomic_rows() > 0) projection_.evaluate(t, q0);
 }
 
@@ -202,6 +214,14 @@ double RadauRows::curvature_size() const {
   double largest = 0.0;
   for (const Block& block : blocks_)
     largest = std::max(largest, largest_entry(block.curvature.data(), block.curvature.size()));
+  return largest;
+}
+
+double RadauRows::rate_size(const Columns& q) const {
+  double largest = 0.0;
+  start_.pattern().for_each([&](Eigen::Index e, int, int c) {
+    largest = std::max(largest, part_that_counts * std::abs(start_rates_[e] * q(c, s_ - 1)));
+  });
   return largest;
 }
 

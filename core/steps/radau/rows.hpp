@@ -41,6 +41,9 @@ class RadauRows {
   double form_size() const;
   double impulse_size(const double* multipliers) const;
   double curvature_size() const;
+  /// The largest term of ∂b/∂q q, the derivative at the start and q at the end: what b cancels inside, as
+  /// (told - x)/lag, it loses to the round-off of positions.  A thousandth of it counts as a scale.
+  double rate_size(const Columns& q) const;
   /// sizes += those of the terms of Aᵀλ and of what it loses to the round-off of positions.
   void add_impulse_sizes(const double* x, const Vector& q, Vector& sizes) const;
   /// sizes = those of the terms of A v + b.
@@ -78,6 +81,7 @@ class RadauRows {
   ConstraintsAtPoint start_, projection_;  ///< A(q0) and A_h(q0)
   PatternProduct stiffness_along_, mixed_along_, force_along_;
   int lagrangian_layout_ = -1, force_layout_ = -1;
+  Vector start_rates_;    ///< ∂b/∂q there
   Vector product_, sum_;  ///< workspaces
 };
 

@@ -163,8 +163,9 @@ class RadauStep final : public StepProblem {
     if (m_ > 0) terms = std::max(terms, rows_.impulse_size(x.data() + n_ * s_));
     if (std::isfinite(terms)) blocks_[0].scale = std::max(known_momentum_, terms);
     if (m_ == 0) return;
-    scale_rows(rows_.form_size(), largest_entry(x.data(), n_ * s_),
-               largest_entry(points_.gauss.data(), n_ * s_));
+    const double position = largest_entry(points_.gauss.data(), n_ * s_);
+    scale_rows(rows_.form_size(), largest_entry(x.data(), n_ * s_), position);
+    blocks_[1].scale = std::max(blocks_[1].scale, rows_.rate_size(points_.gauss));
   }
 
   /// For such sizes of A, of velocities and of positions.

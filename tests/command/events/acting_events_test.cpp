@@ -291,12 +291,36 @@ TEST_F(ActingEvents, BadOnesAreToldWithTheirPlace) {
   refused("when = \"x\"\nset = { p_x = \"1\" }\n", {"scene.toml:11", "velocities v_"});
   refused("when = \"x\"\nif = \"x\"\n", {"scene.toml:11:", "comparison"});
   refused("when = \"lambda_rod\"\n", {"scene.toml:10", "lambda_rod"});
-  expect_misuse("run " + scene(head + "when = \"x - 0.1\"\nset = { x = \"0\" }\n") + " --every-time 0.1",
-                {"--every-time", "events"});
   refused("when = \"sqrt(x - 1)\"\n", {"scene.toml:10", "event 'e' is not a number"});
   const Outcome undefined = run("run " + scene(head + "when = \"sqrt(0.5 - t)\"\n"));
   EXPECT_EQ(undefined.status, 1);
   EXPECT_NE(undefined.err.find("event 'e' is not a number"), std::string::npos) << undefined.err;
+}
+
+/// A free body starts on the zero of its event; a row holds one until the force on it turns.
+TEST_F(ActingEvents, AZeroAtTheStartAndARowWithoutADirectionAreNoted) {
+  const std::string head =
+      "name = \"a\"\nlagrangian = \"v_x^2/2\"\n[coordinates]\nx = {}\n[span]\nend = 1.5\nstep = 0.1\n";
+  const auto noted = [&](const std::string& text) {
+    const Outcome outcome = run("run " + scene(head + text));
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+    return outcome.err;
+  };
+  const std::string passes = "[start]\nv_x = 1\n[[events]]\nname = \"e\"\nwhen = \"x\"\n",
+                    counts = "set = { v_x = \"1\" }\n", note = "event 'e': its function is 0 at the start";
+  EXPECT_NE(noted(passes + counts).find(note), std::string::npos);
+  EXPECT_NE(noted(passes + "direction = \"rising\"\n" + counts).find(note), std::string::npos);
+  EXPECT_EQ(noted(passes + "direction = \"falling\"\n" + counts).find(note), std::string::npos);
+  EXPECT_EQ(noted(passes).find(note), std::string::npos) << "nothing depends on it";
+
+  const std::string held =
+      "[force]\nx = \"t - 1\"\n[[rows]]\nname = \"hold\"\nequation = \"x = 0\"\n[[events]]\nname = \"e\"\n"
+      "when = \"lambda_hold\"\noff = \"hold\"\n";
+  const std::string off = noted(held);
+  EXPECT_NE(off.find("row 'hold' stays on until it changes its sign; direction = \"falling\""),
+            std::string::npos)
+      << off;
+  EXPECT_EQ(noted(held + "direction = \"falling\"\n").find("stays on"), std::string::npos);
 }
 
 const std::string relay =

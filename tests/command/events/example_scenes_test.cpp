@@ -49,6 +49,18 @@ TEST_F(ExampleScenes, ASteeredSkateGlidesAlongArcs) {
   EXPECT_NEAR(end_of(json, "q", "th"), heading, 1e-12);
 }
 
+/// x(4) = 13/3 − 4 τ + 2 τ² but for e^(−1/τ), of an actuator far faster than the steps.
+TEST_F(ExampleScenes, AnActuatorMayBeAsFastAsItLikes) {
+  for (const double lag : {1e-3, 1e-6, 1e-9, 1e-12}) {
+    const auto json = result("actuator", "--set lag=" + std::to_string(1e12 * lag) + "e-12");
+    EXPECT_EQ(json["method"], "damped/radau:3") << lag;
+    EXPECT_NEAR(end_of(json, "q", "x"), 13.0 / 3.0 - 4.0 * lag + 2.0 * lag * lag, 1e-9) << lag;
+    EXPECT_NEAR(end_of(json, "q", "push"), 4.0, 1e-9) << lag;
+    EXPECT_LT(json["steps"].get<int>(), 500) << lag;
+  }
+  EXPECT_EQ(result("actuator")["method"], "type1/gl:3");
+}
+
 /// x'' = 4 (a sin(3 t) − x) from rest.
 TEST_F(ExampleScenes, ADrivenBaseSwingsItsMass) {
   const auto json = result("driven_base");

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/reports/report.hpp>
+#include <diracstep/scene_format/scene_file.hpp>
 #include <diracstep/solvers/kinsol_solver.hpp>
 #include <diracstep/validation/studies/converged_reference.hpp>
 #include <diracstep/validation/studies/convergence_study.hpp>
@@ -237,6 +238,26 @@ TEST(ConvergenceStudy, IdaIsTheLastResortWhereOurOwnReferenceGetsNoTime) {
   StudyOptions options = short_study("knife_edge");
   options.reference_budget = 0.0;
   EXPECT_EQ(convergence_study(entry, Registry::with_built_ins(), kinsol(), options).reference_kind, "ida");
+}
+
+/// 1e8 radians, which IDA takes hours for; our own runs come to the end with steps that say nothing.
+TEST(ConvergenceStudy, AReferenceByIdaHasABudget) {
+  const CatalogueScene entry = scene_from_text(
+      "fast.toml",
+      "name = \"fast\"\nlagrangian = \"(v_x^2 - 1e10*x^4)/2\"\n[coordinates]\nx = {}\n[start]\nx = 1\n"
+      "[span]\nend = 1000\nstep = 50\n");
+  StudyOptions options;
+  options.methods = {"type1/midpoint"};
+  options.orders = {2};
+  options.steps = {50.0};
+  options.rtols = {};
+  options.repeats = 1;
+  options.reference_budget = 0.0;
+  options.run_budget = 0.05;
+  const Study study = convergence_study(entry, Registry::with_built_ins(), kinsol(), options);
+  ASSERT_FALSE(study.rows.empty());
+  EXPECT_NE(study.rows.front().status.find("IDA has not come to the end within 0.05 s"), std::string::npos)
+      << study_table(study);
 }
 
 TEST(ConvergedReference, LiesWithinItsOwnErrorOfAClosedForm) {
