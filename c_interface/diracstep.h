@@ -301,9 +301,9 @@ typedef struct diracstep_points {
 
 /* How far a run goes, and what it keeps: the start, each `every`-th point, and the end. */
 typedef struct diracstep_course {
-  long steps;         /* above 0: so many steps */
-  int times;          /* above 0: at so many times instead, reached by shorter steps; at the time of an event as
-                       * it has left the motion … */
+  long steps; /* above 0: so many steps */
+  int times;  /* above 0: at so many times instead, reached by shorter steps; at the time of an event as
+               * it has left the motion … */
   const double *time; /* … which run from the current point on; those behind an event that ends the motion are
                        * not shown */
   int ends;           /* 1: to the time `end`; 0: to that of the options or else of the scene */
@@ -347,8 +347,8 @@ typedef struct diracstep_found {
 
 /* A run with method and steps that the library finds, repeated until the estimated error at the end is below
  * the one asked for.  Of the course, `steps` does not count; times lie before the end, where the error
- * is.  Steps are of one size where the scene has events: DIRACSTEP_MISUSE where they are to vary.  DIRACSTEP_FAILED where the
- * search is refused: `found` and one point are then the best answer so far. */
+ * is.  Steps are of one size where the scene has events: DIRACSTEP_MISUSE where they are to vary.
+ * DIRACSTEP_FAILED where the search is refused: `found` and one point are then the best answer so far. */
 DIRACSTEP_API int diracstep_solve(const diracstep_model *model, const diracstep_options *options,
                                   const diracstep_course *course, const diracstep_error *error,
                                   diracstep_points *points, diracstep_found *found);
