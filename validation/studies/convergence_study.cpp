@@ -122,6 +122,7 @@ class StudyInProgress {
       });
     } catch (const OutOfTime&) {
       ours.missing += fmt::format("; IDA has not come to the end within {:g} s", seconds);
+      ours.how = ours.missing;
       return ours;
     }
   }
