@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/numerics/fewer_entries.hpp>
 #include <diracstep/core/numerics/kernel_basis.hpp>
 #include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/core/system/constraint_distribution.hpp>
@@ -68,52 +69,6 @@ Columns kernel(const Columns& matrix) {
     if (basis(first, j) < 0.0) basis.col(j) *= -1.0;  // names begin without a sign
   }
   return (basis.array().abs() < zero_tolerance).select(0.0, basis);
-}
-
-long entries_of(const Vector& column) { return (column.array() != 0.0).count(); }
-
-/// The sum of column i and another, or their difference, with fewest entries; empty where none has fewer than
-/// column i.  Those with about as many come first: a sum has at least as many as the two differ by.
-Vector sparsest_sum(const Columns& basis, const std::vector<long>& entries, Eigen::Index i) {
-  const auto at = [](Eigen::Index k) { return static_cast<std::size_t>(k); };
-  std::vector<Eigen::Index> others;
-  for (Eigen::Index j = 0; j < basis.cols(); ++j)
-    if (j != i) others.push_back(j);
-  const auto apart = [&](Eigen::Index j) { return std::abs(entries[at(j)] - entries[at(i)]); };
-  std::ranges::stable_sort(others, {}, apart);
-  Vector best;
-  long fewest = entries[at(i)];
-  for (const Eigen::Index j : others) {
-    if (apart(j) >= fewest) break;
-    for (const double sign : {1.0, -1.0}) {
-      Vector sum = basis.col(i) + sign * basis.col(j);
-      sum = (sum.array().abs() < zero_tolerance).select(0.0, sum);
-      const long count = entries_of(sum);
-      if (count == 0 || count >= fewest) continue;
-      fewest = count;
-      best = sum / max_norm(sum);
-    }
-  }
-  return best;
-}
-
-/// The same space by columns with fewer entries, such as loops of a circuit around one mesh each.
-Columns fewer_entries(Columns basis) {
-  constexpr long few = 3;
-  std::vector<long> entries;
-  for (Eigen::Index j = 0; j < basis.cols(); ++j) entries.push_back(entries_of(basis.col(j)));
-  for (bool changed = true; changed;) {
-    changed = false;
-    for (Eigen::Index i = basis.cols() - 1; i >= 0; --i) {
-      if (entries[static_cast<std::size_t>(i)] <= few) continue;
-      const Vector sum = sparsest_sum(basis, entries, i);
-      if (sum.size() == 0) continue;
-      basis.col(i) = sum;
-      entries[static_cast<std::size_t>(i)] = entries_of(sum);
-      changed = true;
-    }
-  }
-  return basis;
 }
 
 Columns row_matrix(const Scene& scene, const Point& at) {
@@ -217,7 +172,7 @@ Columns directions(const Scene& scene, const Point& start, const FullDerivatives
   Columns both(here.rows() + elsewhere.rows(), here.cols());
   both << here, elsewhere;
   Columns constant = kernel(both);
-  if (constant.cols() > several) constant = fewer_entries(std::move(constant));
+  if (constant.cols() > several) constant = fewer_entries(std::move(constant), zero_tolerance);
   if (kernel(elsewhere).cols() > constant.cols())
     refuse(scene, w,
            "elsewhere another motion does: a direction without momentum that moves is not supported");
