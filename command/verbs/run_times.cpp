@@ -28,14 +28,16 @@ std::vector<double> chosen_times(const RunArguments& options, const CatalogueSce
 }
 
 void require_within(const std::vector<double>& times, double start, double end, double step) {
+  const auto reaches = [step](double from, double to) { return (to - from) * step >= -1e-9 * step * step; };
   double last = start;
   for (const double t : times) {
-    if (!((t - last) * step >= -1e-9 * step * step && (end - t) * step >= -1e-9 * step * step))
-      throw Misuse(
-          fmt::format("--at: t = {:g} does not lie between t = {:g}, the time before, and t = {:g}, the end",
-                      t, last, end));
+    if (!reaches(last, t))
+      throw Misuse(fmt::format("--at: t = {:g} is not ahead of t = {:g}, {}", t, last,
+                               last == start ? "the start" : "the time before"));
     last = t;
   }
+  if (!reaches(last, end))
+    throw Misuse(fmt::format("--at: t = {:g} lies behind t = {:g}, the end; --end moves it", last, end));
 }
 
 }  // namespace diracstep::command

@@ -84,7 +84,7 @@ SceneDocument::NodeName node_name(const std::string& file, const FormulaText& te
       FormulaText{text.text.substr(bracket + 1, text.text.size() - bracket - 2), text.place(bracket + 1)}};
 }
 
-void guess_currents(SceneDocument& document) {
+void guess_starts(SceneDocument& document) {
   const bool by_elements = std::ranges::any_of(document.branches, [](const auto& branch) {
     return branch.kind == "source_current" || coordinates_of(branch).size() > 1;
   });
@@ -100,6 +100,9 @@ void guess_currents(SceneDocument& document) {
       const std::string velocity = "v_" + coordinate.name;
       if (branch.kind != "inductor" && !stated(velocity))
         document.guesses.push_back({velocity, branch.place});
+      // the charge of a junction follows the voltage across it
+      if (coordinate.name == "q" + branch.name + "_c" && !stated(coordinate.name))
+        document.guesses.push_back({coordinate.name, branch.place});
     }
 }
 

@@ -24,8 +24,8 @@ SceneDocument::NodeName node_name(const std::string& file, const FormulaText& te
 
 /// Where currents are given by elements, or some by the start, or the motion starts at the operating point,
 /// the start of those that nothing stores is to be found: they become guesses, but for those of inductors and
-/// those that the start gives.
-void guess_currents(SceneDocument& document);
+/// those that the start gives.  Charges of junctions, which follow the voltages across them, likewise.
+void guess_starts(SceneDocument& document);
 
 /// Reads the elements of a circuit from the tables of a scene file.
 class CircuitReader {

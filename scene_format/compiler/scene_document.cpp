@@ -79,7 +79,7 @@ SceneDocument read_document(const std::string& file, const std::string& text) {
                      fmt::format("nested too deep: a key of more than {} parts", limits.key_parts));
   if (file.ends_with(".cir")) {
     SceneDocument document = read_netlist(file, text);
-    guess_currents(document);
+    guess_starts(document);
     return document;
   }
   toml::table root;

@@ -84,7 +84,7 @@ TEST_F(AdaptiveCommand, MisuseNamesTheValueAndWhatIsAllowed) {
   expect_misuse("run knife_edge --adaptive --eps=-1", {"eps = -1", "above 0"});
   expect_misuse("run knife_edge --adaptive --control fast",
                 {"fast", "integrating", "in-step", "irreversible"});
-  expect_misuse("run knife_edge --at 1,2 --error 1e-4", {"--at", "--error"});
+  expect_misuse("run knife_edge --at 11 --error 1e-4", {"--at", "t = 11", "t = 10, the end", "--end"});
   expect_misuse("run knife_edge --adaptive --at 2,1", {"t = 1", "ahead"});
   expect_misuse("run kepler_e06 --method type1/left --adaptive", {"type1/left", "not self-adjoint"});
   expect_misuse("run lotka_volterra_2d --adaptive", {"lotka_volterra_2d", "linear in v"});

@@ -47,7 +47,7 @@ SceneDocument DocumentReader::read(const toml::table& root) {
   document_.control = read_control(*this, root, document_.parameters);
   read_events(root);
   read_recommended(root);
-  guess_currents(document_);
+  guess_starts(document_);
   guess_extensions();
   require_no_spaces(root);
   return std::move(document_);
