@@ -1,28 +1,12 @@
 #pragma once
 
-#include <cmath>
 #include <diracstep/core/runs/run.hpp>
+#include <diracstep/core/runs/shown_times.hpp>
 #include <diracstep/core/runs/step_loop.hpp>
 #include <span>
 
 /// The runs of run.hpp, for an Integrator and an AdaptiveIntegrator alike.
 namespace diracstep::detail {
-
-/// Relative to the step: times so close are the same.
-constexpr double same_time = 1e-9;
-
-/// How far `to` lies ahead of `from` for steps of this size.
-inline double ahead(double from, double to, double size) { return size > 0.0 ? to - from : from - to; }
-
-/// Whether a step of this size from t leads beyond `end`.
-inline bool passes(double t, double size, double end) {
-  return ahead(end, t + size, size) > same_time * std::abs(size);
-}
-
-inline void require_ahead(double from, double to, double size) {
-  if (std::isfinite(to) && ahead(from, to, size) >= -same_time * std::abs(size)) return;
-  throw Misuse("t = " + to_text(to) + " does not lie ahead of t = " + to_text(from));
-}
 
 /// A run of one stepper, and what it reads on its way.  `Steps` takes the steps of the stepper, perhaps with
 /// checks around them, which see what is read.

@@ -1,12 +1,33 @@
 #pragma once
 
-#include <diracstep/core/runs/run_points.hpp>
+#include <cmath>
+#include <diracstep/core/runs/run.hpp>
 #include <functional>
 #include <string>
 #include <utility>
 #include <vector>
 
 namespace diracstep {
+
+namespace detail {
+
+/// Relative to the step: times so close are the same.
+constexpr double same_time = 1e-9;
+
+/// How far `to` lies ahead of `from` for steps of this size.
+inline double ahead(double from, double to, double size) { return size > 0.0 ? to - from : from - to; }
+
+/// Whether a step of this size from t leads beyond `end`.
+inline bool passes(double t, double size, double end) {
+  return ahead(end, t + size, size) > same_time * std::abs(size);
+}
+
+inline void require_ahead(double from, double to, double size) {
+  if (std::isfinite(to) && ahead(from, to, size) >= -same_time * std::abs(size)) return;
+  throw Misuse("t = " + to_text(to) + " does not lie ahead of t = " + to_text(from));
+}
+
+}  // namespace detail
 
 /// Times of the user's choice at which a motion is shown, whatever its nodes.  EventSteps hands over each
 /// piece that it has accepted, a step or what of it lies before an event that acts: between the ends of a
