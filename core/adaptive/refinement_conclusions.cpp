@@ -17,6 +17,7 @@ constexpr int max_divisions = 6;
 constexpr std::size_t max_runs = 60;
 constexpr std::size_t runs_to_converge = 8, runs_to_resolve_kinks = 24;  // before stagnation counts
 constexpr double missed_allowed = 0.1;          // by the forces surveyed, in parts of the error asked for
+constexpr double least_part_left = 0.01;        // of an end beside the motion, that the forces are held to
 constexpr double error_out_of_reach = 1e-15;    // differences of runs hold nothing but round-off below it
 constexpr double growth_of_no_power = 1e6;      // of two runs apart: powers of the time lead to less
 constexpr double smallest_local_error = 2e-14;  // below it steps have one of round-off
@@ -121,6 +122,16 @@ std::vector<PathPoint> RefinementSearch::path_of(long refinement) {
   return path;
 }
 
+/// The size of the end in parts of the largest on the way, of q or p whichever is less: what the forces miss
+/// along the motion is to be small beside the end.
+double RefinementSearch::part_left_at_end() const {
+  const auto part = [](const Vector& column, double largest) {
+    return largest > 0.0 ? size_at_end(column, largest) / largest : 1.0;
+  };
+  return std::clamp(std::min(part(report_.end.q, largest_position_), part(report_.end.p, largest_momentum_)),
+                    least_part_left, 1.0);
+}
+
 /// Looks for what the steps of the last run do not resolve, before it is accepted or because the runs do not
 /// converge.  False where the motion is divided anew or the
 /// search is refused.
@@ -138,10 +149,11 @@ bool RefinementSearch::survey(bool accepted) {
   const std::vector<PathPoint> path = follows ? path_ : path_of(way);
   if (path.size() < 2 || !reached_end(path.back().time))
     return refuse("the time was used up before the forces along the motion were surveyed (--max-time)");
-  ForceSurvey forces(*motion_.scene, motion_.options.error);
+  const double allowed = motion_.options.error * part_left_at_end();
+  ForceSurvey forces(*motion_.scene, allowed);
   const long parts = std::max(1L, std::lround(static_cast<double>(refinement_) / static_cast<double>(way)));
   const ForceSurveyReport found = forces.along(path, parts);
-  if (found.missed <= missed_allowed * motion_.options.error) return true;
+  if (found.missed <= missed_allowed * allowed) return true;
   fast_ = "the force changes fast near t = " + to_text(found.time);
   if (!accepted && (!found.followed || report_.adaptive)) return true;  // finer steps may do
   if (!found.followed)

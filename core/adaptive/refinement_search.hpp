@@ -74,6 +74,7 @@ class RefinementSearch {
   bool stopped(long max_solves);
   bool survey(bool accepted);
   void add_to_path(const Sample& point, std::vector<PathPoint>& path) const;
+  double part_left_at_end() const;
   std::vector<PathPoint> path_of(long refinement);
   void divide(const ForceSurveyReport& found);
   bool accept();

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <diracstep/core/runs/run.hpp>
 #include <diracstep/core/runs/shown_times.hpp>
 #include <diracstep/core/runs/step_loop.hpp>
