@@ -3,6 +3,7 @@
 #include <diracstep/core/integrator/prepared_scene.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/runs/event_actions.hpp>
+#include <diracstep/core/system/consistent_start.hpp>
 #include <diracstep/core/system/contradictory_rows.hpp>
 #include <diracstep/core/system/row_subset.hpp>
 #include <diracstep/core/system/saddle_point.hpp>
@@ -137,6 +138,7 @@ EventActions::Outcome EventActions::act(const Event& event, const Sample& at, co
   std::shared_ptr<const Scene> scene(std::shared_ptr<void>(), &current);
   if (outcome.switched) try {
       scene = scene_with(on, {at.time, outcome.q, outcome.v});
+      settle(*scene, at, outcome.q);
     } catch (const Misuse& misuse) {
       outcome.failure = "event '" + event.name + "' at t = " + to_text(at.time, 10) + ": " + misuse.what();
       return outcome;
@@ -187,6 +189,18 @@ EventActions::Outcome EventActions::act(const Event& event, const Sample& at, co
   else
     outcome.failure = "event '" + event.name + "' at t = " + to_text(at.time, 10) + ": " + outcome.failure;
   return outcome;
+}
+
+void EventActions::settle(const Scene& scene, const Sample& at, Vector& q) const {
+  constexpr double round_off = 1e-12;
+  try {
+    require_consistent(scene, {at.time, q, at.v});
+  } catch (const InconsistentStart& off) {
+    if (off.of() != InconsistentStart::Of::position) return;
+    const Vector on_rows = project_start(scene, {at.time, q, at.v}, solvers_).start.q;
+    const Vector way = q.cwiseAbs() + std::abs(at.time - start_->start.time) * at.v.cwiseAbs();
+    if (((on_rows - q).cwiseAbs().array() <= round_off * way.array()).all()) q = on_rows;
+  }
 }
 
 double EventActions::contact_rate(const Event& event, const Sample& at) {

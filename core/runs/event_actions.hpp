@@ -54,6 +54,9 @@ class EventActions {
   /// The scene of these rows from a start, without redundant ones.  Which are left out is found where the
   /// rows are first on, and kept.
   std::shared_ptr<const Scene> scene_with(const std::vector<bool>& on, const Start& start) const;
+  /// Puts q onto the rows of a scene where it is off by no more than the round-off of the time since the
+  /// start.
+  void settle(const Scene& scene, const Sample& at, Vector& q) const;
   std::size_t row(const std::string& name) const;
 
   std::shared_ptr<const Scene> start_, all_;
