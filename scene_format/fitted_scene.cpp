@@ -85,6 +85,9 @@ FitData fit_data(const CsvTable& table, const std::string& from, const Catalogue
   Parameters left = sigma;
   for (std::size_t c = 1; c < table.names.size(); ++c) {
     const std::string& name = table.names[c];
+    const auto here = table.names.begin() + static_cast<std::ptrdiff_t>(c);
+    if (std::find(table.names.begin(), here, name) != here)
+      throw Misuse(fmt::format("{}: two columns are named '{}'", from, name));
     const auto found = std::ranges::find(known, name);
     if (found == known.end()) {
       if (is_left_alone(name)) continue;

@@ -5,14 +5,16 @@ The scene goes there as its file's text; answers come as JSON.
 
 from __future__ import annotations
 
+import csv
 import json
 import os
 import shutil
 import subprocess
 import tempfile
 import warnings
+from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -108,8 +110,22 @@ def sweep(scene: Scene, varied: Varied, recorded: Mapping[str, Sequence[str]], s
         file = verbs.folder / "sweep.toml"
         file.write_text("\n".join(lines) + "\n", encoding="utf-8")
         where = Path(out) if out is not None else verbs.folder / "out"
-        verbs.call("sweep", str(file), "--out", str(where), "--threads", str(threads), *verbs.tolerances(), scene=False)
+        with _reasons_told(where):
+            verbs.call("sweep", str(file), "--out", str(where), "--threads", str(threads), *verbs.tolerances(), scene=False)
         return _results(where)
+
+
+@contextmanager
+def _reasons_told(folder: Path) -> Iterator[None]:
+    """A sweep of which every member fails says why the first did."""
+    try:
+        yield
+    except Failure as failure:
+        if str(failure) or not (folder / "results.csv").exists():
+            raise
+        with open(folder / "results.csv", encoding="utf-8", newline="") as file:
+            first = next(csv.DictReader(file), {})
+        raise Failure(f"every member failed, the first one: {first.get('reason', '')}") from None
 
 
 def _results(folder: Path) -> np.ndarray:
@@ -184,6 +200,7 @@ def sweep_of_file(file: str | os.PathLike[str], *, out: str | os.PathLike[str] |
     """
     with tempfile.TemporaryDirectory() as folder:
         where = Path(out) if out is not None else Path(folder) / "out"
-        call_command("sweep", [os.fspath(file), "--out", str(where), "--threads", str(whole(threads, "threads"))], plugins,
-                     str(file))
+        with _reasons_told(where):
+            call_command("sweep", [os.fspath(file), "--out", str(where), "--threads", str(whole(threads, "threads"))], plugins,
+                         str(file))
         return _results(where)

@@ -185,6 +185,7 @@ TEST_F(FitVerb, RefusesDataThatAreNone) {
   refused("t,x\n1,two\n", "expected finite numbers");
   refused("t,x\n1\n", "1 columns; expected 2");
   refused("t,x\n", "no lines");
+  refused("t,x,x\n1,0.9,0.5\n", "two columns are named 'x'");
   refused("t,x\n2,1\n1,1\n", "does not follow");
   EXPECT_EQ(run("fit chaplygin_sleigh " + data_ + " --parameters mass").status, 2);
   EXPECT_EQ(run("fit chaplygin_sleigh " + data_ + " --parameters a --sigma z=1").status, 2);

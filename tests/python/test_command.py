@@ -54,6 +54,11 @@ def test_sweeps_of_scenes_and_sweeps_that_are_files(spring, tmp_path, monkeypatc
         ds.sweep("none.toml")
 
 
+def test_a_sweep_of_which_all_fail_says_why(spring):
+    with pytest.raises(ds.Failure, match="every member failed, the first one: unknown method 'typo'"):
+        spring.sweep({"k": [1.0, 4.0]}, ["x"], until=1.0, method="typo")
+
+
 def test_a_scene_with_files_of_its_own_stays_where_it_is(tmp_path):
     (tmp_path / "table.csv").write_text("t,u\n0,0\n1,2\n")
     file = tmp_path / "driven.toml"
