@@ -9,7 +9,7 @@ namespace diracstep {
 namespace {
 
 constexpr int most_iterations = 300;
-constexpr double singular_below = 1e-13;         // of the largest pivot of a matrix with balanced entries
+constexpr double singular_below = 2e-15;  // of the largest pivot; a diode that blocks has 4e-13 A/V beside 1
 constexpr double shortest_part_of_step = 1e-18;  // 1 A into a diode of 1e-12 A/V is 1e12 V at first
 constexpr double solved_to = 1e-14, near_round_off = 1e-9;  // |change| beside |x|
 

@@ -56,6 +56,18 @@ TEST_F(Circuits, ASallenKeyFilter) {
   EXPECT_NEAR(value(out, "V(out)"), 1 - std::exp(-d * t) * (std::cos(b * t) + d / b * std::sin(b * t)), 1e-5);
 }
 
+/// A given current flows on through one of two diodes, and the other, of 4e-13 A/V, blocks: I' = −V(I)/L.
+TEST_F(Circuits, AGivenCurrentFlowsOnThroughADiode) {
+  const Json out =
+      json(netlist("freewheeling\nL1 a 0 1m IC=10m\nD1 a 0 DM\nD2 0 a DM\n.model DM D(IS=1e-14 CJO=0)\n"
+                   ".tran 0.1u 5u uic\n.print V(a) I(L1)\n"))["outputs"];
+  const double thermal = 8.617333262e-5 * 300.15;
+  const auto rate = [&](double, double lost) { return thermal * std::log1p((1e-2 - lost) / 1e-14) / 1e-3; };
+  const double left = 1e-2 - runge_kutta(5e-6, 1000, rate);
+  EXPECT_NEAR(value(out, "I(L1)"), left, 1e-10);
+  EXPECT_NEAR(value(out, "V(a)"), -thermal * std::log1p(left / 1e-14), 1e-8);
+}
+
 TEST_F(Circuits, ARectifierWhoseDiodeHasASeriesResistance) {
   const Json found =
       json(netlist("Half-wave rectifier\n"
