@@ -26,10 +26,6 @@ class ShownTimesOfRuns : public Command {
     }
     return rows;
   }
-  std::string scene(const std::string& text) const {
-    std::ofstream(path("scene.toml")) << text;
-    return "'" + path("scene.toml") + "'";
-  }
 };
 
 struct BallAt {
@@ -81,11 +77,12 @@ TEST_F(ShownTimesOfRuns, ABlockThatSticksAndSlips) {
 
 /// Multiples of 0.1 and the ticks of a clock are the same times whatever their last digits.
 TEST_F(ShownTimesOfRuns, AtTheTimeOfAnEventTheStateIsThatBehindIt) {
-  const std::string file = scene(
-      "name = \"clock\"\nlagrangian = \"v_x^2/2\"\n[coordinates]\nx = {}\n[states]\nn = {}\n[start]\nv_x = "
-      "1\n"
-      "[[events]]\nname = \"tick\"\nevery = 0.1\nset = { n = \"n + 1\" }\n[[events]]\nname = \"end\"\n"
-      "when = \"x - 1.05\"\naction = \"stop\"\nset = { x = \"5\" }\n[span]\nend = 3\nstep = 0.07\n");
+  const std::string file =
+      scene("clock",
+            "lagrangian = \"v_x^2/2\"\n[coordinates]\nx = {}\n[states]\nn = {}\n[start]\nv_x = "
+            "1\n"
+            "[[events]]\nname = \"tick\"\nevery = 0.1\nset = { n = \"n + 1\" }\n[[events]]\nname = \"end\"\n"
+            "when = \"x - 1.05\"\naction = \"stop\"\nset = { x = \"5\" }\n[span]\nend = 3\nstep = 0.07\n");
   for (const char* steps : {"--step 0.07", "--step 0.1", "--step 1", "--adaptive"}) {
     const auto rows = points(file + " --at 0,0.05,0.1,0.3,0.6,0.7,0.75,0.9,1.05,1.2 " + steps);
     ASSERT_EQ(rows.size(), 9U) << steps;  // the run is over at 1.05
@@ -120,23 +117,25 @@ TEST_F(ShownTimesOfRuns, TheMotionKeepsItsBitsAndAResumedRunTheBytes) {
 /// y = 3 cos t − 2 to the floor, then up with half of the speed.
 TEST_F(ShownTimesOfRuns, GoWithAnErrorAskedFor) {
   const std::string oscillator =
-      "name = \"o\"\nlagrangian = \"(v_x^2 - x^2)/2\"\n[coordinates]\nx = {}\n[start]\nx = 1\n[span]\n"
+      "lagrangian = \"(v_x^2 - x^2)/2\"\n[coordinates]\nx = {}\n[start]\nx = 1\n[span]\n"
       "end = 6\nstep = 0.1\n";
   for (const char* steps : {"", "--adaptive", "--fixed"})
-    for (const auto& row : points(scene(oscillator) + " --error 1e-9 --every-time 0.31 " + steps)) {
+    for (const auto& row :
+         points(scene("oscillator", oscillator) + " --error 1e-9 --every-time 0.31 " + steps)) {
       EXPECT_NEAR(row[1], std::cos(row[0]), 1e-9) << steps;
       EXPECT_NEAR(row[2], -std::sin(row[0]), 1e-9) << steps;
     }
   std::string pulse = oscillator;
   pulse.insert(pulse.find("[span]"), "[force]\nx = \"if(t > 2.2, x, 0) + if(x < -0.3, 1, 0)\"\n");
-  const std::string finer = scene(pulse) + " --at 1,2,2.19,2.21,3,6";
+  const std::string finer = scene("pulse", pulse) + " --at 1,2,2.19,2.21,3,6";
   const auto fine = points(finer + " --method type1/gl:3 --step 0.001"),
              found = points(finer + " --error 1e-8");
   ASSERT_EQ(found.size(), 6U);
   for (std::size_t k = 0; k < 6; ++k) EXPECT_NEAR(found[k][1], fine[k][1], 1e-8) << found[k][0];
 
   const auto rows =
-      points(scene("name = \"b\"\nlagrangian = \"v_y^2/2 - y^2/2 - 2*y\"\n[coordinates]\ny = {}\n"
+      points(scene("landing",
+                   "lagrangian = \"v_y^2/2 - y^2/2 - 2*y\"\n[coordinates]\ny = {}\n"
                    "[start]\ny = 1\n[span]\nend = 1.5\nstep = 0.1\n[[events]]\nname = \"floor\"\n"
                    "when = \"y\"\nrestitution = 0.5\n") +
              " --error 1e-9 --at 0.3,0.8,1.4");
@@ -145,7 +144,8 @@ TEST_F(ShownTimesOfRuns, GoWithAnErrorAskedFor) {
   EXPECT_NEAR(rows[0][1], 3.0 * std::cos(0.3) - 2.0, 2e-9);
   EXPECT_NEAR(rows[1][1], 3.0 * std::cos(0.8) - 2.0, 2e-9);
   EXPECT_NEAR(rows[2][1], 2.0 * std::cos(1.4 - first) + up * std::sin(1.4 - first) - 2.0, 4e-9);
-  expect_misuse("run " + scene(oscillator) + " --error 1e-9 --at 7", {"--at", "t = 7", "the end"});
+  expect_misuse("run " + scene("oscillator", oscillator) + " --error 1e-9 --at 7",
+                {"--at", "t = 7", "the end"});
 }
 
 }  // namespace
