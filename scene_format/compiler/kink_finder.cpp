@@ -148,7 +148,8 @@ bool KinkFinder::holds(Node root, Op op, Role role) const {
 std::vector<int> KinkFinder::loops_of(Node root, const std::vector<int>& loops) const {
   std::vector<Node> roots{root};
   std::vector<int> kept;
-  for (const int loop : std::views::reverse(loops)) {
+  for (auto at = loops.rbegin(); at != loops.rend(); ++at) {  // Clang 14 does not compile std::views::reverse
+    const int loop = *at;
     const bool held = std::ranges::any_of(graph_.reachable(roots, true), [&](Node node) {
       return graph_[node].op == Op::loop_index && graph_[node].a == loop;
     });

@@ -158,7 +158,7 @@ std::vector<std::string> frame_of(const std::array<std::string, 3>& q) {
   const std::string length = fmt::format("sqrt(({})^2 + ({})^2 + ({})^2)", q[0], q[1], q[2]);
   std::array<std::string, 3> unit;
   for (std::size_t i = 0; i < 3; ++i) unit[i] = fmt::format("(({})/{})", q[i], length);
-  const auto& [x, y, z] = unit;
+  const std::string &x = unit[0], &y = unit[1], &z = unit[2];
   // The shortest turn from e3, and on the lower half that from −e3 behind a half turn about e1.  The edge is
   // at a number that nobody states, since if(…) is the mean of both sides there.
   const auto either = [&](const std::string& upper, const std::string& lower) {

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstring>
+
 namespace diracstep {
 
 /// y_i = base_i + Σ_k weights[s i + k] x_k for i, k < s, where x and y are s columns of n numbers; base_i
@@ -14,9 +16,13 @@ namespace detail {
 
 /// Two numbers that the processor adds side by side; four would need a newer one than the build asks for.
 using Pair = double __attribute__((vector_size(16)));
-using LoosePair = double __attribute__((vector_size(16), aligned(8), may_alias));
 
-inline Pair pair_at(const double* x) { return *reinterpret_cast<const LoosePair*>(x); }
+/// Those at x, which need not be aligned as a pair is.
+inline Pair pair_at(const double* x) {
+  Pair pair;
+  std::memcpy(&pair, x, sizeof pair);
+  return pair;
+}
 
 /// The function behind stage_sum().
 template <int n, int s>
@@ -39,8 +45,10 @@ inline void sum_stages(const double* x, const double* weights, const double* bas
     }
   }
   for (int i = 0; i < s; ++i) {
-    for (int p = 0; p < whole; ++p)
-      *reinterpret_cast<LoosePair*>(y + i * n + 2 * p) = pair_at(base + i * stride + 2 * p) + sums[i][p];
+    for (int p = 0; p < whole; ++p) {
+      const Pair sum = pair_at(base + i * stride + 2 * p) + sums[i][p];
+      std::memcpy(y + i * n + 2 * p, &sum, sizeof sum);
+    }
     if constexpr (n % 2 == 1) y[i * n + n - 1] = base[i * stride + n - 1] + sums[i][whole][0];
   }
 }
