@@ -13,7 +13,6 @@
 #include <diracstep/scene_format/scene_catalogue.hpp>
 #include <diracstep/scene_format/scene_file.hpp>
 #include <diracstep/scene_format/scene_text.hpp>
-#include <ranges>
 
 namespace diracstep {
 
@@ -56,8 +55,8 @@ void drop_redundant_rows(CatalogueScene& entry) {
   }
   constexpr std::size_t most_names = 50;
   std::string names;
-  for (const std::string& name : dependent | std::views::take(most_names))
-    names += (names.empty() ? "'" : ", '") + name + "'";
+  for (std::size_t a = 0; a < std::min(dependent.size(), most_names); ++a)
+    names += (names.empty() ? "'" : ", '") + dependent[a] + "'";
   if (dependent.size() > most_names)
     names += " and " + std::to_string(dependent.size() - most_names) + " more";
   entry.changes.push_back("redundant constraints left out: " + names +

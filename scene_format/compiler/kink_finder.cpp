@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <diracstep/scene_format/compiler/kink_finder.hpp>
 #include <numbers>
-#include <ranges>
 
 namespace diracstep::scene_compiler {
 

@@ -37,8 +37,8 @@ void expect_order(const CatalogueScene& entry, double exactly, const std::string
   for (const auto& [method, order] :
        {std::pair{"type1/midpoint", 2.0}, {"type1/gl:2", 4.0}, {"type1/gl:3", 6.0}}) {
     const double coarse = order > 5.0 ? 0.5 : 0.25;
-    const auto error = [&](double step) {
-      return std::abs(end_of(entry.scene, last_time, step, method).q[0] - exactly);
+    const auto error = [&, name = method](double step) {
+      return std::abs(end_of(entry.scene, last_time, step, name).q[0] - exactly);
     };
     EXPECT_NEAR(std::log2(error(coarse) / error(coarse / 2.0)), order, 0.5) << what << ' ' << method;
   }

@@ -45,8 +45,8 @@ TEST(States, AloneTheyAreIntegratedAtTheOrderOfTheStep) {
   const CatalogueScene entry = scene_from_text("scene.toml", filtered_sine);
   for (const auto& [method, order] :
        {std::pair{"type1/gl:1", 2.0}, {"type1/gl:2", 4.0}, {"type1/gl:3", 6.0}}) {
-    const auto error = [&](double step) {
-      return std::abs(end_of(entry.scene, 3.0, step, method).q[0] - filtered_sine_exactly(3.0, 0.5));
+    const auto error = [&, name = method](double step) {
+      return std::abs(end_of(entry.scene, 3.0, step, name).q[0] - filtered_sine_exactly(3.0, 0.5));
     };
     EXPECT_NEAR(std::log2(error(0.5) / error(0.25)), order, 0.4) << method;
   }
