@@ -93,6 +93,15 @@ double StepDivision::place_ahead(Interval step, const State& start) {
   return high < nearly_all ? high / nearly_all : shorter;
 }
 
+/// Of a step that has no solution, as one deep into a stiff wall: just behind where the motion comes to a
+/// kink first, or 0.
+double StepDivision::failed_place(Interval step, const State& start) {
+  if (!takes_acceleration_) return 0.0;
+  after_ = before_;
+  find_acceleration(step, start);
+  return place_ahead(step, start);
+}
+
 /// Where between the ends of a step, in parts of it, a kink is on another side than at both; 0 where none.
 double StepDivision::hidden_place(Interval step, const State& start, const State& end) {
   find_acceleration(step, start);

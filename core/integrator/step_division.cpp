@@ -97,12 +97,13 @@ bool StepDivision::follow(const State& start, Work& work) {
         return give_up(crossed, part.start);
       read(part.start, from, true, before_);
       start_velocity_ = velocity_;
-      while (!solve_part(part, from, Guess::plain, work)) {
+      for (bool first = true; !solve_part(part, from, Guess::plain, work); first = false) {
         if (++halvings > most_halvings) {
           const int number = crossed >= 0 ? crossed : ahead(before_);
           return number >= 0 && give_up(number, part.start);
         }
-        part.size *= 0.5;
+        const double place = first ? failed_place(part, from) : 0.0;
+        part.size *= place > 0.0 ? place : 0.5;
       }
       for (double place = 1.0; place > 0.0 && hidden < most_hidden;) {
         place = hidden_place(part, from, sequence_->end());

@@ -77,6 +77,7 @@ class StepDivision {
   bool crosses(Interval step, const State& start, const State& end);
   double place_ahead(Interval step, const State& start);
   void find_acceleration(Interval step, const State& start);
+  double failed_place(Interval step, const State& start);
   double hidden_place(Interval step, const State& start, const State& end);
   int first_change() const;
   int ahead(const Vector& here) const;

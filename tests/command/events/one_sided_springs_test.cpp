@@ -17,8 +17,8 @@ class OneSidedSprings : public Command {
 
 /// Thrown up at v0 from x0, then bouncing on a spring of k below x = 0: arcs, and half oscillations about
 /// −g/k of the length 2(π − atan(V sqrt(k)/g))/sqrt(k).
-double bounced(double x0, double v0, double k, double t) {
-  const double g = 9.81, speed = std::sqrt(v0 * v0 + 2.0 * g * x0), met = (v0 + speed) / g, w = std::sqrt(k);
+double bounced(double x0, double v0, double k, double t, double g = 9.81) {
+  const double speed = std::sqrt(v0 * v0 + 2.0 * g * x0), met = (v0 + speed) / g, w = std::sqrt(k);
   if (t < met) return x0 + v0 * t - 0.5 * g * t * t;
   const double contact = 2.0 * (M_PI - std::atan(speed * w / g)) / w, arc = 2.0 * speed / g;
   const double s = std::fmod(t - met, contact + arc), r = s - contact;
@@ -49,6 +49,25 @@ TEST_F(OneSidedSprings, VariableStepsFollowStiffSprings) {
     ASSERT_EQ(outcome.status, 0) << it.k << outcome.err;
     EXPECT_NEAR(end_of(outcome, "x"), bounced(it.x0, it.v0, it.k, it.end), 1e-8) << it.k;
   }
+}
+
+/// Steps of a size that has no solution, so deep into the wall it leads.
+TEST_F(OneSidedSprings, VariableStepsThatFailBeforeAWallAreShortenedToIt) {
+  const Outcome outcome = run("run " + scene("hard", R"toml(
+lagrangian = "v_x^2/2 - x - if(x < 0, 462461219.46471757*x^2/2, 0)"
+[coordinates]
+x = {}
+[start]
+x = 3.271661134053748
+v_x = -1.309079113201952
+[span]
+end = 12.421470435584895
+step = 0.6210735217792448
+)toml") + " --json --adaptive");
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_NEAR(end_of(outcome, "x"),
+              bounced(3.271661134053748, -1.309079113201952, 462461219.46471757, 12.421470435584895, 1.0),
+              1e-8);
 }
 
 /// Two balls of their own springs, each in the way of the other's steps.
