@@ -82,25 +82,6 @@ RateMeter make_meter(const Scene& scene, const SolverFactory& solvers, const Ada
   return {scene, solvers, adaptive.monitor, scales};
 }
 
-/// From where a side step ended at a kink on to t, by steps as long as the rate there allows.
-StepReport go_on_behind_kinks(Integrator& side, RateMeter& meter, double eps, double t) {
-  StepReport report;
-  Vector v = side.velocity_estimate();
-  double size = t - side.time();
-  const double least = 1e-12 * std::abs(size);
-  while (report.ok() && std::abs(t - side.time()) > least) {
-    const double left = t - side.time();
-    report.solve = meter.motion().velocity(side.time(), side.position(), side.momentum(), v);
-    for (int k = 0; k < 2 && report.ok(); ++k) {  // the width of its differences follows the step
-      const double ahead = side.kinks_passed().empty() ? 0.0 : RateMeter::beside_kink * size;
-      const Rate rate = meter.rate(side.time() + ahead, side.position() + ahead * v, v, size);
-      if (rate.ok()) size = std::copysign(std::min(eps / rate.rate, std::abs(left)), left);
-    }
-    if (report.ok()) report = side.step(size);
-  }
-  return report;
-}
-
 }  // namespace
 
 const char* name(StepControl control) {
@@ -238,8 +219,7 @@ StepReport AdaptiveIntegrator::sample_from(double node, ConstVectorRef q, ConstV
     report = side_steps_to(t);
   else if (t != node)
     report = side_.step(t - node);
-  if (!local_ && report.ok() && !side_.kinks_passed().empty())
-    report = go_on_behind_kinks(side_, *meter_, adaptive_.eps, t);
+  if (!local_ && report.ok() && !side_.kinks_passed().empty()) report = side_steps_behind_kinks(t);
   if (!report.ok()) return report;
   report.solve = side_.sample(momentum, sample);
   sample.time = t;

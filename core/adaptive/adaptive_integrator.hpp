@@ -125,6 +125,15 @@ class AdaptiveIntegrator {
   double up_to_instant(double size) const;
   StepReport control_step(double size);
   StepReport solve_size(double eps, double guess, double& size);
+  struct PartOfMotion {
+    Rate rate;         ///< at its start
+    double size, eps;  ///< of its first step, and eps in it
+  };
+  PartOfMotion begin_part(const Integrator& at, double size_before, bool behind_kink, Vector& v);
+  bool agree(double size, double eps);
+  double resolved_size(double size, double eps);
+  StepReport side_steps_behind_kinks(double t);
+  Rate rate_of(const Integrator& at, double size, double ahead, bool growth, Vector& v);
   bool measure(bool growth);
   double span() const;
   double largest_rate() const;
@@ -149,6 +158,7 @@ class AdaptiveIntegrator {
   Vector v_;   ///< there
   bool started_ = false;
   double z_ = 0.0;
+  double eps_ = 0.0;  ///< of this part of the motion: adaptive_.eps, or less behind a kink
   double next_size_ = 0.0;
   struct Sizes {
     double newest, older;

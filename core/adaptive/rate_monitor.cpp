@@ -58,7 +58,10 @@ void require_even(const Monitor& monitor, const Start& start) {
 }
 
 RateMeter::RateMeter(const Scene& scene, const SolverFactory& solvers, Monitor monitor, MonitorScales scales)
-    : monitor_(std::move(monitor)), scales_(scales), a_(Columns::Zero(scene.dimension(), 5)) {
+    : monitor_(std::move(monitor)),
+      scales_(scales),
+      typical_(scales.typical),
+      a_(Columns::Zero(scene.dimension(), 5)) {
   q_.setZero(scene.storage_size());
   v_.setZero(scene.dimension());
   origin_ = v_;
@@ -97,11 +100,21 @@ bool RateMeter::accelerations(double t, ConstVectorRef q, ConstVectorRef v, doub
 }
 
 double RateMeter::generic_rate(int place, ConstVectorRef v, double delta) const {
-  const double tau = (place - 2) * delta, typical = scales_.typical * scales_.typical;
+  const double tau = (place - 2) * delta, typical = typical_ * typical_;
   const double v2 = (v + tau * a_.col(2)).squaredNorm(), a2 = a_.col(place).squaredNorm();
   const double jerk2 = (a_.col(place + 1) - a_.col(place - 1)).squaredNorm() / (4.0 * delta * delta);
   const double floor = scales_.lowest * scales_.lowest, below = typical * v2 + a2;
   return std::sqrt((below > 0.0 ? (typical * a2 + jerk2) / below : 0.0) + floor);
+}
+
+/// ω0 is to be no less than the rate that the point alone tells, sqrt(|ȧ|/|v|), at most |ȧ|/|a|: behind the
+/// kink of a spring that begins to act that is the spring's, with which ω stays it all through the contact.
+void RateMeter::fit_typical(ConstVectorRef v, double step) {
+  typical_ = scales_.typical;
+  if (!generic()) return;
+  const double jerk = (a_.col(3) - a_.col(1)).norm() / (2.0 * difference_width * std::abs(step)),
+               by_v = std::sqrt(jerk / v.norm()), by_a = jerk / a_.col(2).norm();
+  if (const double alone = std::min(by_v, by_a); std::isfinite(alone)) typical_ = std::max(typical_, alone);
 }
 
 double RateMeter::own_rate(double t, ConstVectorRef q, ConstVectorRef v, double delta, int place) {

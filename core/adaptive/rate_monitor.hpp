@@ -60,6 +60,10 @@ class RateMeter {
 
   /// ω alone; `step` sets the width of the differences.
   Rate rate(double t, ConstVectorRef q, ConstVectorRef v, double step);
+  /// Of the generic monitor: ω0 for a part of a motion, from the point where ω was taken last on.
+  void fit_typical(ConstVectorRef v, double step);
+  void set_typical(double typical) { typical_ = typical; }
+  double typical() const { return typical_; }
   /// ω and d(ln ω)/dt.
   Rate rate_and_growth(double t, ConstVectorRef q, ConstVectorRef v, double step);
 
@@ -78,6 +82,7 @@ class RateMeter {
 
   Monitor monitor_;
   MonitorScales scales_;
+  double typical_;  ///< ω0 of this part of the motion
   std::unique_ptr<PointwiseMotion> motion_;
   SolveReport last_;
   Columns a_;  ///< accelerations, one column a place

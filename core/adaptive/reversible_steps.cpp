@@ -16,23 +16,28 @@ constexpr int max_sizes = 30;             // tried for one step
 
 }  // namespace
 
-/// v, ω and, if asked for, d(ln ω)/dt at the current node.  ω is bounded from above, by a number that is even
-/// in v as ω is.
+/// v, ω and, if asked for, d(ln ω)/dt at the current node of an integrator, or so long ahead of it.  ω is
+/// bounded from above, by a number that is even in v as ω is.
+Rate AdaptiveIntegrator::rate_of(const Integrator& at, double size, double ahead, bool growth, Vector& v) {
+  const SolveReport report = meter_->motion().velocity(at.time(), at.position(), at.momentum(), v);
+  if (!report.ok()) return {0.0, 0.0, std::string("no velocity for the monitor: ") + describe(report.status)};
+  const auto rate_at = [&](const Vector& q) {
+    return growth ? meter_->rate_and_growth(at.time() + ahead, q, v, size)
+                  : meter_->rate(at.time() + ahead, q, v, size);
+  };
+  const Space* space = meter_->motion().space();
+  Rate rate = ahead == 0.0       ? rate_at(at.position())
+              : space != nullptr ? rate_at(space->moved(at.position(), Vector(ahead * v)))
+                                 : rate_at(at.position() + ahead * v);
+  if (const double largest = largest_rate(); rate.ok() && rate.rate > largest) rate = {largest, 0.0, {}};
+  return rate;
+}
+
 bool AdaptiveIntegrator::measure(bool growth) {
-  const double t = main_.time();
-  const SolveReport report = meter_->motion().velocity(t, main_.position(), main_.momentum(), v_);
   // At a kink just crossed it is measured where no difference reaches across.
   const double ahead = main_.kinks_passed().empty() ? 0.0 : RateMeter::beside_kink * next_size_;
-  const auto rate_at = [&](const Vector& q) {
-    return growth ? meter_->rate_and_growth(t + ahead, q, v_, next_size_)
-                  : meter_->rate(t + ahead, q, v_, next_size_);
-  };
-  if (!report.ok())
-    rate_ = {0.0, 0.0, std::string("no velocity for the monitor: ") + describe(report.status)};
-  else
-    rate_ = ahead == 0.0 ? rate_at(main_.position()) : rate_at(main_.position() + ahead * v_);
+  rate_ = rate_of(main_, next_size_, ahead, growth, v_);
   if (!rate_.ok()) return false;
-  if (const double largest = largest_rate(); rate_.rate > largest) rate_ = {largest, 0.0, {}};
   report_.slowest = std::min(report_.slowest, rate_.rate);
   report_.fastest = std::max(report_.fastest, rate_.rate);
   return true;
@@ -41,11 +46,14 @@ bool AdaptiveIntegrator::measure(bool growth) {
 bool AdaptiveIntegrator::start_control() {
   const bool growth = adaptive_.control == StepControl::integrating;
   // The width of the differences follows the step, which is not known yet: measure twice.
-  if (!measure(false)) return false;
-  next_size_ = sign_ * adaptive_.eps / rate_.rate;
+  const PartOfMotion part = begin_part(main_, next_size_, !main_.kinks_passed().empty(), v_);
+  rate_ = part.rate;
+  if (!rate_.ok()) return false;
+  next_size_ = part.size;
+  eps_ = part.eps;
   if (!measure(growth)) return false;
-  z_ = rate_.rate + 0.5 * sign_ * adaptive_.eps * rate_.growth;
-  next_size_ = sign_ * adaptive_.eps / (growth && z_ > 0.0 ? z_ : rate_.rate);
+  z_ = rate_.rate + 0.5 * sign_ * eps_ * rate_.growth;
+  next_size_ = sign_ * eps_ / (growth && z_ > 0.0 ? z_ : rate_.rate);
   last_sizes_.clear();
   for (const double fraction : fractions_)
     last_sizes_.push_back({fraction * next_size_, fraction * next_size_});
@@ -64,10 +72,10 @@ StepReport AdaptiveIntegrator::control_step(double size) {
   const bool integrating = adaptive_.control == StepControl::integrating;
   if (!measure(integrating)) return failed(rate_.failure);
   if (!integrating) {
-    next_size_ = sign_ * adaptive_.eps / rate_.rate;
+    next_size_ = sign_ * eps_ / rate_.rate;
     return report;
   }
-  const double change = sign_ * adaptive_.eps * rate_.growth;
+  const double change = sign_ * eps_ * rate_.growth;
   const double ratio = (z_ + 0.5 * change) / rate_.rate;
   report_.lowest_ratio = std::min(report_.lowest_ratio, ratio);
   report_.highest_ratio = std::max(report_.highest_ratio, ratio);
@@ -76,7 +84,7 @@ StepReport AdaptiveIntegrator::control_step(double size) {
     z_ = std::max(rate_.rate + 0.5 * change, 0.5 * rate_.rate);
     ++report_.resets;
   }
-  next_size_ = sign_ * adaptive_.eps / z_;
+  next_size_ = sign_ * eps_ / z_;
   return report;
 }
 

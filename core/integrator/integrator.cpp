@@ -61,6 +61,8 @@ Integrator::Integrator(PreparedScene prepared, const Registry& registry, const S
                                                *reader_, *sequence_)),
       left_out_(scene_->whole ? std::make_unique<LeftOutRows>(*scene_) : nullptr) {
   if (method_.info.damped) division_->take_no_acceleration();
+  constexpr int higher_order = 3;
+  if (method_.info.order >= higher_order) division_->divide_ways();
   reset(scene_->start);
 }
 

@@ -22,6 +22,10 @@ double end_apart(const Vector& a, const Vector& b, const Vector& start) {
   return size > 0.0 ? max_norm(a - b) / size : 0.0;
 }
 
+double states_apart(const State& a, const State& b, const State& start) {
+  return std::max(end_apart(a.q, b.q, start.q), end_apart(a.p, b.p, start.p));
+}
+
 }  // namespace
 
 /// The size of the next part: what is left, or a part of what lies between two kinks.
@@ -37,15 +41,49 @@ bool StepDivision::follow_in(std::size_t parts, const State& start, Work& work) 
   return follow(start, work);
 }
 
+/// How far the ends of a part and of two halves of it are apart.
+double StepDivision::error_of(const Interval& part, const State& from, Work& work) {
+  if (part.size == 0.0) return 0.0;
+  const double half = 0.5 * part.size;
+  const Interval halves[] = {{part.start, half}, {part.start + half, half}};
+  if (!sequence_->solve(halves, from, Guess::plain, work).ok()) return HUGE_VAL;
+  const State fine = sequence_->end();
+  if (!sequence_->solve({&part, 1}, from, Guess::plain, work).ok()) return HUGE_VAL;
+  return states_apart(fine, sequence_->end(), from);
+}
+
+/// Whether the ways to the first kink and from the last one are to be divided, too.
+bool StepDivision::find_ends(const State& start, Work& work) {
+  constexpr double beside_the_other = 10.0;
+  divides_head_ = divides_tail_ = false;
+  allowed_ = same_end;
+  if (!divides_ways_ || undivided_.size() > 1) return false;
+  const State end = sequence_->end();
+  const Interval& whole = undivided_.front();
+  const KinkPassed& last = passed_.back();
+  const double head = error_of({whole.start, passed_.front().time - whole.start}, start, work),
+               tail = error_of({last.time, whole.start + whole.size - last.time}, last.at, work);
+  sequence_->end() = end;
+  sequence_->drop_unkept();
+  allowed_ = std::max(same_end, beside_the_other * std::min(head, tail));
+  divides_head_ = head > allowed_;
+  divides_tail_ = tail > allowed_;
+  return divides_head_ || divides_tail_;
+}
+
 /// Divides what lies between the kinks of the step just solved until twice as many parts lead to the same
 /// end.  False where no division leads to an end any more.
 bool StepDivision::resolve_gaps(const State& start, Work& work) {
-  constexpr std::size_t fewest = 2;
-  if (end_at_kinks_ || passed_.size() < fewest) return true;
+  if (end_at_kinks_ || passed_.empty()) return true;
+  const std::size_t fewest = find_ends(start, work) ? 1 : 2;
+  if (passed_.size() < fewest) return true;
   for (std::size_t parts = 2;; parts *= 2) {
     const State coarse = sequence_->end();
     const std::vector<double> gaps = gaps_;
     find_gaps(passed_, gaps_);
+    const Interval& whole = undivided_.front();
+    if (divides_head_) gaps_.front() = std::abs(passed_.front().time - whole.start);
+    if (divides_tail_) gaps_.push_back(std::abs(whole.start + whole.size - passed_.back().time));
     if (!follow_in(parts, start, work)) {
       unresolved_ = HUGE_VAL;
       gaps_ = gaps;
@@ -55,9 +93,8 @@ bool StepDivision::resolve_gaps(const State& start, Work& work) {
       unresolved_ = 0.0;
       return true;
     }
-    const State& fine = sequence_->end();
-    unresolved_ = std::max(end_apart(fine.q, coarse.q, start.q), end_apart(fine.p, coarse.p, start.p));
-    if (unresolved_ <= same_end) {
+    unresolved_ = states_apart(sequence_->end(), coarse, start);
+    if (unresolved_ <= allowed_) {
       unresolved_ = 0.0;
       return true;
     }

@@ -59,12 +59,13 @@ void StepDivision::find_acceleration(Interval step, const State& start) {
 }
 
 /// Just behind where the motion would cross a kink first with its velocity and acceleration at the start of a
-/// step, in parts of it, where its end is on this side again: a step far too large for what is behind the
-/// kink turns it back within itself.  0 where it would not.
+/// step, in parts of it, whether the end of the step is on this side again or on the other: a step far too
+/// large for what is behind the kink turns back within itself, and where it ends tells nothing of the first
+/// crossing.  Without an acceleration for ends on this side alone.  0 where it would not.
 double StepDivision::place_ahead(Interval step, const State& start) {
   constexpr int halvings = 12;
   constexpr double quarter = 0.25;
-  const auto crosses_by = [&](double place) {
+  const auto crosses_by = [&](double place, bool any) {
     const double time = place * step.size;
     position_ = time * start_velocity_ + (0.5 * time * time) * acceleration_;
     if (scene_->space)
@@ -74,20 +75,31 @@ double StepDivision::place_ahead(Interval step, const State& start) {
     speed_ = start_velocity_ + time * acceleration_;
     kinks_->evaluate(step.start + time, position_, speed_, between_);
     for (Eigen::Index k = 0; k < between_.size(); ++k)
-      if (kinks_->kinds()[static_cast<std::size_t>(k)] == Kinks::Kind::kink && before_[k] * after_[k] > 0.0 &&
-          between_[k] * before_[k] < 0.0)
+      if (kinks_->kinds()[static_cast<std::size_t>(k)] == Kinks::Kind::kink &&
+          (any || before_[k] * after_[k] > 0.0) && between_[k] * before_[k] < 0.0)
         return true;
     return false;
   };
   between_.resize(kinks_->count());
-  double low = 0.0, high = 0.0;
-  while (high < 1.0 && !crosses_by(high += quarter)) low = high;
-  if (high == 1.0 && !crosses_by(1.0)) return 0.0;
+  const bool any = takes_acceleration_;
+  double low = 0.0, high = quarter;
+  for (; high < 1.0 && !crosses_by(high, any); high += quarter) low = high;
+  if (high == 1.0 && !crosses_by(1.0, any)) return 0.0;
   for (int k = 0; k < halvings; ++k) {
     const double place = 0.5 * (low + high);
-    (crosses_by(place) ? high : low) = place;
+    (crosses_by(place, any) ? high : low) = place;
   }
+  if (!crosses_by(high, false)) return high < shorter ? high / nearly_all : 0.0;
   return high < nearly_all ? high / nearly_all : shorter;
+}
+
+/// Of a step that has no solution, as one deep into a stiff wall: just behind where the motion comes to a
+/// kink first, or 0.
+double StepDivision::failed_place(Interval step, const State& start) {
+  if (!takes_acceleration_) return 0.0;
+  after_ = before_;
+  find_acceleration(step, start);
+  return place_ahead(step, start);
 }
 
 /// Where between the ends of a step, in parts of it, a kink is on another side than at both; 0 where none.

@@ -97,12 +97,13 @@ bool StepDivision::follow(const State& start, Work& work) {
         return give_up(crossed, part.start);
       read(part.start, from, true, before_);
       start_velocity_ = velocity_;
-      while (!solve_part(part, from, Guess::plain, work)) {
+      for (bool first = true; !solve_part(part, from, Guess::plain, work); first = false) {
         if (++halvings > most_halvings) {
           const int number = crossed >= 0 ? crossed : ahead(before_);
           return number >= 0 && give_up(number, part.start);
         }
-        part.size *= 0.5;
+        const double place = first ? failed_place(part, from) : 0.0;
+        part.size *= place > 0.0 ? place : 0.5;
       }
       for (double place = 1.0; place > 0.0 && hidden < most_hidden;) {
         place = hidden_place(part, from, sequence_->end());
@@ -181,10 +182,12 @@ bool StepDivision::approach(int number, const Interval& part, const State& from,
                             Work& work) {
   const auto near_side = [&](double value) { return before_[number] * value > 0.0; };
   to = {0.0, before_[number], part.size * before_[number] / (before_[number] - after_[number])};
+  double beyond = part.size;  // the shortest size that ends on the far side, where one is known
   if (near_side(after_[number])) {
     if (std::abs(after_[number]) >= std::abs(to.value)) return false;
     to.size = part.size;
     to.value = after_[number];
+    beyond = std::copysign(HUGE_VAL, part.size);
   }
   const double finest = finest_of(part);
   Guess guess = to.size == 0.0 ? Guess::plain : Guess::last_solution;
@@ -196,12 +199,15 @@ bool StepDivision::approach(int number, const Interval& part, const State& from,
       const double slope = (after_[number] - to.value) / (next - to.size);
       to.zero =
           slope * before_[number] * part.size < 0.0 ? next - after_[number] / slope : 2.0 * next - to.size;
+      // A motion that turned on the way has the wrong slope; longer steps may end on this side once more.
+      if (std::abs(to.zero) > std::abs(beyond)) to.zero = 0.5 * (next + beyond);
       to.size = next;
       to.value = after_[number];
       guess = Guess::last_solution;
       continue;
     }
     if (++behind > most_behind) return false;
+    beyond = next;
     to.zero = to.size + 0.5 * (next - to.size);
     guess = Guess::plain;
   }

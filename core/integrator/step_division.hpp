@@ -22,9 +22,11 @@ namespace diracstep {
 /// step, and along the one that the force at its start alone would lead on; so pairs that are narrow beside a
 /// step, and flat ones, are not seen.  What lies between two kinks of one step, as a contact that is shorter,
 /// is divided until twice as many parts end the step at the same place, and unresolved() says what that
-/// leaves: its parts do not become shorter with the step.  Where the motion crosses one
-/// kink again and again, as at a force that jumps and points back from both sides, the step is solved
-/// undivided, and stuck() says so.
+/// leaves: its parts do not become shorter with the step.  So is the way to the first kink, or from the last
+/// one, where two halves of it are further from it than those of the other are, as in a contact that has
+/// begun before the step or lasts beyond it: to ten times what that other way leaves, by methods of order 3
+/// and more.  Where the motion crosses one kink again and again, as at a force that jumps and points back
+/// from both sides, the step is solved undivided, and stuck() says so.
 ///
 /// What is done depends on the step and its start alone; what is said of a step that fails before a kink also
 /// on the one solved before.
@@ -39,6 +41,9 @@ class StepDivision {
   /// From now on no acceleration at the start of a step tells of kinks ahead: steps of damping methods may be
   /// far longer than the times of stiff forces.
   void take_no_acceleration() { takes_acceleration_ = false; }
+  /// From now on the ways to the first kink of a step and from the last one are divided, too.  Steps of a low
+  /// order have errors on all of their ways.
+  void divide_ways() { divides_ways_ = true; }
 
   /// Afterwards sequence.end() is where the step ends; no trace of it is left before it is accepted.
   StepSequence::Outcome solve(Interval step, const State& start, Guess guess, Work& work);
@@ -72,11 +77,14 @@ class StepDivision {
   bool crosses(Interval step, const State& start, const State& end);
   double place_ahead(Interval step, const State& start);
   void find_acceleration(Interval step, const State& start);
+  double failed_place(Interval step, const State& start);
   double hidden_place(Interval step, const State& start, const State& end);
   int first_change() const;
   int ahead(const Vector& here) const;
   bool solve_part(Interval part, const State& from, Guess guess, Work& work);
   void keep(const Interval& part, State& from);
+  double error_of(const Interval& part, const State& from, Work& work);
+  bool find_ends(const State& start, Work& work);
   bool resolve_gaps(const State& start, Work& work);
   bool follow_in(std::size_t parts, const State& start, Work& work);
   double within_gap(double left) const;
@@ -99,7 +107,9 @@ class StepDivision {
   bool divided_ = false;
   std::vector<double> gaps_;  ///< lengths of what is divided, to each kink; 0 where that is not
   std::size_t parts_of_gap_ = 1;
-  bool takes_acceleration_ = true;
+  bool divides_head_ = false, divides_tail_ = false;  ///< the ways to the first kink and from the last one
+  double allowed_ = 0.0;                              ///< of unresolved()
+  bool takes_acceleration_ = true, divides_ways_ = false;
   double unresolved_ = 0.0;
   SolveReport last_, solved_;  ///< of the part solved last, and of all that were kept
   double to_zero_ = 0.0;       ///< from the end of the part solved last, without sign

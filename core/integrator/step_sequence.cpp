@@ -34,8 +34,7 @@ StepSequence::Outcome StepSequence::solve(std::span<const Interval> pieces, cons
                                           Work& work) {
   SolveReport total;
   const State* at = &start;
-  record_.erase(record_.begin() + static_cast<std::ptrdiff_t>(std::min(kept_, record_.size())),
-                record_.end());
+  drop_unkept();
   for (const Interval& piece : pieces) {
     double t = piece.start;
     for (Stage& stage : stages_) {

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <algorithm>
+#include <cstddef>
 #include <diracstep/core/integrator/solved_stage.hpp>
 #include <diracstep/core/integrator/step_solver.hpp>
 #include <functional>
@@ -62,6 +64,10 @@ class StepSequence {
   const std::vector<SolvedStage>& solved_stages() const { return record_; }
   void begin_record() { kept_ = 0; }
   void keep_record() { kept_ = record_.size(); }
+  void drop_unkept() {
+    record_.erase(record_.begin() + static_cast<std::ptrdiff_t>(std::min(kept_, record_.size())),
+                  record_.end());
+  }
 
   const StepSolver& part() const { return parts_.front(); }
 

@@ -3,6 +3,7 @@
 #include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/core/runs/rest_sizes.hpp>
 #include <diracstep/core/runs/work_check.hpp>
+#include <span>
 #include <sstream>
 #include <utility>
 
@@ -64,10 +65,26 @@ void WorkCheck::look(const Integrator& integrator) {
   to_.time = integrator.time();
   to_.q = integrator.position();
   to_.v = integrator.velocity_estimate();
-  const Integral part = work_between(from_, to_);
-  work_.value += part.value;
-  work_.error += part.error;
-  turned_over_ += std::abs(part.value);
+  const auto add = [this](const Integral& part) {
+    work_.value += part.value;
+    work_.error += part.error;
+    turned_over_ += std::abs(part.value);
+  };
+  const std::span<const KinkPassed> kinks = integrator.kinks_passed();
+  if (integrator.met_kinks() && kinks.empty()) {  // divided at instants, as of a pulse, that no cubic knows
+    begun_ = false;
+    power_ = power(to_.time, to_.q, to_.v);
+    return;
+  }
+  // In parts from kink to kink, between which the force is smooth.
+  PathPoint begin = from_;
+  for (const KinkPassed& kink : kinks) {
+    if (kink.time == begin.time || kink.time == to_.time) continue;
+    PathPoint end{kink.time, kink.at.q, kink.at.v};
+    add(work_between(begin, end));
+    begin = std::move(end);
+  }
+  add(work_between(begin, to_));
 }
 
 void WorkCheck::see(const Sample& point) {

@@ -13,6 +13,9 @@ namespace diracstep {
 /// at play and of ∫ |f·v| dt, which a motion that is driven and damped turns over; a tenth where the order is
 /// below 3, whose energy swings about the true one.
 ///
+/// The work of a step that crosses kinks is taken from kink to kink.  Behind a step divided at instants that
+/// the time alone brings, as a pulse far shorter than it, which no cubic knows, the comparison begins anew.
+///
 /// Only for scenes in R^n that are given by a Lagrangian, with a force by which alone the energy changes: no
 /// time in L, and rows that do no work.
 class WorkCheck {
