@@ -20,6 +20,9 @@ using detail::require;
 
 /// KINSOL measures a Newton step in units of the guess, which may be next to zero.
 constexpr double no_limit = 1e100;
+/// A guess of less has no size to take a unit from: as velocities at rest that fell from step to step, of
+/// which forces of rows would be beyond that limit.
+constexpr double no_size = 1e-50;
 /// The row that a norm is of is no larger than that norm times its scale, but for rounding.
 constexpr double at_rounding = 1e-12;
 
@@ -266,7 +269,7 @@ class KinsolSolver final : public NonlinearSolver {
   void set_scales() {
     row_scales_ = nullptr;
     const double size = largest_entry(guess_.data(), guess_.size());
-    unit_ = size > 0.0 && std::isfinite(size) ? 1.0 / size : 1.0;
+    unit_ = size > no_size && std::isfinite(size) ? 1.0 / size : 1.0;
     set_unit_of_unknowns(1.0);
     std::array<detail::Run, 4> runs{};
     std::size_t b = 0;

@@ -56,18 +56,19 @@ std::string component_text(const std::string& name, std::complex<double> value) 
 }
 
 /// The largest components, as "th 1, x 0.25 at 90°".
-std::string mode_text(const Scene& scene, const Mode& mode) {
-  std::vector<Eigen::Index> order(static_cast<std::size_t>(mode.shape.size()));
+std::string direction_text(const Scene& scene, const Eigen::VectorXcd& shape) {
+  std::vector<Eigen::Index> order(static_cast<std::size_t>(shape.size()));
   std::iota(order.begin(), order.end(), 0);
-  std::ranges::stable_sort(order, std::greater<>(), [&](Eigen::Index i) { return std::abs(mode.shape[i]); });
+  std::ranges::stable_sort(order, std::greater<>(), [&](Eigen::Index i) { return std::abs(shape[i]); });
   std::string text;
   for (std::size_t k = 0; k < std::min(order.size(), shown_components); ++k) {
-    const std::complex<double> value = mode.shape[order[k]];
+    const std::complex<double> value = shape[order[k]];
     if (std::abs(value) < shown_from) break;
     text +=
         (k == 0 ? "" : ", ") + component_text(scene.coordinates[static_cast<std::size_t>(order[k])], value);
   }
-  return text + (order.size() > shown_components ? ", …" : "");
+  const bool more = order.size() > shown_components && std::abs(shape[order[shown_components]]) >= shown_from;
+  return text + (more ? ", …" : "");
 }
 
 std::string eigenvalue_text(std::complex<double> value) {
@@ -83,11 +84,18 @@ std::string modes_text(const Scene& scene, const Eigenmodes& modes) {
     rows.push_back({eigenvalue_text(mode.eigenvalue),
                     imaginary > 0.0 ? fmt::format("{:.6g}", imaginary / (2.0 * std::numbers::pi)) : "-",
                     imaginary > 0.0 ? fmt::format("{:.3g}", -mode.eigenvalue.real() / size + 0.0) : "-",
-                    mode_text(scene, mode)});
+                    direction_text(scene, mode.shape)});
   }
   std::string text = modes.modes.empty() ? "" : aligned(rows);
   if (modes.zeros > 0)
-    text += fmt::format("{} eigenvalues 0: motions that nothing draws back\n", modes.zeros);
+    text += fmt::format("{} {} 0: motions that nothing draws back{}\n", modes.zeros,
+                        modes.zeros == 1 ? "eigenvalue" : "eigenvalues",
+                        modes.zeros_below > 0.0
+                            ? fmt::format("; rates below {:.2g} are not told from 0", modes.zeros_below)
+                            : "");
+  for (Eigen::Index k = 0; k < modes.free_directions.cols(); ++k)
+    text += fmt::format("free direction, an equilibrium to first order: {}\n",
+                        direction_text(scene, modes.free_directions.col(k).cast<std::complex<double>>()));
   return text;
 }
 
@@ -179,6 +187,10 @@ void add_small_motions(Json& json, const Scene& scene, const SmallMotions& small
     json["variation"] = small.nearest->variation;
   }
   json["zero_eigenvalues"] = small.modes.zeros;
+  json["zeros_below"] = small.modes.zeros_below;
+  json["free_directions"] = Json::array();
+  for (Eigen::Index k = 0; k < small.modes.free_directions.cols(); ++k)
+    json["free_directions"].push_back(numbers_by_name(scene.coordinates, small.modes.free_directions.col(k)));
   json["stability"] = describe(small.modes.stability);
   json["modes"] = Json::array();
   for (const Mode& mode : small.modes.modes) json["modes"].push_back(mode_json(scene, mode));

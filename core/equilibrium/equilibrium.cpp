@@ -7,16 +7,17 @@
 #include <diracstep/core/equilibrium/sparse_equilibrium.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/spaces/space.hpp>
+#include <diracstep/core/system/multiplier_rows.hpp>
 #include <optional>
 
 namespace diracstep {
 
 namespace {
 
-constexpr double equation_met = 1e-10;     // of the terms of an equation
-constexpr double round_off = 1e-14;        // of the largest term
-constexpr double near_the_end = 1e-8;      // of the largest coordinate; round-off may decide there
-constexpr double smallest_change = 1e-13;  // of the largest coordinate
+constexpr double equation_met = 1e-10;        // of the terms of an equation
+constexpr double round_off_of_terms = 1e-14;  // of the largest term
+constexpr double near_the_end = 1e-8;         // of the largest coordinate; round-off may decide there
+constexpr double smallest_change = 1e-13;     // of the largest coordinate
 constexpr int max_path_steps = 400;
 constexpr double shortest_path_step = 1e-6;
 
@@ -184,17 +185,19 @@ class EquilibriumSearch {
     return here;
   }
 
-  /// What each equation may be off by: parts of its terms.
+  /// What each equation may be off by: parts of its terms, and of what a change of q makes of them, by way of
+  /// λ too.
   Vector allowed(const Point& point) const {
     const Vector q = balance_.position_sizes(point.q);
     const Vector change = size_ * reach_;
     Vector sizes(point.residual.size());
-    sizes << balance_.sizes + balance_.stiffness.cwiseAbs() * change,
+    const Vector along = Columns(point.allowed.transpose() * balance_.stiffness).cwiseAbs() * change;
+    sizes << balance_.sizes + balance_.stiffness.cwiseAbs() * change + point.allowed.cwiseAbs() * along,
         Vector(balance_.one_forms.cwiseAbs() * (q + change)).head(balance_.on_positions),
         balance_.one_forms.cwiseAbs() * point.v.cwiseAbs() +
             balance_.row_derivative.cwiseAbs() * (q + change) +
             (balance_.velocity - balance_.one_forms * point.v).cwiseAbs();
-    return equation_met * sizes + Vector::Constant(sizes.size(), round_off * sizes.maxCoeff());
+    return equation_met * sizes + Vector::Constant(sizes.size(), round_off_of_terms * sizes.maxCoeff());
   }
 
   Equilibrium finish(const Point& point) {
@@ -266,7 +269,8 @@ Equilibrium find_equilibrium(const Scene& scene, const Start& start, bool along_
   }
   const auto extended = with_start_and_hidden_rows(scene, start);
   Equilibrium found = EquilibriumSearch(*extended, extended->start, along_start).find();
-  found.lambda.conservativeResize(scene.rows());  // hidden rows stand behind and carry no force
+  show_multipliers(*extended, found.lambda, found.q);
+  found.lambda.conservativeResize(scene.rows());  // other hidden rows, which stand behind, carry no force
   return found;
 }
 

@@ -254,12 +254,24 @@ double relative_change(const SparseMatrix& from, const SparseMatrix& to) {
   return size > 0.0 ? (to - from).norm() / size : to.norm();
 }
 
-Vector least_multipliers(const Columns& one_forms, const Vector& forces) {
-  if (one_forms.rows() == 0) return {};
+namespace {
+
+Eigen::CompleteOrthogonalDecomposition<Columns> factors_of_forces(const Columns& one_forms) {
   Eigen::CompleteOrthogonalDecomposition<Columns> decomposition;
   decomposition.setThreshold(dependent_row);
   decomposition.compute(one_forms.transpose());
-  return decomposition.solve(forces);
+  return decomposition;
+}
+
+}  // namespace
+
+Vector least_multipliers(const Columns& one_forms, const Vector& forces) {
+  if (one_forms.rows() == 0) return {};
+  return factors_of_forces(one_forms).solve(forces);
+}
+
+Columns least_inverse(const Columns& one_forms) {
+  return Columns(factors_of_forces(one_forms).pseudoInverse()).transpose();
 }
 
 Columns null_space(const Columns& matrix) {

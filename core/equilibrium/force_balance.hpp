@@ -76,6 +76,9 @@ double relative_change(const SparseMatrix& from, const SparseMatrix& to);
 /// The multiplier of least norm with Aᵀλ ≈ forces in least squares.
 Vector least_multipliers(const Columns& one_forms, const Vector& forces);
 
+/// The matrix P, n×m, with that multiplier as Pᵀ forces.
+Columns least_inverse(const Columns& one_forms);
+
 /// Whether a block of rows fixes positions: see ForceBalance::on_positions.
 inline bool is_on_positions(const ConstraintRows& block) { return block.holonomic() || block.constant(); }
 

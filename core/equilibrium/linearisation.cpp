@@ -1,6 +1,7 @@
 #include <Eigen/LU>
 #include <Eigen/QR>
 #include <algorithm>
+#include <cmath>
 #include <diracstep/core/equilibrium/force_balance.hpp>
 #include <diracstep/core/equilibrium/linearisation.hpp>
 #include <diracstep/core/numerics/errors.hpp>
@@ -37,10 +38,59 @@ double variation_between(const BalanceAt& first, const BalanceAt& second, double
                       reach * largest_entry(a.stiffness);
   if (size > 0.0) largest = std::max(largest, second.left.lpNorm<Eigen::Infinity>() / size);
   if (b.on_positions == 0) return largest;
-  const double position =
-      Vector(b.one_forms.cwiseAbs() * b.position_sizes(second.q)).head(b.on_positions).maxCoeff();
+  const Vector reached = b.position_sizes(second.q).array() + reach;
+  const double position = Vector(b.one_forms.cwiseAbs() * reached).head(b.on_positions).maxCoeff();
   const double moved = b.position.lpNorm<Eigen::Infinity>();
   return std::max(largest, position > 0.0 ? moved / position : moved > 0.0 ? 1.0 : 0.0);
+}
+
+/// |K(q + δ) − K(q)| beside |δ| for a small δ, on that side of a kink where it is less, times `sizes`: what
+/// an error in q that is a part of these makes of K, as that part of it.
+Columns change_with_position(const Scene& scene, const BalanceAt& at, const Equilibrium& point,
+                             const Vector& lambda, const Vector& sizes) {
+  constexpr double part = 1e-6;
+  const Columns here = at.balance.stiffness;
+  Columns change = Columns::Zero(here.rows(), here.cols());
+  ForceBalance there(scene);
+  for (const double pattern : {0.7, 1.9}) {
+    Vector direction(sizes.size());
+    for (Eigen::Index i = 0; i < sizes.size(); ++i)
+      direction[i] = part * sizes[i] * (std::cos(pattern * static_cast<double>(i + 1)) < 0.0 ? -1.0 : 1.0);
+    const auto from_here = [&](double side) {
+      there.evaluate(point.time, moved_position(scene, point.q, side * direction), point.v);
+      there.set_multipliers(lambda);
+      return Columns((Columns(there.stiffness) - here).cwiseAbs() / part);
+    };
+    change = change.cwiseMax(from_here(1.0).cwiseMin(from_here(-1.0)));
+  }
+  return change;
+}
+
+/// What round-off may make of K.  λ solves a system: each of its components has round-off of all forces.
+Columns round_off_of_stiffness(const Scene& scene, const BalanceAt& at, const Equilibrium& point,
+                               const Vector& start) {
+  constexpr double of_terms = 1e-13, of_positions = 1e-12;
+  const ForceBalance& balance = at.balance;
+  const Vector sizes = balance.position_sizes(point.q).cwiseMax(balance.position_sizes(start));
+  Columns terms = Columns(balance.stiffness).cwiseAbs();
+  const Eigen::Index rows = balance.one_forms.rows();
+  const Vector lambda = least_multipliers(balance.one_forms, balance.forces);
+  if (rows > 0) {
+    const Vector off = least_inverse(balance.one_forms).colwise().norm().transpose() * balance.sizes.norm();
+    ForceBalance of_one = balance;
+    of_one.set_multipliers(Vector::Zero(rows));
+    const Columns free = of_one.stiffness;
+    terms = free.cwiseAbs();
+    for (Eigen::Index row = 0; row < rows; ++row) {
+      of_one.set_multipliers(Vector::Unit(rows, row));
+      terms += (std::abs(lambda[row]) + off[row]) * (Columns(of_one.stiffness) - free).cwiseAbs();
+    }
+  }
+  return of_terms * terms + of_positions * change_with_position(scene, at, point, lambda, sizes);
+}
+
+void drop_round_off_in(Columns& matrix, const Columns& round_off) {
+  matrix = (matrix.cwiseAbs().array() <= round_off.array()).select(0.0, matrix);
 }
 
 bool symmetric(const Columns& matrix) {
@@ -100,6 +150,9 @@ Linearisation linearise(const Scene& given, const Equilibrium& at, double later)
   linear.mass = s.transpose() * mass * s;
   linear.damping = s.transpose() * damping * s;
   linear.stiffness = s.transpose() * stiffness * n;
+  linear.stiffness_round_off =
+      s.transpose().cwiseAbs() * round_off_of_stiffness(*scene, here, at, given.start.q) * n.cwiseAbs();
+  drop_round_off_in(linear.stiffness, linear.stiffness_round_off);
   linear.rows = scene->rows();
   linear.redundant_rows = linear.rows - static_cast<int>(scene->dimension() - s.cols());
   const bool no_drift = linear.drift.size() == 0 || linear.drift.cwiseAbs().maxCoeff() == 0.0;

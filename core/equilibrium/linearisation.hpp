@@ -22,7 +22,10 @@ struct Linearisation {
 
   Columns mass;       ///< Sᵀ M S
   Columns damping;    ///< Sᵀ C S: gyroscopic terms are in its antisymmetric part
-  Columns stiffness;  ///< Sᵀ K N
+  Columns stiffness;  ///< Sᵀ K N, 0 where it is round-off
+  /// What round-off may make of each entry of that: of forces of rows that cancel, and of a position that is
+  /// known to so many digits.
+  Columns stiffness_round_off;
 
   /// d/dt (y, u) = state (y, u); d/dt y = state y where all of M vanishes, as for phase-space
   /// Lagrangians, and where rows leave no u.

@@ -120,7 +120,7 @@ void add_mode(NearestModes& result, std::complex<double> s, double error, const 
   }
   if (std::abs(s.imag()) <= error) s = {s.real(), 0.0};
   if (std::abs(s.real()) <= error) s = {0.0, s.imag()};
-  if (s.imag() >= 0.0) result.found.modes.push_back({s, with_unit_largest(shape)});
+  if (s.imag() >= 0.0) result.found.modes.push_back({s, with_unit_largest(shape), error});
 }
 
 }  // namespace

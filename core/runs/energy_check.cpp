@@ -38,7 +38,8 @@ void EnergyCheck::see(const Sample& point) {
   last_time_ = point.time;
   const double way = max_norm(point.q - start_position_);
   // At rest what moves is round-off, and so are the energies at play.
-  if (std::isfinite(point.energy) && way <= at_rest * max_norm(start_position_)) return;
+  const double size = std::max(max_norm(start_position_), longest_time_ * rest_.speed(longest_time_));
+  if (std::isfinite(point.energy) && way <= at_rest * size) return;
   add_at_play(point);
   double change = std::abs(point.energy - start_energy_);
   if (!std::isfinite(change)) change = HUGE_VAL;

@@ -221,8 +221,11 @@ ConstraintBlocks hidden_rows(const Scene& scene) {
   const Columns undetermined = kernel(units.cwiseInverse().asDiagonal() * matrix * w);
   const bool multipliers = undetermined.cols() > 0 && undetermined.cols() == parts.free.cols() &&
                            are_multipliers(scene, parts.free);
-  if (undetermined.cols() > 0 && !multipliers)
-    refuse(scene, w * undetermined, "neither a potential nor a force determines it; is a term missing in L?");
+  if (undetermined.cols() > 0 && !multipliers) {
+    const std::string fault = fault_of_multipliers(scene, w * undetermined);
+    refuse(scene, w * undetermined,
+           fault.empty() ? "neither a potential nor a force determines it; is a term missing in L?" : fault);
+  }
   ConstraintBlocks blocks;
   const Eigen::Index r = parts.resisted.cols(), c = parts.free.cols();
   if (r > 0 && !first_order.by_force)

@@ -6,6 +6,7 @@
 #include <diracstep/core/system/lagrangian_derivatives.hpp>
 #include <diracstep/core/system/multiplier_rows.hpp>
 #include <diracstep/core/system/rows_along_motions.hpp>
+#include <utility>
 
 namespace diracstep {
 
@@ -98,25 +99,44 @@ void MultiplierRows::annihilator_derivative(double t, ConstVectorRef q, ConstVec
     d = second_difference(t, q, direction / size * max_norm(scaled_)) * (size / max_norm(scaled_));
 }
 
-bool are_multipliers(const Scene& scene, const Columns& directions) {
-  const Lagrangian& l = *scene.lagrangian;
-  const Eigen::Index n = directions.rows();
-  const auto vanishes_beside = [](const Columns& small, const Columns& whole) {
-    return max_norm(small) <= 1e-11 * size_or_one(max_norm(whole));
-  };
+namespace {
+
+constexpr double later = 0.37;  // than the start
+
+bool vanishes_beside(const Columns& small, const Columns& whole) {
+  return max_norm(small) <= 1e-11 * size_or_one(max_norm(whole));
+}
+
+/// q and v of no special place.
+std::pair<Vector, Vector> near_start(const Scene& scene) {
   Vector q = scene.start.q, v = scene.start.v;
-  for (Eigen::Index i = 0; i < n; ++i) {
+  for (Eigen::Index i = 0; i < q.size(); ++i) {
     q[i] += 1e-2 * size_or_one(max_norm(scene.start.q)) * std::sin(1.0 + 1.7 * static_cast<double>(i));
     v[i] += 0.3 * size_or_one(max_norm(scene.start.v)) * std::cos(0.3 + 2.3 * static_cast<double>(i));
   }
-  for (const double t : {scene.start.time, scene.start.time + 0.37}) {
+  return {std::move(q), std::move(v)};
+}
+
+/// How many of the rows ∂g/∂q = Uᵀ ∂²L/∂q² are independent.
+Eigen::Index rank_of_factors(const Columns& directions, const Columns& qq) {
+  const Columns factors = directions.transpose() * qq;
+  if (vanishes_beside(factors, qq)) return 0;
+  Eigen::FullPivLU<Columns> lu;
+  lu.setThreshold(1e-9);
+  return lu.compute(factors).rank();
+}
+
+}  // namespace
+
+bool are_multipliers(const Scene& scene, const Columns& directions) {
+  const Lagrangian& l = *scene.lagrangian;
+  const Eigen::Index n = directions.rows();
+  const auto [q, v] = near_start(scene);
+  for (const double t : {scene.start.time, scene.start.time + later}) {
     LagrangianDerivatives at(l);
     at.take_second(l, t, q, v);
     const Columns qq = l.pattern().full(at.qq), qv = l.pattern().full(at.qv);
-    const Columns factors = directions.transpose() * qq;  // ∂g/∂q, of independent rows
-    Eigen::FullPivLU<Columns> lu;
-    lu.setThreshold(1e-9);
-    if (vanishes_beside(factors, qq) || lu.compute(factors).rank() < directions.cols()) return false;
+    if (rank_of_factors(directions, qq) < directions.cols()) return false;
     Vector rate(n);
     l.position_gradient_rate(t, q, v, rate);
     if (!vanishes_beside(directions.transpose() * qq * directions, qq) ||
@@ -139,6 +159,26 @@ bool are_multipliers(const Scene& scene, const Columns& directions) {
       return false;
   }
   return true;
+}
+
+std::string fault_of_multipliers(const Scene& scene, const Columns& directions) {
+  const Lagrangian& l = *scene.lagrangian;
+  const auto [q, v] = near_start(scene);
+  LagrangianDerivatives at(l);
+  at.take_second(l, scene.start.time + later, q, v);
+  const Columns qq = l.pattern().full(at.qq);
+  const Eigen::Index rank = rank_of_factors(directions, qq);
+  if (rank == 0 || !vanishes_beside(directions.transpose() * qq * directions, qq)) return {};
+  Vector rate(q.size());
+  l.position_gradient_rate(scene.start.time + later, q, v, rate);
+  if (!vanishes_beside(directions.transpose() * rate, rate))
+    return "what it is a multiplier of depends on the time: state that as a row, whose force is the "
+           "multiplier, "
+           "and leave the coordinate out";
+  if (rank < directions.cols())
+    return "they are multipliers of the same, so that only a sum of them is determined: leave out all but " +
+           std::to_string(rank);
+  return {};
 }
 
 std::string rows_said_twice(const Scene& scene, const MultiplierRows& rows) {

@@ -44,6 +44,10 @@ class MultiplierRows final : public ConstraintRows {
 /// the start.
 bool are_multipliers(const Scene& scene, const Columns& directions);
 
+/// Why directions in which L is affine are no such multipliers, in words with what helps: g depends on the
+/// time, or its components on each other.  Empty where it is something else.
+std::string fault_of_multipliers(const Scene& scene, const Columns& directions);
+
 /// The rows of the scene that say what these of multipliers say already, near the start, so that only sums of
 /// the forces of both are determined: "row 'rod'"; empty where there are none.
 std::string rows_said_twice(const Scene& scene, const MultiplierRows& rows);

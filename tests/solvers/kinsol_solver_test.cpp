@@ -125,6 +125,21 @@ TEST(Kinsol, UnknownsOfVeryDifferentSizeAreBothFound) {
   }
 }
 
+/// v − μ = −0.2 and v = 0, as of a body at rest on a floor: a guess of v that is next to zero is no unit of
+/// μ.
+TEST(Kinsol, AGuessNextToZeroIsNoUnit) {
+  FunctionProblem problem(
+      SparsityPattern::dense(2, 2), {{"momentum", 1, 0.2}, {"velocity", 1, 1e-100}},
+      [](ConstVectorRef x, VectorRef f) { f << x[0] - x[1] + 0.2, x[0]; },
+      [](ConstVectorRef, VectorRef values) { values << 1.0, 1.0, -1.0, 0.0; });
+  for (const double guess : {1e-40, 1e-77, -3e-107, 1e-300}) {
+    Vector x{{guess, 0.0}};
+    const SolveReport report = kinsol()(problem)->solve(x);
+    EXPECT_TRUE(report.ok()) << describe(report.status) << " from " << guess;
+    EXPECT_NEAR(x[1], 0.2, epsilon) << guess;
+  }
+}
+
 TEST(Kinsol, SingularJacobianIsReported) {
   const Eigen::MatrixXd singular{{1.0, 2.0}, {2.0, 4.0}}, zero = Eigen::MatrixXd::Zero(2, 2);
   for (const Eigen::MatrixXd& m : {singular, zero}) {

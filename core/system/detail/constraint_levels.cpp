@@ -60,6 +60,7 @@ void LevelledEquations::estimate_loss(const LevelledPoint& at) {
 
 void LevelledEquations::factor(double t, ConstVectorRef z, LevelledPoint& at) {
   array_.evaluate(t, z, at.w, true);
+  rest_speed_ = array_.rest_speed(z);
   Columns kept = array_.by_unknowns()(levels_.kept, levels_.by);
   at.sizes.resize(kept.rows());
   for (Eigen::Index r = 0; r < kept.rows(); ++r) {
@@ -107,7 +108,10 @@ bool LevelledEquations::solve(double t, ConstVectorRef z, LevelledPoint& at) {
 
 /// The size of a change of v_0 and Λ_0 in units of theirs.
 double LevelledEquations::part_of_leading(ConstVectorRef change, ConstVectorRef w) const {
-  const double velocity = size_or_one(max_norm(w.head(n_))), force = size_or_one(max_norm(w.segment(n_, m_)));
+  const double speed = max_norm(w.head(n_)),
+               velocity =
+                   size_or_one(speed > EquationArray::part_of_rest_speed * rest_speed_ ? speed : rest_speed_),
+               force = size_or_one(max_norm(w.segment(n_, m_)));
   double part = 0.0;
   for (std::size_t k = 0; k < levels_.by.size(); ++k) {
     const double of = std::abs(change[static_cast<Eigen::Index>(k)]);

@@ -76,6 +76,7 @@ class LevelledEquations {
   int n_, m_, holonomic_count_;
   EquationArray array_;
   double loss_ = 1.0, constraint_terms_ = 0.0;
+  double rest_speed_ = 0.0;   ///< where `at` was factored last
   ConstraintsAtPoint forms_;  ///< of φ
 };
 

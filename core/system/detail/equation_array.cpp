@@ -267,10 +267,18 @@ void EquationArray::take_reach(double reach, Vector& w) {
   reach_ = reach;
 }
 
+double EquationArray::rest_speed(ConstVectorRef z) const {
+  const double by_velocity = max_norm(by_unknowns_.block(place_of_motion(0), 0, n_, n_)),
+               by_position = max_norm(by_state_.block(place_of_motion(0), 0, n_, n_)),
+               speed = size_or_one(max_norm(z.head(n_))) * by_position / by_velocity;
+  return std::isfinite(speed) ? speed : 0.0;
+}
+
 void EquationArray::choose_reach(double t, ConstVectorRef z, Vector& w) {
   constexpr int most_halvings = 14;
+  evaluate(t, z, w, true);
   const double speed = max_norm(w.head(n_)), size = size_or_one(max_norm(z.head(n_))),
-               time = speed > 0.0 ? size / speed : 1.0;
+               time = speed > part_of_rest_speed * rest_speed(z) ? size / speed : 1.0;
   double least = std::numeric_limits<double>::infinity(), best = time, reach = time;
   for (int k = 0; k <= most_halvings && !(least <= smooth_to); ++k, reach /= 2.0) {
     take_reach(reach, w);

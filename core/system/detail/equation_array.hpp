@@ -54,6 +54,11 @@ class EquationArray {
   Columns rate_by_leading() const;                      ///< by v_0 and Λ_0
   double terms() const { return terms_; }               ///< size of what cancels in ρ and ∂L/∂v − p
   double row_terms() const { return row_terms_; }       ///< and in S
+  /// How fast q would be, at the last derivatives, were its part in the equations of order 0 not in balance,
+  /// by their part in v; 0 where one of them is missing.  Velocities below `part_of_rest_speed` of it are
+  /// round-off of zero, as at rest, and no size of velocities.
+  double rest_speed(ConstVectorRef z) const;
+  static constexpr double part_of_rest_speed = 1e-10;
   /// Sizes of round-off in the rows, in units of ε.
   Vector round_off() const;
 

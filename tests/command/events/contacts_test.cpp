@@ -1,4 +1,5 @@
 /// Runs over contacts that are as short as their steps, against closed forms.
+#include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <sstream>
@@ -62,6 +63,30 @@ TEST_F(HardContacts, OfAFewStepsAreRightOrDoubted) {
       run("run " + scene("fall", falling_on("if(x < 0, -1e5*x, 0)")) + " --json --step 0.001");
   EXPECT_EQ(fine.status, 0) << fine.err;
   EXPECT_NEAR(end_of(fine), falls_on_contacts[0].end, 1e-6);
+}
+
+/// At rest behind a landing all velocities are round-off, smaller from step to step; nothing of that ends the
+/// run or is told as lost energy.
+TEST_F(HardContacts, LeaveAtRestWhatHasLanded) {
+  for (const auto& [height, restitution, spans, steps] :
+       {std::array{3.0, 0.0, 5.0, 50.0}, std::array{1.0, 0.0, 1.0, 300.0}, std::array{0.01, 0.1, 5.0, 50.0},
+        std::array{100.0, 0.3, 5.0, 50.0}, std::array{1e4, 0.3, 5.0, 50.0}}) {
+    const double end = spans * (2.0 / (1.0 - restitution) + 1.0) * std::sqrt(2.0 * 9.81 * height) / 9.81;
+    std::ostringstream text;
+    text.precision(17);
+    text << "lagrangian = \"v_x^2/2 - 9.81*x\"\n[coordinates]\nx = {}\n[start]\nx = " << height
+         << "\n[[rows]]\nname = \"floor\"\nequation = \"x = 0\"\non = false\n"
+            "[[events]]\nname = \"lands\"\nwhen = \"x\"\ndirection = \"falling\"\non = \"floor\"\n";
+    if (restitution > 0.0)
+      text << "if = \"v_x > -0.01\"\n[[events]]\nname = \"bounces\"\nwhen = \"x\"\nif = \"v_x < "
+              "-0.01\"\nrestitution = "
+           << restitution;
+    text << "\n[span]\nend = " << end << "\nstep = " << end / steps << "\n";
+    const Outcome outcome = run("run " + scene("rests", text.str()) + " --json");
+    ASSERT_EQ(outcome.status, 0) << height << " " << restitution << outcome.err;
+    EXPECT_NEAR(end_of(outcome), 0.0, 1e-15 * height) << height << " " << restitution;
+    EXPECT_EQ(nlohmann::json::parse(outcome.out)["events"].back()["name"], "lands") << height;
+  }
 }
 
 }  // namespace

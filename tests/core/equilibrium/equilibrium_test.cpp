@@ -200,6 +200,100 @@ TEST(Equilibrium, NonholonomicRowsLeaveMorePositionsThanVelocities) {
   EXPECT_NEAR(modes.modes[1].eigenvalue.imag(), 3.0, 1e-12);
 }
 
+/// On the circle of a sphere at which a row holds it: all of the weight is the force of that row, and what is
+/// left along the circle is round-off of it, whose root is no rate.
+TEST(Equilibrium, AFamilyUnderALoadIsNeutralAndNamesItsDirection) {
+  Scene scene = spherical_pendulum(Vector{{0.8, 0.5, 0.31}}, Vector::Zero(3));
+  scene.constraints.push_back(holonomic<3, 1>(
+      []<class T>(const std::array<T, 3>& x) { return std::array<T, 1>{x[2] - 0.3}; }, {"level"}));
+  const Equilibrium at = find_equilibrium(scene, scene.start);
+  ASSERT_TRUE(at.ok()) << at.failure;
+  EXPECT_NEAR(at.lambda[1], gravity, 1e-13);
+  const Eigenmodes modes = eigenmodes(linearise(scene, at, 1.0));
+  EXPECT_EQ(modes.zeros, 2);
+  EXPECT_LT(modes.zeros_below, 1e-5);
+  EXPECT_TRUE(modes.modes.empty());
+  EXPECT_EQ(modes.stability, Stability::neutral);
+  ASSERT_EQ(modes.free_directions.cols(), 1);
+  EXPECT_NEAR(modes.free_directions(0, 0), -at.q[1] / at.q[0], 1e-12);
+  EXPECT_NEAR(modes.free_directions(1, 0), 1.0, 1e-15);
+}
+
+/// y (1 + x²) = 0 holds a weight at each x, with the force g/(1 + x²).
+TEST(Equilibrium, AFamilyWhoseForceChangesAlongItIsOne) {
+  Scene scene = scene_of({"x", "y"}, lagrangian<2>([](const auto& x, const auto& w) {
+                           return 0.5 * (w[0] * w[0] + w[1] * w[1]) - gravity * x[1];
+                         }),
+                         Vector{{0.8, 0.5}}, Vector::Zero(2));
+  scene.constraints = {holonomic<2, 1>(
+      []<class T>(const std::array<T, 2>& x) { return std::array<T, 1>{x[1] * (1.0 + x[0] * x[0])}; })};
+  const Equilibrium at = find_equilibrium(scene, scene.start);
+  ASSERT_TRUE(at.ok()) << at.failure;
+  EXPECT_NEAR(at.lambda[0], gravity / (1.0 + at.q[0] * at.q[0]), 1e-12);
+  const Linearisation linear = linearise(scene, at, 1.0);
+  EXPECT_LT(linear.variation, 1e-10);
+  const Eigenmodes modes = eigenmodes(linear);
+  EXPECT_EQ(modes.zeros, 2);
+  EXPECT_EQ(modes.stability, Stability::neutral);
+  EXPECT_EQ(modes.free_directions.col(0), (Vector{{1.0, 0.0}}));
+}
+
+/// A disc that rolls upright, pulled by 3 along x: it rests where it heads across, ph = pi/2.
+TEST(Equilibrium, ADiscRestsAcrossThePull) {
+  Scene scene = scene_of({"x", "y", "th", "ph"}, lagrangian<4>([](const auto& q, const auto& v) {
+                           return 0.5 * (v[0] * v[0] + v[1] * v[1]) + 0.25 * v[2] * v[2] +
+                                  0.125 * v[3] * v[3] - 3.0 * q[0];
+                         }),
+                         Vector{{0.0, 1.0, 1.0, 0.3}}, Vector::Zero(4));
+  scene.constraints = {pfaffian<4, 2>([]<class T>(const std::array<T, 4>& q) {
+    using std::cos, std::sin;
+    return std::array<std::array<T, 4>, 2>{
+        {{T(1.0), T(0.0), -cos(q[3]), T(0.0)}, {T(0.0), T(1.0), -sin(q[3]), T(0.0)}}};
+  })};
+  const Equilibrium at = find_equilibrium(scene, scene.start);
+  ASSERT_TRUE(at.ok()) << at.failure;
+  EXPECT_NEAR(at.q[3], M_PI / 2.0, 1e-12);
+  EXPECT_NEAR(at.lambda[0], 3.0, 1e-12);
+  EXPECT_EQ(eigenmodes(linearise(scene, at, 1.0)).free_directions.cols(), 3);  // x, y and th
+}
+
+/// Two particles, one of them drawn away at the slow rate r: told from one that is free, also where both
+/// coordinates are mixed, as long as r² is more than round-off of the other's.
+TEST(Equilibrium, ASlowGrowthBesideAFastVibrationIsNoFreeDirection) {
+  for (const double rate : {1e-5, 1e-6, 3e-8})
+    for (const bool mixed : {false, true}) {
+      const Scene scene =
+          scene_of({"u", "w"}, lagrangian<2>([=](const auto& q, const auto& v) {
+                     const auto a = mixed ? q[0] + q[1] : q[0], b = mixed ? q[0] - q[1] : q[1];
+                     return 0.5 * (v[0] * v[0] + v[1] * v[1]) - 0.5 * a * a + 0.5 * rate * rate * b * b;
+                   }),
+                   Vector{{0.1, 0.0}}, Vector::Zero(2));
+      const Eigenmodes modes = eigenmodes(linearise(scene, find_equilibrium(scene, scene.start), 1.0));
+      const double grows = mixed ? std::sqrt(2.0) * rate : rate;
+      if (mixed && rate < 1e-7) {  // rate² is round-off of 1
+        EXPECT_EQ(modes.zeros, 2) << rate;
+        EXPECT_GT(modes.zeros_below, grows);
+        continue;
+      }
+      EXPECT_EQ(modes.zeros, 0) << rate << mixed;
+      EXPECT_EQ(modes.stability, Stability::unstable) << rate << mixed;
+      EXPECT_NEAR(modes.modes[1].eigenvalue.real(), grows, 1e-3 * grows) << rate << mixed;
+    }
+}
+
+/// A weight held by a multiplier that is a coordinate, l (y − 1/2): l is the force.
+TEST(Equilibrium, AMultiplierAmongTheCoordinatesHasItsForce) {
+  const Scene scene =
+      scene_of({"x", "y", "l"}, lagrangian<3>([](const auto& q, const auto& v) {
+                 return 0.5 * (v[0] * v[0] + v[1] * v[1]) - gravity * q[1] + q[2] * (q[1] - 0.5);
+               }),
+               Vector{{0.8, 0.5, 0.0}}, Vector::Zero(3));
+  const Equilibrium at = find_equilibrium(scene, scene.start);
+  ASSERT_TRUE(at.ok()) << at.failure;
+  EXPECT_NEAR(at.q[2], gravity, 1e-13);
+  EXPECT_EQ(eigenmodes(linearise(scene, at, 1.0)).zeros, 2);
+}
+
 TEST(Equilibrium, WhereThereIsNoneTheForceThatIsLeftIsNamed) {
   const Scene scene =
       scene_of({"height"},

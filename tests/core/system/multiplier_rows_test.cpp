@@ -164,7 +164,17 @@ TEST(MultipliersAsCoordinates, OfWhatMovesWithTheTimeAreRefused) {
     return Links::free(q, v) - q[4] * (phi[0] - t) - q[5] * phi[1];
   });
   expect_misuse([&] { Integrator(scene, Registry::with_built_ins(), kinsol(), {.step = 0.1}); },
-                {"'multipliers'", "a", "neither a potential nor a force determines it"});
+                {"'multipliers'", "a", "depends on the time", "state that as a row"});
+}
+
+TEST(MultipliersAsCoordinates, OfTheSameFunctionAreNamed) {
+  auto scene = std::make_shared<Scene>(*with_multipliers());
+  scene->lagrangian = lagrangian<6>([](const auto& q, const auto& v) {
+    const auto phi = Links::apart(q);
+    return Links::free(q, v) - (q[4] + q[5]) * phi[0];
+  });
+  expect_misuse([&] { Integrator(scene, Registry::with_built_ins(), kinsol(), {.step = 0.1}); },
+                {"'a', 'b'", "multipliers of the same", "leave out all but 1"});
 }
 
 }  // namespace

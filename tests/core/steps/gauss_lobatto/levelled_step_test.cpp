@@ -155,6 +155,25 @@ TEST(LevelledStep, StartsOffTheConstraintsAreToldAndMoved) {
   EXPECT_LT(distance(moved, off.start.q), 0.2);
 }
 
+/// All of x = l = 1 and y = 0 follows from the equations: at the only point there is nothing moves, which is
+/// no reason to see no constraints.
+TEST(LevelledStep, StartsOffTheOnlyPointThatIsAllowedAreTold) {
+  Scene off = testing::scene_of("held", {"x", "y", "l"});
+  off.lagrangian = lagrangian<3>([](const auto& q, const auto& v) {
+    return q[1] * v[0] - q[0] * v[1] - 0.5 * (q[0] * q[0] + q[1] * q[1]) + q[2] * (q[0] - 1.0);
+  });
+  for (const Vector& q : {Vector{{1.0, 0.0, 0.2}}, Vector{{0.9, 0.0, 0.2}}, Vector{{1.0, 0.3, 1.0}}}) {
+    off.start = {0.0, q, Vector::Zero(3)};
+    const auto take = [&](bool project) {
+      return Integrator(std::make_shared<const Scene>(off), Registry::with_built_ins(), kinsol(),
+                        {.method = gl(2), .step = 0.1, .project_start = project});
+    };
+    const std::string allowed = q[2] == 1.0 ? "y from 0.3 to" : "l from 0.2 to 1";
+    expect_misuse([&] { (void)take(false); }, {"'held'", "the equation of motion along 'l'", allowed});
+    EXPECT_LT(distance(take(true).position(), Vector{{1.0, 0.0, 1.0}}), 1e-12);
+  }
+}
+
 TEST(LevelledStep, ContradictionsAreToldWithAnEquation) {
   Scene scene = testing::scene_of("two walls", {"x", "p", "a", "b"});
   scene.lagrangian = lagrangian<4>([](const auto& q, const auto& v) {
