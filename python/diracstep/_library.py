@@ -114,7 +114,7 @@ class Table(Structure):
         width = self.columns
         if not width:
             return []
-        cells = [self.cells[k].decode() for k in range(self.rows * width)]
+        cells = [decoded(self.cells[k]) for k in range(self.rows * width)]
         return [tuple(cells[k:k + width]) for k in range(0, len(cells), width)]
 
 
@@ -307,17 +307,23 @@ lib = _Functions(_load())
 
 def version() -> str:
     """The version of the library, "0.1.0"."""
-    return lib.version().decode()
+    return decoded(lib.version())
 
 
 def check(code: int) -> None:
     """Raises what a code stands for."""
     if code != OK:
-        raise raised(code, lib.message().decode())
+        raise raised(code, decoded(lib.message()))
 
 
 def encoded(text: str | None) -> bytes | None:
-    return None if text is None else text.encode()
+    """Bytes of a path that are no UTF-8, which Python's texts hold as surrogates, become themselves again."""
+    return None if text is None else text.encode("utf-8", "surrogateescape")
+
+
+def decoded(text: bytes | None) -> str:
+    """Bytes that are no UTF-8, as paths and files may hold them, stand as \\xXX."""
+    return (text or b"").decode("utf-8", "backslashreplace")
 
 
 def lines_of(handle: int, what: int) -> list[tuple[str, ...]]:
@@ -358,7 +364,7 @@ def call_interruptibly(call: Callable[[], int], stop: c_int,
     def work() -> None:
         try:
             code = call()
-            outcome.extend((code, lib.message().decode() if code != OK else ""))  # messages belong to the thread
+            outcome.extend((code, decoded(lib.message()) if code != OK else ""))  # messages belong to the thread
         except BaseException as error:  # noqa: BLE001  of a callback's machinery: raised below, in the caller
             outcome.extend((error, ""))
         running.release()

@@ -84,7 +84,7 @@ def equilibrium_of(scene: Scene, along: bool, modes: int | None, near: float | N
     rest = Equilibrium(
         scene, found.time, _numbers(found.q, scene._widths["q"]), _numbers(found.v, n), _numbers(found.lambda_, len(scene._rows)),
         found.iterations, _numbers(found.eigenvalue, k, 2).view(complex).reshape(k), _numbers(found.shape, k, n, 2).view(complex).reshape(k, n),
-        found.zeros, found.stability.decode(), None if full else found.near, found.variation, spelled(found.doubt.decode()),
+        found.zeros, c.decoded(found.stability), None if full else found.near, found.variation, spelled(c.decoded(found.doubt)),
         found.redundant_rows, **matrices)
     if rest.doubt:
         warnings.warn(f"{scene.name}: {rest.doubt}", Doubt, stacklevel=3)
