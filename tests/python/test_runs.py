@@ -198,3 +198,10 @@ step = 1e-4
     integrator = scene.integrator()
     integrator.step()
     assert integrator.state().lambda_.shape == (len(scene.rows),)
+
+
+def test_a_body_that_is_held_still_is_not_doubted():
+    # What pulls at it acts for 1e-5 of the first step, until the brake has taken it up: v = −g/c.
+    held = ds.Scene(["y"], lambda q, v: v.y**2 / 2 - 9.81 * q.y, force=lambda v: {"y": -1e5 * v.y}, until=1.0, step=0.01)
+    run = held.run(method="damped/radau:3", adaptive=False)
+    assert run.doubt == "" and run["v_y"][-1] == pytest.approx(-9.81e-5, rel=1e-12)
