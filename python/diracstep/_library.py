@@ -6,6 +6,7 @@ import ctypes
 import os
 import sys
 import threading
+import time
 from ctypes import (CFUNCTYPE, POINTER, Structure, byref, c_char_p, c_double, c_int, c_long, c_size_t, c_uint,
                     c_void_p)
 from pathlib import Path
@@ -168,7 +169,7 @@ class Found(Structure):
 
 
 class Rest(Structure):
-    _fields_ = [("along", c_int), ("modes", c_int), ("nearby", c_int), ("near", c_double)]
+    _fields_ = [("along", c_int), ("modes", c_int), ("nearby", c_int), ("near", c_double), ("stop", POINTER(c_int))]
 
 
 class Equilibrium(Structure):
@@ -349,17 +350,19 @@ class KeptException:
         return kept
 
 
-def call_interruptibly(call: Callable[[], int], stop: c_int,
-                       watch: Callable[[], None] | None = None) -> tuple[int, str]:
+def call_interruptibly(call: Callable[[], int], stop: c_int, watch: Callable[[], None] | None = None,
+                       patience: float | None = None) -> tuple[int, str]:
     """Makes a long call on a thread of its own and waits for it: the code, and the library's message.
 
     Ctrl-C sets the flag ``stop``, which ends the call; a second one is raised as usual, and then the call may outlive this
-    function: ``call`` must keep all that it uses.  ``watch`` is called about ten times a second.
+    function: ``call`` must keep all that it uses.  So does the first one ``patience`` seconds later, of a call that may take long
+    to see the flag.  ``watch`` is called about ten times a second.
     """
     outcome: list[Any] = []
     # Thread.join takes a thread for ended where Ctrl-C comes in it (Python 3.11), and Event.wait may keep its lock then.
     running = threading.Lock()
     running.acquire()
+    asked = 0.0
 
     def work() -> None:
         try:
@@ -376,9 +379,12 @@ def call_interruptibly(call: Callable[[], int], stop: c_int,
             try:
                 if not running.acquire(timeout=0.1) and watch is not None:
                     watch()
+                if asked and patience is not None and time.monotonic() > asked + patience and not outcome:
+                    raise KeyboardInterrupt
             except KeyboardInterrupt:
                 if stop.value != 0:
                     raise
+                asked = time.monotonic()
                 stop.value = 1
     except BaseException:
         stop.value = 1  # the call must not go on by itself

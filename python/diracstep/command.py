@@ -9,8 +9,10 @@ import csv
 import json
 import os
 import shutil
+import signal
 import subprocess
 import tempfile
+import time
 import warnings
 from contextlib import contextmanager
 from pathlib import Path
@@ -18,9 +20,10 @@ from typing import TYPE_CHECKING, Any, Iterator, Mapping, Sequence
 
 import numpy as np
 
+from ._library import call_interruptibly
 from .arrays import path, real, table, texts, whole
 from .errors import Doubt, Failure, Misuse, spelled
-from .options import refuse
+from .options import refuse, stop_flag
 
 if TYPE_CHECKING:
     from .scene import Scene
@@ -32,6 +35,9 @@ def _command() -> str:
         raise ImportError("this is done by the command diracstep (Debian package diracstep), which was not found; "
                           "DIRACSTEP_COMMAND may give its path")
     return given
+
+
+_PATIENCE = 5.0  # seconds for the command to keep what it has
 
 
 class Verbs:
@@ -83,16 +89,41 @@ def call_command(verb: str, arguments: Sequence[str], plugins: Sequence[str], na
     """The document that a verb gives; ``name`` stands before a doubt, and paths in ``folder``, which nobody will find, are shown
     without it."""
     loaded = [text for plugin in plugins for text in ("--plugin", os.fspath(plugin))]
-    done = subprocess.run([_command(), verb, *arguments, *loaded, "--json"], capture_output=True, check=False,
-                          encoding="utf-8", errors="backslashreplace")
-    told = _told(done.stderr if folder is None else done.stderr.replace(f"{folder}{os.sep}", ""))
-    if done.returncode == 2:
+    status, out, said = _ended([_command(), verb, *arguments, *loaded, "--json"])
+    told = _told(said if folder is None else said.replace(f"{folder}{os.sep}", ""))
+    if status == 2:
         raise Misuse(told)
-    if done.returncode == 3:
+    if status == 3:
         warnings.warn(f"{name}: {told}", Doubt, stacklevel=5)
-    elif done.returncode != 0:
+    elif status != 0:
         raise Failure(told)
-    return json.loads(done.stdout)
+    return json.loads(out)
+
+
+def _ended(words: Sequence[str]) -> tuple[int, str, str]:
+    """Status, output and messages of a process.  Ctrl-C is passed on to it, in a notebook too, whose processes the signal does not
+    come to, so that it keeps what it has; KeyboardInterrupt is raised where it has ended."""
+    stop, ended = stop_flag(), []
+
+    def call() -> int:
+        with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, encoding="utf-8", errors="backslashreplace") as process:
+            told = 0.0
+            while not ended:
+                try:
+                    out, said = process.communicate(timeout=0.05)
+                    ended.append((process.returncode, out, said))
+                except subprocess.TimeoutExpired:
+                    if stop.value and not told:  # twice within 0.1 s, from the terminal too, is once for the command
+                        process.send_signal(signal.SIGINT)
+                        told = time.monotonic()
+                    elif told and time.monotonic() > told + _PATIENCE:
+                        process.kill()
+        return 0
+
+    call_interruptibly(call, stop)
+    if stop.value:
+        raise KeyboardInterrupt(_told(ended[0][2]))
+    return ended[0]
 
 
 def _told(text: str) -> str:

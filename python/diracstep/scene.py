@@ -266,7 +266,8 @@ class Scene(OpenedScene):
         along: a steady motion, in which coordinates with a velocity at the start keep moving.
         modes: so many, by sparse matrices, the nearest to ``near`` or else the slowest; without both all of them, or ten of a scene
         of more than 2000 coordinates and rows.  Events are not looked for.
-        Raises Failure where none is found; warns with Doubt where the linear equations change until the scene's end.
+        Raises Failure where none is found; warns with Doubt where the linear equations change until the scene's end.  Ctrl-C ends it
+        with KeyboardInterrupt.
         """
         return equilibrium_of(self, along, modes, near)
 
