@@ -59,6 +59,7 @@ def spelled(text: str) -> str:
                         'drop_redundant=True, or redundant = "drop" in a scene file')
     text = text.replace("; Space::normalised() makes them so", "")
     text = text.replace("(option `fixed`)", "(adaptive=False)")
+    text = text.replace("--method damped/radau:3 --adaptive", 'method="damped/radau:3", adaptive=True')
     text = re.sub(r"(?:set )?IntegratorOptions::(\w+)", r"\1=True", text)
     return re.sub(r"(?<![\w-])--([a-z][a-z-]*)", lambda option: option[1].replace("-", "_"), text)
 
