@@ -151,6 +151,7 @@ typedef struct diracstep_rest {
   int modes;  /* so many modes, by sparse matrices; 0: all by full ones, or of a large scene ten … */
   int nearby; /* 1: by sparse matrices those nearest to `near`, else the slowest */
   double near;
+  const int *stop; /* NULL, or an int that ends the search soon after it is no longer 0 */
 } diracstep_rest;
 
 /* What was found.  Texts and numbers are valid until the next call of this thread; matrices stand row by row,
@@ -175,7 +176,8 @@ typedef struct diracstep_equilibrium {
 } diracstep_equilibrium;
 
 /* Finds where the scene rests, its start as the guess, and its small motions there; events are not looked
- * for.  DIRACSTEP_FAILED where none is found: q, v and lambda are then where the search has ended. */
+ * for.  DIRACSTEP_FAILED where none is found: q, v and lambda are then where the search has ended.
+ * DIRACSTEP_INTERRUPTED by `stop`. */
 DIRACSTEP_API int diracstep_find_equilibrium(const diracstep_model *model, const diracstep_rest *rest,
                                              diracstep_equilibrium *found);
 

@@ -83,9 +83,15 @@ void find(const diracstep_model& model, const diracstep_rest& rest, diracstep_eq
   const CatalogueScene& entry = entry_of(model);
   const bool all = entry.events.empty() && entry.all_rows && !model.drop_redundant;
   std::shared_ptr<const Scene> scene = all ? entry.all_rows : entry.scene;
-  Equilibrium at = find_equilibrium(*scene, scene->start, rest.along != 0);
+  const auto go_on = [stop = rest.stop] { return !stopped(stop); };
+  const auto require_wanted = [&] {
+    if (stopped(rest.stop)) throw Interruption("interrupted");
+  };
+  Equilibrium at = find_equilibrium(*scene, scene->start, rest.along != 0, go_on);
+  require_wanted();
   if (all && !at.ok()) {  // rows that depend on their surface alone bar the way there
-    Equilibrium by_independent = find_equilibrium(*entry.scene, entry.scene->start, rest.along != 0);
+    Equilibrium by_independent = find_equilibrium(*entry.scene, entry.scene->start, rest.along != 0, go_on);
+    require_wanted();
     if (by_independent.ok()) {
       scene = entry.scene;
       at = std::move(by_independent);

@@ -45,7 +45,8 @@ void drop_redundant_rows(CatalogueScene& entry) {
   entry.scene = without_refusal(entry.scene);
   entry.all_rows = without_refusal(entry.all_rows);
   const std::shared_ptr<const Scene> scene = completed(entry.scene);
-  if (!scene->start.q.allFinite() || scene->start.q.size() != scene->dimension()) return;  // refused by runs
+  if (!scene->start.q.allFinite() || scene->start.q.size() != scene->storage_size())
+    return;  // refused by runs
   const std::vector<std::string> dependent = redundant_rows(*scene, scene->start);
   if (dependent.empty() || row_dependence(*scene, scene->start, dependent) != RowDependence::lasting) return;
   if (!contradiction(*scene, scene->start, dependent).empty()) return;  // refused by runs, with the reason

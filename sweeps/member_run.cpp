@@ -21,7 +21,7 @@ namespace diracstep {
 
 namespace {
 
-constexpr long tried_for_an_example = 100;
+constexpr long tried_for_an_example = 100, steps_between_looks = 1000;
 constexpr double unknown_number = std::numeric_limits<double>::quiet_NaN();
 constexpr const char* start_prefix = "start.";
 
@@ -93,8 +93,12 @@ MemberResult result_of(const std::string& failure, const std::string& doubt, con
 }  // namespace
 
 MemberRuns::MemberRuns(const Sweep& sweep, SceneMaker make_scene, const Registry& registry,
-                       SolverFactory solvers)
-    : sweep_(sweep), make_scene_(std::move(make_scene)), registry_(registry), solvers_(std::move(solvers)) {
+                       SolverFactory solvers, std::function<bool()> goes_on)
+    : sweep_(sweep),
+      make_scene_(std::move(make_scene)),
+      registry_(registry),
+      solvers_(std::move(solvers)),
+      goes_on_(std::move(goes_on)) {
   const long count = std::min(tried_for_an_example, sweep.members());
   for (long k = 0; !example_.scene; ++k) try {
       example_ = scene_of(k);
@@ -212,11 +216,11 @@ MemberResult MemberRuns::run_without_events(const CatalogueScene& entry, const I
   const auto see = [&](const Sample& node) {
     recorded.see(entry, node);
     end = node;
-    return true;
+    return goes_on();
   };
-  const RunReport report =
-      run_steps(integrator, steps, Momentum::projected, recorded.needs_every_point() ? 1 : steps, see,
-                checks ? &*checks : nullptr);
+  const RunReport report = run_steps(integrator, steps, Momentum::projected,
+                                     recorded.needs_every_point() ? 1 : std::min(steps, steps_between_looks),
+                                     see, checks ? &*checks : nullptr);
   if (!report.last.ok()) end.time = integrator.time();  // not every node was seen
   return result_of(report.last.failure, checks ? checks->text() : "", entry, end, recorded);
 }
@@ -238,7 +242,7 @@ MemberResult MemberRuns::run_with_derivatives(long number, const CatalogueScene&
         recorded.see(entry, node);
         end = node;
         if (seen++ == steps) numbers = derivatives.numbers();  // before the checks take further steps
-        return true;
+        return goes_on();
       },
       checks ? &*checks : nullptr);
   const std::string doubt = joined_doubts({checks ? checks->text() : "", derivatives.doubt()});
@@ -259,7 +263,7 @@ MemberResult MemberRuns::run_by_local_error(const CatalogueScene& entry, const I
   const auto see = [&](const Sample& node) {
     recorded.see(entry, node);
     end = node;
-    return true;
+    return goes_on();
   };
   const RunReport report =
       run_until(integrator, *sweep_.end, Momentum::projected, 1, see, checks ? &*checks : nullptr);
@@ -274,7 +278,7 @@ MemberResult MemberRuns::run_through_events(const CatalogueScene& entry, const I
   Sample end;
   SolveReport read = motion.sample(end);
   std::string failure;
-  for (long k = 0; k < steps && read.ok() && failure.empty() && !motion.stopped(); ++k) {
+  for (long k = 0; k < steps && read.ok() && failure.empty() && !motion.stopped() && goes_on(); ++k) {
     recorded.see(entry, end);
     failure = motion.step().failure;
     if (failure.empty() && !motion.stopped()) read = motion.sample(end);
@@ -298,6 +302,7 @@ MemberResult MemberRuns::search(const CatalogueScene& entry) const {
   wanted.integrator = options_;
   wanted.max_time =
       std::numeric_limits<double>::infinity();  // solves alone, so that the answer is the same anywhere
+  wanted.go_on = goes_on_;
   const double end = *sweep_.end;
   const bool through_events = !entry.events.empty();
   if (through_events) wanted.first_step = std::abs(entry.natural_step);
@@ -319,7 +324,7 @@ MemberResult MemberRuns::search(const CatalogueScene& entry) const {
   if (recorded.needs_every_point()) {
     const auto see = [&](const Sample& node) {
       recorded.see(entry, node);
-      return true;
+      return goes_on();
     };
     const RunReport again = run_again(entry.scene, registry_, solvers_, found, Momentum::projected, 1, see);
     if (!again.ok()) return {MemberResult::Status::failed, again.last.failure, unknown_number, {}};

@@ -26,7 +26,10 @@ class MemberRuns {
   /// Chooses what the file leaves open, by the first member whose scene can be made: the method, the step,
   /// the end, what is recorded.  Throws Misuse where there is none among the first hundred, and for names
   /// that it has not.
-  MemberRuns(const Sweep& sweep, SceneMaker make_scene, const Registry& registry, SolverFactory solvers);
+  /// `goes_on`, where there is one, is asked within each run by all threads; where it is false the run ends,
+  /// and its result is to be left.
+  MemberRuns(const Sweep& sweep, SceneMaker make_scene, const Registry& registry, SolverFactory solvers,
+             std::function<bool()> goes_on = {});
 
   /// The sweep with all that was left open filled in.
   const Sweep& sweep() const { return sweep_; }
@@ -49,6 +52,7 @@ class MemberRuns {
   MemberResult run_through_events(const CatalogueScene& entry, const IntegratorOptions& options, long steps,
                                   Recorded& recorded) const;
   MemberResult search(const CatalogueScene& entry) const;
+  bool goes_on() const { return !goes_on_ || goes_on_(); }
   void take_recommendation();
   void choose_method();
 
@@ -56,6 +60,7 @@ class MemberRuns {
   SceneMaker make_scene_;
   const Registry& registry_;
   SolverFactory solvers_;
+  std::function<bool()> goes_on_;
   CatalogueScene example_;
   IntegratorOptions options_;
   bool step_given_ = false;

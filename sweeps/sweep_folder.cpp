@@ -152,7 +152,9 @@ class BlockRunner {
     const auto work = [&](bool shows) {
       try {
         for (long k = next++; k < size && goes_on(); k = next++) {
-          rows[static_cast<std::size_t>(k)] = result_line(runs_.sweep(), first + k, runs_.run(first + k));
+          const MemberResult result = runs_.run(first + k);
+          if (!goes_on()) return;  // within it, maybe
+          rows[static_cast<std::size_t>(k)] = result_line(runs_.sweep(), first + k, result);
           ++done;
           if (shows) show(done);
         }
@@ -240,7 +242,7 @@ SweepReport run_sweep(const Sweep& sweep, const std::function<CatalogueScene(con
   const int threads = options.threads > 0
                           ? options.threads
                           : static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
-  const MemberRuns runs(sweep, make_scene, registry, solvers);
+  const MemberRuns runs(sweep, make_scene, registry, solvers, options.goes_on);
   SweepReport report;
   report.method = runs.sweep().error ? "by the error asked for" : runs.sweep().method;
   report.members = sweep.members();

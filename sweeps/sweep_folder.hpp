@@ -16,7 +16,7 @@ struct SweepOptions {
   int threads = 0;           ///< 0: one for each processor
   /// In place of parts: the next number of a block, drawn by all processes from one counter.
   std::function<long()> next_block = {};
-  std::function<bool()> goes_on = {};  ///< false ends it after a member
+  std::function<bool()> goes_on = {};  ///< asked within members too; false ends it
   std::function<void(double done, const std::string& what)> progress =
       {};  ///< of this process's part, 0 to 1
 };

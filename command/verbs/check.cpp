@@ -16,6 +16,7 @@
 #include <diracstep/validation/laws/method_check.hpp>
 #include <diracstep/validation/laws/scene_examination.hpp>
 #include <memory>
+#include <optional>
 
 namespace diracstep::command {
 
@@ -145,6 +146,9 @@ class Examiner {
   }
 
   void take(const std::string& scene) {
+    if (interrupted()) return;
+    std::optional<NothingKept> examining;
+    if (scenes_.empty() && document_.empty()) examining.emplace();
     const CatalogueScene entry = make_scene(session_, scene, parameters(options_.set));
     const Examination examination = examine(entry, session_.registry, session_.solvers);
     if (!examination.passed()) session_.exit_status = failed;

@@ -21,11 +21,19 @@ constexpr double smallest_change = 1e-13;     // of the largest coordinate
 constexpr int max_path_steps = 400;
 constexpr double shortest_path_step = 1e-6;
 
+/// Thrown where the caller asks for the end.
+struct Ended {};
+
 /// Newton's method for q, with v and λ as functions of it.
 class EquilibriumSearch {
  public:
-  EquilibriumSearch(const Scene& scene, const Start& start, bool along_start)
-      : scene_(scene), balance_(scene), time_(start.time), wanted_v_(Vector::Zero(start.v.size())) {
+  EquilibriumSearch(const Scene& scene, const Start& start, bool along_start,
+                    const std::function<bool()>& go_on)
+      : scene_(scene),
+        go_on_(go_on),
+        balance_(scene),
+        time_(start.time),
+        wanted_v_(Vector::Zero(start.v.size())) {
     if (along_start) wanted_v_ = start.v;
     for (Eigen::Index i = 0; i < wanted_v_.size(); ++i)
       if (wanted_v_[i] != 0.0) moving_.push_back(static_cast<int>(i));
@@ -79,6 +87,7 @@ class EquilibriumSearch {
   };
 
   Point evaluate(const Vector& q) {
+    if (go_on_ && !go_on_()) throw Ended{};
     Point point{q, wanted_v_, {}, {}, {}, {}, {}};
     balance_.evaluate(time_, q, wanted_v_);
     const Columns a = balance_.one_forms;
@@ -242,6 +251,7 @@ class EquilibriumSearch {
   }
 
   const Scene& scene_;
+  const std::function<bool()>& go_on_;
   ForceBalance balance_;
   double time_;
   Vector wanted_v_, at_;
@@ -256,7 +266,8 @@ class EquilibriumSearch {
 
 }  // namespace
 
-Equilibrium find_equilibrium(const Scene& scene, const Start& start, bool along_start) {
+Equilibrium find_equilibrium(const Scene& scene, const Start& start, bool along_start,
+                             const std::function<bool()>& go_on) {
   if (scene.space && (along_start || needs_sparse_matrices(scene)))
     throw Misuse("scene '" + scene.name + "' on " + scene.space->name() + ": " +
                  (along_start ? "steady motions are looked for in R^n only, equilibria at rest here too"
@@ -265,13 +276,18 @@ Equilibrium find_equilibrium(const Scene& scene, const Start& start, bool along_
     if (along_start)
       throw Misuse("scene '" + scene.name +
                    "': steady motions are looked for with full matrices, of 2000 at most");
-    return find_sparse_equilibrium(*with_start(scene, start));
+    return find_sparse_equilibrium(*with_start(scene, start), go_on);
   }
   const auto extended = with_start_and_hidden_rows(scene, start);
-  Equilibrium found = EquilibriumSearch(*extended, extended->start, along_start).find();
-  show_multipliers(*extended, found.lambda, found.q);
-  found.lambda.conservativeResize(scene.rows());  // other hidden rows, which stand behind, carry no force
-  return found;
+  try {
+    Equilibrium found = EquilibriumSearch(*extended, extended->start, along_start, go_on).find();
+    show_multipliers(*extended, found.lambda, found.q);
+    found.lambda.conservativeResize(scene.rows());  // other hidden rows, which stand behind, carry no force
+    return found;
+  } catch (const Ended&) {
+    return {start.time, start.q,      Vector::Zero(scene.dimension()), Vector::Zero(scene.rows()),
+            0,          "interrupted"};
+  }
 }
 
 }  // namespace diracstep

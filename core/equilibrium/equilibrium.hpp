@@ -1,6 +1,7 @@
 #pragma once
 
 #include <diracstep/core/system/scene.hpp>
+#include <functional>
 #include <string>
 
 namespace diracstep {
@@ -38,9 +39,11 @@ struct Equilibrium {
 ///
 /// Damped by following Newton's path: a step counts when the residual there is what the path predicts.
 /// Matrices are full up to 2000 coordinates and rows.  Beyond, they are sparse, all rows must be on positions
-/// and independent, the equilibrium isolated, and it cannot be asked for along_start.  Throws Misuse, and
-/// what completed() throws.
-Equilibrium find_equilibrium(const Scene& scene, const Start& start, bool along_start = false);
+/// and independent, the equilibrium isolated, and it cannot be asked for along_start.  `go_on`, where there
+/// is one, is asked before each evaluation; false ends the search with the failure "interrupted".  Throws
+/// Misuse, and what completed() throws.
+Equilibrium find_equilibrium(const Scene& scene, const Start& start, bool along_start = false,
+                             const std::function<bool()>& go_on = {});
 
 /// Whether a scene is too large for full matrices.
 bool needs_sparse_matrices(const Scene& scene);

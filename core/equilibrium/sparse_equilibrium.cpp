@@ -72,10 +72,11 @@ class SparseSearch {
     size_ = q_.lpNorm<Eigen::Infinity>();
   }
 
-  Equilibrium find() {
+  Equilibrium find(const std::function<bool()>& go_on) {
     set_first_multipliers();
     for (; iterations_ < most_iterations; ++iterations_) {
       const Vector residual = residual_at(q_, lambda_);
+      if (go_on && !go_on()) return ended("interrupted", residual);
       if (!residual.allFinite()) return ended("the forces are not finite", residual);
       const SaddleFactors factors(balance_.stiffness, balance_.one_forms, balance_.one_forms);
       if (factors.singular())
@@ -181,10 +182,10 @@ std::shared_ptr<const Scene> with_independent_rows_there(const std::shared_ptr<c
   return dependent.empty() ? scene : with_rows_left_out(scene, dependent);
 }
 
-Equilibrium find_sparse_equilibrium(const Scene& scene) {
+Equilibrium find_sparse_equilibrium(const Scene& scene, const std::function<bool()>& go_on) {
   const auto independent =
       with_independent_rows_there(std::shared_ptr<const Scene>(std::shared_ptr<void>(), &scene));
-  Equilibrium found = SparseSearch(*independent).find();
+  Equilibrium found = SparseSearch(*independent).find(go_on);
   if (!independent->whole) return found;
   const std::string broken = LeftOutRows(*independent).broken_at(found.time, found.q);
   if (!broken.empty())

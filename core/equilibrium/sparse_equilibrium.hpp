@@ -26,8 +26,9 @@ class SaddleFactors {
 /// damped by the natural monotonicity test (Deuflhard, Newton Methods for Nonlinear Problems, 2004, 3.3).
 /// Rows are on positions, or on velocities with constant coefficients; redundant ones are left out, and the
 /// forces are the least ones of all.  The equilibrium is isolated; Equilibrium::failure tells where it is
-/// not.  Throws Misuse for other rows on velocities, which leave more positions than they allow velocities.
-Equilibrium find_sparse_equilibrium(const Scene& scene);
+/// not; `go_on` is asked before each iteration.  Throws Misuse for other rows on velocities, which leave more
+/// positions than they allow velocities.
+Equilibrium find_sparse_equilibrium(const Scene& scene, const std::function<bool()>& go_on = {});
 
 /// The scene itself, or a copy without the rows that are redundant at its start, as with_rows_left_out().
 std::shared_ptr<const Scene> with_independent_rows_there(const std::shared_ptr<const Scene>& scene);

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <diracstep/core/integrator/integrator.hpp>
 #include <diracstep/core/integrator/point_reader.hpp>
@@ -13,6 +14,12 @@
 namespace diracstep {
 
 namespace {
+
+/// Whether anything can be: by a force, or by rows that do work, as those of states.
+bool may_be_damped(const Scene& scene) {
+  return scene.force ||
+         !std::ranges::all_of(scene.constraints, [](const auto& rows) { return rows->workless(); });
+}
 
 /// What a discrete constraint of one's own misses at the start of a step; empty where nothing.
 std::string fault_of_own_rows(const IntegratorOptions& options, const Scene& scene, double t,
@@ -177,6 +184,9 @@ std::string Integrator::broken_left_out_row(const Vector& end) {
 StepReport Integrator::failed(const SolveReport& solve, double time, const std::string& why) const {
   std::ostringstream message;
   message << "step " << work_.steps << " from t = " << time << ": " << why;
+  if (solve.status == SolveStatus::no_convergence && !method().damped && may_be_damped(*scene_))
+    message << "; what is damped much faster than the steps is taken by damped/radau:3, with steps by their "
+               "local error: --method damped/radau:3 --adaptive";
   return {solve, work_.steps, time, message.str()};
 }
 

@@ -92,14 +92,21 @@ void NodeCheck::add_force(const Sample& node, Vector& force, Vector& terms, Vect
   if (rows_.rows() == 0) return;
   rows_.evaluate(node.time, node.q);
   rows_.add_annihilator(node.lambda, force);
-  const Vector sizes = rows_.coefficients().cwiseAbs(), multipliers = node.lambda.cwiseAbs();
+  // A multiplier is known to a part of the largest forces that it balances, on other coordinates too.
+  const Vector sizes = rows_.coefficients().cwiseAbs(), squares = sizes.cwiseAbs2();
+  Vector multipliers = Vector::Zero(rows_.rows()), weights = multipliers;
+  rows_.pattern().multiply_add(sizes.data(), terms.data(), multipliers.data());
+  rows_.pattern().multiply_add(squares.data(), Vector::Ones(n).eval().data(), weights.data());
+  for (Eigen::Index r = 0; r < multipliers.size(); ++r)
+    multipliers[r] = weights[r] > 0.0 ? multipliers[r] / weights[r] : 0.0;
+  multipliers = multipliers.cwiseMax(node.lambda.cwiseAbs());
   rows_.pattern().transposed_multiply_add(sizes.data(), multipliers.data(), terms.data(), 1.0);
 }
 
 void NodeCheck::look_for_rest() {
   if (!text_.empty()) return;
   const Eigen::Index n = scene_.dimension();
-  Vector changes = Vector::Zero(n), impulses = changes, all = changes, noise = changes;
+  Vector changes = Vector::Zero(n), impulses = changes, all = changes, noise = changes, largest = changes;
   Vector force, terms, cancelling;
   for (std::size_t k = 0; k + 1 < window; ++k) {
     const double h = std::abs(nodes_[k + 1].time - nodes_[k].time);
@@ -107,9 +114,11 @@ void NodeCheck::look_for_rest() {
     if (!force.allFinite()) return;
     changes += (nodes_[k + 1].p - nodes_[k].p).cwiseAbs();
     impulses += h * force.cwiseAbs();
+    largest = largest.cwiseMax(h * force.cwiseAbs());
     all += h * terms;
     noise += at_rest * (h * cancelling + nodes_[k].p.cwiseAbs());
   }
+  impulses -= largest;  // of a force that dies out within a step; one that lasts is left at six nodes
   // What has no momentum at all is in balance to round-off of the largest forces on such coordinates.
   const auto momentum_less = [&](Eigen::Index i) { return changes[i] == 0.0 && nodes_.back().p[i] == 0.0; };
   double balancing = 0.0;

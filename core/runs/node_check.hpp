@@ -15,7 +15,8 @@ namespace diracstep {
 ///    damped faster than the step, such as the current of an inductor at a large resistor, comes back with
 ///    its sign reversed by methods that do not damp it;
 ///  * a momentum that stays while a force acts on it,  Σ|Δp_i| < 1e-3 Σ h |F_i|  with
-///    F = ∂L/∂q + f + AᵀΛ: a frozen motion, whose forces have been taken for round-off.
+///    F = ∂L/∂q + f + AᵀΛ, the largest of these left out: a frozen motion, whose forces have been taken for
+///    round-off.  A body that is held still has such a force at its first node at most.
 class NodeCheck {
  public:
   /// For a run of about so many steps; 0 where that is not known: windows then come less and less often.  The

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/core/system/contradictory_rows.hpp>
+#include <diracstep/core/system/detail/poses.hpp>
 #include <diracstep/core/system/redundant_rows.hpp>
 #include <iterator>
 #include <sstream>
@@ -23,6 +24,7 @@ class RowsBesideOthers {
   RowsBesideOthers(const Scene& scene, const std::vector<std::string>& dependent)
       : names_(scene.row_names()),
         n_(scene.dimension()),
+        space_(scene.space.get()),
         rows_(scene.constraints, n_),
         others_(only_holonomic(without_rows(scene, dependent)->constraints)),
         all_(only_holonomic(scene.constraints)) {
@@ -45,14 +47,14 @@ class RowsBesideOthers {
 
   /// Empty, or what contradicts at this time, from a pose near q.
   std::string at(double t, const Vector& near) {
-    const auto pose = pose_near(others_, t, near, {});
+    const auto pose = pose_near_on(space_, others_, t, near, {});
     if (!pose || !pose->allFinite()) return {};
     if (std::string rates = different_rates(t, *pose); !rates.empty()) return rates;
     return no_common_pose(t, *pose);
   }
 
   std::string different_rates_near(double t, const Vector& near) {
-    const auto pose = pose_near(others_, t, near, {});
+    const auto pose = pose_near_on(space_, others_, t, near, {});
     return pose && pose->allFinite() ? different_rates(t, *pose) : std::string();
   }
 
@@ -97,7 +99,7 @@ class RowsBesideOthers {
   std::string no_common_pose(double t, const Vector& q) {
     const double off = distance_of(holonomic_these_, t, q);
     if (!(off > differs)) return {};
-    const auto common = pose_near(all_, t, q, {});
+    const auto common = pose_near_on(space_, all_, t, q, {});
     if (!common || !(distance_of(all_, t, *common) > differs)) return {};
     rows_.evaluate(t, q);
     std::ostringstream text;
@@ -145,6 +147,7 @@ class RowsBesideOthers {
 
   std::vector<std::string> names_, kept_;
   int n_;
+  const Space* space_;
   ConstraintsAtPoint rows_;
   ConstraintBlocks others_, all_, holonomic_these_;
   std::vector<int> these_, those_;
@@ -159,7 +162,8 @@ std::string contradiction(const Scene& scene, const Start& start, const std::vec
   for (int k = -12; k <= 12; ++k) times.push_back(start.time + std::pow(10.0, 0.5 * k));
   for (const double t : times)
     for (const double distance : {0.0, -0.1, 0.1})
-      if (std::string text = rows.at(t, moved(start, distance)); !text.empty()) return text;
+      if (std::string text = rows.at(t, moved_on(scene.space.get(), start, distance)); !text.empty())
+        return text;
   return {};
 }
 

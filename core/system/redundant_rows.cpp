@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <diracstep/core/numerics/scales.hpp>
+#include <diracstep/core/system/detail/poses.hpp>
 #include <diracstep/core/system/detail/sparse_dependence.hpp>
 #include <diracstep/core/system/redundant_rows.hpp>
 #include <optional>
+#include <utility>
 
 namespace diracstep {
 
@@ -59,10 +61,10 @@ std::vector<Columns> one_forms_around(const Scene& scene, const Start& start) {
     return full_one_forms(rows);
   };
   std::vector<Columns> all{at(start.q)};
-  if (scene.space) return all;  // poses around it are looked for in R^n
   const ConstraintBlocks holonomic = only_holonomic(scene.constraints);
   for (const double distance : {-0.3, -0.1, 0.1, 0.3}) {
-    const auto pose = pose_near(holonomic, start.time, moved(start, distance), {});
+    const auto pose = pose_near_on(scene.space.get(), holonomic, start.time,
+                                   moved_on(scene.space.get(), start, distance), {});
     if (!pose) continue;
     if (Columns there = at(*pose); there.allFinite()) all.push_back(std::move(there));
   }
@@ -115,7 +117,6 @@ double distance_from(const ConstraintBlocks& holonomic, double t, const Vector& 
 /// Whether all poses around the start that the other rows allow break the holonomic rows of these names.
 bool broken_by_the_others(const Scene& scene, const Start& start, const std::vector<std::string>& dependent) {
   constexpr double met = 1e-7;
-  if (scene.space) return false;
   const ConstraintBlocks others = only_holonomic(without_rows(scene, dependent)->constraints);
   std::vector<std::string> kept = scene.row_names();
   std::erase_if(
@@ -123,7 +124,8 @@ bool broken_by_the_others(const Scene& scene, const Start& start, const std::vec
   const ConstraintBlocks these = only_holonomic(without_rows(scene, kept)->constraints);
   bool any = false;
   for (const double distance : {-0.1, -0.03, -0.01, 0.01, 0.03, 0.1}) {
-    const auto pose = pose_near(others, start.time, moved(start, distance), {});
+    const auto pose =
+        pose_near_on(scene.space.get(), others, start.time, moved_on(scene.space.get(), start, distance), {});
     if (!pose) continue;
     if (distance_from(these, start.time, *pose) <= met) return false;
     any = true;
@@ -133,20 +135,27 @@ bool broken_by_the_others(const Scene& scene, const Start& start, const std::vec
 
 }  // namespace
 
-Vector moved(const Start& start, double distance) {
+Vector moved(const Start& start, double distance) { return moved_on(nullptr, start, distance); }
+
+Vector moved_on(const Space* space, const Start& start, double distance) {
   const double size = std::max(start.q.lpNorm<Eigen::Infinity>(), 1e-2);
-  Vector q = start.q;
-  for (Eigen::Index i = 0; i < q.size(); ++i)
-    q[i] += distance * size * std::sin(1.0 + 1.7 * static_cast<double>(i));
-  return q;
+  Vector change(space != nullptr ? space->dimension() : start.q.size());
+  for (Eigen::Index i = 0; i < change.size(); ++i)
+    change[i] = distance * size * std::sin(1.0 + 1.7 * static_cast<double>(i));
+  return space != nullptr ? space->moved(start.q, change) : Vector(start.q + change);
 }
 
 std::optional<Vector> pose_near(const ConstraintBlocks& holonomic, double t, Vector q,
                                 const std::vector<int>& held) {
+  return pose_near_on(nullptr, holonomic, t, std::move(q), held);
+}
+
+std::optional<Vector> pose_near_on(const Space* space, const ConstraintBlocks& holonomic, double t, Vector q,
+                                   const std::vector<int>& held) {
   constexpr int most = 50;
   constexpr double small = 1e-10, dependent = 1e-6;
   const double from = q.norm();
-  ConstraintsAtPoint rows(holonomic, static_cast<int>(q.size()));
+  ConstraintsAtPoint rows(holonomic, space != nullptr ? space->dimension() : static_cast<int>(q.size()));
   for (int iteration = 0; rows.rows() > 0 && iteration < most; ++iteration) {
     Vector phi(rows.rows());
     int row = 0;
@@ -162,7 +171,7 @@ std::optional<Vector> pose_near(const ConstraintBlocks& holonomic, double t, Vec
     solver.setThreshold(dependent);
     solver.compute(a);
     const Vector change = solver.solve(phi);
-    q -= change;
+    q = space != nullptr ? space->moved(q, -change) : Vector(q - change);
     if (change.norm() <= small * size_or_one(std::max(from, q.norm()))) return q;
     if (iteration + 1 == most) return std::nullopt;
   }

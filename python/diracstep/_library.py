@@ -6,6 +6,7 @@ import ctypes
 import os
 import sys
 import threading
+import time
 from ctypes import (CFUNCTYPE, POINTER, Structure, byref, c_char_p, c_double, c_int, c_long, c_size_t, c_uint,
                     c_void_p)
 from pathlib import Path
@@ -114,7 +115,7 @@ class Table(Structure):
         width = self.columns
         if not width:
             return []
-        cells = [self.cells[k].decode() for k in range(self.rows * width)]
+        cells = [decoded(self.cells[k]) for k in range(self.rows * width)]
         return [tuple(cells[k:k + width]) for k in range(0, len(cells), width)]
 
 
@@ -168,7 +169,7 @@ class Found(Structure):
 
 
 class Rest(Structure):
-    _fields_ = [("along", c_int), ("modes", c_int), ("nearby", c_int), ("near", c_double)]
+    _fields_ = [("along", c_int), ("modes", c_int), ("nearby", c_int), ("near", c_double), ("stop", POINTER(c_int))]
 
 
 class Equilibrium(Structure):
@@ -307,17 +308,23 @@ lib = _Functions(_load())
 
 def version() -> str:
     """The version of the library, "0.1.0"."""
-    return lib.version().decode()
+    return decoded(lib.version())
 
 
 def check(code: int) -> None:
     """Raises what a code stands for."""
     if code != OK:
-        raise raised(code, lib.message().decode())
+        raise raised(code, decoded(lib.message()))
 
 
 def encoded(text: str | None) -> bytes | None:
-    return None if text is None else text.encode()
+    """Bytes of a path that are no UTF-8, which Python's texts hold as surrogates, become themselves again."""
+    return None if text is None else text.encode("utf-8", "surrogateescape")
+
+
+def decoded(text: bytes | None) -> str:
+    """Bytes that are no UTF-8, as paths and files may hold them, stand as \\xXX."""
+    return (text or b"").decode("utf-8", "backslashreplace")
 
 
 def lines_of(handle: int, what: int) -> list[tuple[str, ...]]:
@@ -343,22 +350,24 @@ class KeptException:
         return kept
 
 
-def call_interruptibly(call: Callable[[], int], stop: c_int,
-                       watch: Callable[[], None] | None = None) -> tuple[int, str]:
+def call_interruptibly(call: Callable[[], int], stop: c_int, watch: Callable[[], None] | None = None,
+                       patience: float | None = None) -> tuple[int, str]:
     """Makes a long call on a thread of its own and waits for it: the code, and the library's message.
 
     Ctrl-C sets the flag ``stop``, which ends the call; a second one is raised as usual, and then the call may outlive this
-    function: ``call`` must keep all that it uses.  ``watch`` is called about ten times a second.
+    function: ``call`` must keep all that it uses.  So does the first one ``patience`` seconds later, of a call that may take long
+    to see the flag.  ``watch`` is called about ten times a second.
     """
     outcome: list[Any] = []
     # Thread.join takes a thread for ended where Ctrl-C comes in it (Python 3.11), and Event.wait may keep its lock then.
     running = threading.Lock()
     running.acquire()
+    asked = 0.0
 
     def work() -> None:
         try:
             code = call()
-            outcome.extend((code, lib.message().decode() if code != OK else ""))  # messages belong to the thread
+            outcome.extend((code, decoded(lib.message()) if code != OK else ""))  # messages belong to the thread
         except BaseException as error:  # noqa: BLE001  of a callback's machinery: raised below, in the caller
             outcome.extend((error, ""))
         running.release()
@@ -370,9 +379,12 @@ def call_interruptibly(call: Callable[[], int], stop: c_int,
             try:
                 if not running.acquire(timeout=0.1) and watch is not None:
                     watch()
+                if asked and patience is not None and time.monotonic() > asked + patience and not outcome:
+                    raise KeyboardInterrupt
             except KeyboardInterrupt:
                 if stop.value != 0:
                     raise
+                asked = time.monotonic()
                 stop.value = 1
     except BaseException:
         stop.value = 1  # the call must not go on by itself

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numbers
 import os
+import re
 import reprlib
 from typing import Any, Mapping, Sequence
 
@@ -64,9 +65,11 @@ def reals(values: Any, what: str) -> dict[str, float]:
 
 
 def text(value: Any, what: str) -> str:
-    """A text."""
+    """A text that C can read: one without NUL, and without surrogates but those that stand for bytes of a path."""
     if not isinstance(value, str):
         raise _refused(value, what, "a text")
+    if re.search("[\0\ud800-\udc7f\udd00-\udfff]", value):
+        raise _refused(value, what, "a text without NUL and without surrogates")
     return value
 
 
@@ -79,9 +82,10 @@ def texts(values: Any, what: str) -> list[str]:
 
 def path(value: Any, what: str) -> str:
     """The path of a file, as a text."""
-    if not isinstance(value, (str, os.PathLike)):
+    given = os.fspath(value) if isinstance(value, (str, os.PathLike)) else None
+    if not isinstance(given, str):
         raise _refused(value, what, "a text or a path")
-    return str(os.fspath(value))
+    return text(given, what)
 
 
 def flag(value: Any, what: str) -> bool:

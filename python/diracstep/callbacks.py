@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Callable, Mapping, Sequence
 import numpy as np
 
 from . import _library as c
+from .arrays import text
 from .errors import CallbackCost, Failure, Misuse
 from .scene_text import arguments_of, scene_name
 
@@ -53,8 +54,8 @@ class CallbackScene:
         self._kept: list[Any] = []  # everything that C points to
         self._n = len(coordinates)
         self._parameters = dict(parameters)
-        self.struct = c.CallbackScene(name=name.encode(), dimension=self._n, start_time=t, end_time=end, step=step)
-        self.struct.coordinates = self._keep((ctypes.c_char_p * self._n)(*(scene_name(entry).encode() for entry in coordinates)))
+        self.struct = c.CallbackScene(name=c.encoded(name), dimension=self._n, start_time=t, end_time=end, step=step)
+        self.struct.coordinates = self._keep((ctypes.c_char_p * self._n)(*(c.encoded(scene_name(entry)) for entry in coordinates)))
         self.struct.start_q, self.struct.start_v = (self._keep(column).ctypes.data_as(c.Numbers) for column in (q, v))
         self.struct.lagrangian = ctypes.pointer(self._keep(c.Function(value=self._scalar(lagrangian))))
         blocks = [self._block(function, q, k) for k, function in enumerate(
@@ -128,7 +129,7 @@ class GeneratingFunction:
     """
 
     def __init__(self, name: str, order: int, function: Callable[..., Any], *, self_adjoint: bool = False) -> None:
-        if not name.startswith("type1/"):
+        if not text(name, "name").startswith("type1/"):
             raise Misuse(f"the name {name!r} does not begin with type1/")
         self.name = name
         self.exceptions = c.KeptException()
@@ -144,7 +145,7 @@ class GeneratingFunction:
                 return self.exceptions.keep(error)
 
         self._value = c.GENERATING_VALUE(value)
-        self._method = c.GeneratingMethod(name=name.encode(), type=1, order=order, flags=1 if self_adjoint else 0, value=self._value)
+        self._method = c.GeneratingMethod(name=c.encoded(name), type=1, order=order, flags=1 if self_adjoint else 0, value=self._value)
         self._list = (ctypes.POINTER(c.GeneratingMethod) * 1)(ctypes.pointer(self._method))
         self.struct = c.Plugin(version=c.PLUGIN_VERSION, size=ctypes.sizeof(c.Plugin), name=f"python_{id(self)}".encode(), methods=1,
                                method=self._list)

@@ -9,8 +9,10 @@ import csv
 import json
 import os
 import shutil
+import signal
 import subprocess
 import tempfile
+import time
 import warnings
 from contextlib import contextmanager
 from pathlib import Path
@@ -18,8 +20,10 @@ from typing import TYPE_CHECKING, Any, Iterator, Mapping, Sequence
 
 import numpy as np
 
-from .arrays import real, table, texts, whole
+from ._library import call_interruptibly
+from .arrays import path, real, table, texts, whole
 from .errors import Doubt, Failure, Misuse, spelled
+from .options import refuse, stop_flag
 
 if TYPE_CHECKING:
     from .scene import Scene
@@ -31,6 +35,9 @@ def _command() -> str:
         raise ImportError("this is done by the command diracstep (Debian package diracstep), which was not found; "
                           "DIRACSTEP_COMMAND may give its path")
     return given
+
+
+_PATIENCE = 5.0  # seconds for the command to keep what it has
 
 
 class Verbs:
@@ -82,15 +89,41 @@ def call_command(verb: str, arguments: Sequence[str], plugins: Sequence[str], na
     """The document that a verb gives; ``name`` stands before a doubt, and paths in ``folder``, which nobody will find, are shown
     without it."""
     loaded = [text for plugin in plugins for text in ("--plugin", os.fspath(plugin))]
-    done = subprocess.run([_command(), verb, *arguments, *loaded, "--json"], capture_output=True, text=True, check=False)
-    told = _told(done.stderr if folder is None else done.stderr.replace(f"{folder}{os.sep}", ""))
-    if done.returncode == 2:
+    status, out, said = _ended([_command(), verb, *arguments, *loaded, "--json"])
+    told = _told(said if folder is None else said.replace(f"{folder}{os.sep}", ""))
+    if status == 2:
         raise Misuse(told)
-    if done.returncode == 3:
+    if status == 3:
         warnings.warn(f"{name}: {told}", Doubt, stacklevel=5)
-    elif done.returncode != 0:
+    elif status != 0:
         raise Failure(told)
-    return json.loads(done.stdout)
+    return json.loads(out)
+
+
+def _ended(words: Sequence[str]) -> tuple[int, str, str]:
+    """Status, output and messages of a process.  Ctrl-C is passed on to it, in a notebook too, whose processes the signal does not
+    come to, so that it keeps what it has; KeyboardInterrupt is raised where it has ended."""
+    stop, ended = stop_flag(), []
+
+    def call() -> int:
+        with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, encoding="utf-8", errors="backslashreplace") as process:
+            told = 0.0
+            while not ended:
+                try:
+                    out, said = process.communicate(timeout=0.05)
+                    ended.append((process.returncode, out, said))
+                except subprocess.TimeoutExpired:
+                    if stop.value and not told:  # twice within 0.1 s, from the terminal too, is once for the command
+                        process.send_signal(signal.SIGINT)
+                        told = time.monotonic()
+                    elif told and time.monotonic() > told + _PATIENCE:
+                        process.kill()
+        return 0
+
+    call_interruptibly(call, stop)
+    if stop.value:
+        raise KeyboardInterrupt(_told(ended[0][2]))
+    return ended[0]
 
 
 def _told(text: str) -> str:
@@ -109,7 +142,7 @@ def sweep(scene: Scene, varied: Varied, recorded: Mapping[str, Sequence[str]], s
         lines += ["[record]", *(f"{what} = {json.dumps(texts(names, _ARGUMENT.get(what, what)))}" for what, names in recorded.items())]
         file = verbs.folder / "sweep.toml"
         file.write_text("\n".join(lines) + "\n", encoding="utf-8")
-        where = Path(out) if out is not None else verbs.folder / "out"
+        where = Path(path(out, "out")) if out is not None else verbs.folder / "out"
         with _reasons_told(where):
             verbs.call("sweep", str(file), "--out", str(where), "--threads", str(threads), *verbs.tolerances(), scene=False)
         return _results(where)
@@ -146,10 +179,13 @@ class Varied:
         for what, given in (("grid", grid), ("table", table), ("random", random), ("sobol", sobol)):
             if not isinstance(given, Mapping):
                 raise Misuse(f"{what} is {given!r}; a dictionary by name of a parameter, \"start.x\" or \"start.v_x\" is needed")
+            texts(list(given), f"the names of {what}")
         if not (grid or table or random or sobol):
             raise Misuse("nothing varies: a sweep needs grid, table, random or sobol")
         if (random or sobol) and count is None:
             raise Misuse("random and sobol need count, the number of draws")
+        if not (random or sobol):
+            refuse({"count": count, "seed": seed or None}, ("count", "seed"), "it is of draws, which random or sobol ask for")
         self._grid = {name: _column(values, name) for name, values in grid.items()}
         self._table = {name: _column(values, name) for name, values in table.items()}
         if len({len(values) for values in self._table.values()}) > 1:
@@ -199,8 +235,8 @@ def sweep_of_file(file: str | os.PathLike[str], *, out: str | os.PathLike[str] |
     page (``report.html``).  threads: 0: one for each processor.  Made by ``diracstep sweep``.
     """
     with tempfile.TemporaryDirectory() as folder:
-        where = Path(out) if out is not None else Path(folder) / "out"
+        file, where = path(file, "file"), Path(path(out, "out")) if out is not None else Path(folder) / "out"
         with _reasons_told(where):
-            call_command("sweep", [os.fspath(file), "--out", str(where), "--threads", str(whole(threads, "threads"))], plugins,
-                         str(file))
+            call_command("sweep", [file, "--out", str(where), "--threads", str(whole(threads, "threads"))], plugins,
+                         file)
         return _results(where)

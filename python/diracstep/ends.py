@@ -115,7 +115,7 @@ def _by_name(scene: Scene, given: Any, what: str) -> dict[str, float]:
 
 def _put(struct: Any, count: str, values: str, numbers: Mapping[str, float]) -> Any:
     """Writes named numbers into a struct; what it then points to."""
-    entries = (c.Parameter * max(1, len(numbers)))(*(c.Parameter(name.encode(), value) for name, value in numbers.items()))
+    entries = (c.Parameter * max(1, len(numbers)))(*(c.Parameter(c.encoded(name), value) for name, value in numbers.items()))
     setattr(struct, count, len(numbers))
     setattr(struct, values, entries)
     return entries
@@ -145,9 +145,9 @@ def boundary_of(scene: Scene, to: Any, start: Any, periodic: bool, until: float 
         code = c.lib.solve_boundary(scene._handle, ctypes.byref(chosen), ctypes.byref(asked.struct), points.reference(),
                                     ctypes.byref(found))
         pairs = _numbers(found.multiplier, (found.multipliers, 2))
-        told.update(method=(found.method or b"").decode(), iterations=found.iterations, residual=found.residual,
-                    doubt=(found.doubt or b"").decode(), other=(found.other or b"").decode(),
-                    action=None if np.isnan(found.action) else found.action, no_action=(found.no_action or b"").decode(),
+        told.update(method=c.decoded(found.method), iterations=found.iterations, residual=found.residual,
+                    doubt=c.decoded(found.doubt), other=c.decoded(found.other),
+                    action=None if np.isnan(found.action) else found.action, no_action=c.decoded(found.no_action),
                     action_gradient=_numbers(found.gradient, (2 * n,)), action_hessian=_numbers(found.hessian, (2 * n, 2 * n)),
                     free_directions=found.free_directions,
                     multipliers=np.empty(0, complex) if pairs is None else pairs[:, 0] + 1j * pairs[:, 1])
@@ -172,9 +172,9 @@ def control_of(scene: Scene, to: Any, start: Any, at_least: Any, at_most: Any, d
                                    points.reference(), ctypes.byref(found))
         times = _numbers(found.control_time, (found.control_points,))
         values = _numbers(found.control_value, (found.control_points, found.controls))
-        told.update(method=(found.method or b"").decode(), iterations=found.iterations, cost=found.cost, residual=found.residual,
-                    end_of_run=found.end_of_run, doubt=(found.doubt or b"").decode(),
-                    control_names=tuple(found.name[k].decode() for k in range(found.controls)),
+        told.update(method=c.decoded(found.method), iterations=found.iterations, cost=found.cost, residual=found.residual,
+                    end_of_run=found.end_of_run, doubt=c.decoded(found.doubt),
+                    control_names=tuple(c.decoded(found.name[k]) for k in range(found.controls)),
                     control_times=np.empty(0) if times is None else times,
                     controls=np.empty((0, found.controls)) if values is None else values)
         return code

@@ -13,6 +13,7 @@ from . import _library as c
 from .arrays import flag, real, whole
 from .errors import Doubt, spelled
 from .integrator import State
+from .options import stop_flag
 
 if TYPE_CHECKING:
     from .scene import Scene
@@ -73,22 +74,39 @@ def equilibrium_of(scene: Scene, along: bool, modes: int | None, near: float | N
     wanted = c.Rest(along=int(flag(along, "along")), modes=0 if modes is None else whole(modes, "modes", 1, 1000))
     if near is not None:
         wanted.nearby, wanted.near = 1, real(near, "near")
-    found = c.Equilibrium()
-    scene._check(c.lib.find_equilibrium(scene._handle, ctypes.byref(wanted), ctypes.byref(found)))
+    stop, told = stop_flag(), []
+    wanted.stop = ctypes.pointer(stop)
+
+    def call() -> int:
+        found = c.Equilibrium()
+        code = c.lib.find_equilibrium(scene._handle, ctypes.byref(wanted), ctypes.byref(found))
+        if code == c.OK:
+            told.append(_copied(scene, found))  # what it points to belongs to this thread
+        return code
+
+    code, message = c.call_interruptibly(call, stop, patience=0.5)
+    if code == c.INTERRUPTED:
+        raise KeyboardInterrupt(message)
+    if code != c.OK:
+        scene._raise(code, message)
+    rest: Equilibrium = told[0]
+    if rest.doubt:
+        warnings.warn(f"{scene.name}: {rest.doubt}", Doubt, stacklevel=3)
+    return rest
+
+
+def _copied(scene: Scene, found: c.Equilibrium) -> Equilibrium:
     n, k, p, u = len(scene._coordinates), found.modes, found.positions, found.velocities
     full = bool(np.isnan(found.near))
     shapes = {"of_positions": (n, p), "of_velocities": (n, u), "drift": (n, p), "mass": (u, u), "damping": (u, u),
               "stiffness": (u, p)}
     matrices = {name.removeprefix("of_"): _numbers(getattr(found, name), *shape) if full else None
                 for name, shape in shapes.items()}
-    rest = Equilibrium(
+    return Equilibrium(
         scene, found.time, _numbers(found.q, scene._widths["q"]), _numbers(found.v, n), _numbers(found.lambda_, len(scene._rows)),
         found.iterations, _numbers(found.eigenvalue, k, 2).view(complex).reshape(k), _numbers(found.shape, k, n, 2).view(complex).reshape(k, n),
-        found.zeros, found.stability.decode(), None if full else found.near, found.variation, spelled(found.doubt.decode()),
+        found.zeros, c.decoded(found.stability), None if full else found.near, found.variation, spelled(c.decoded(found.doubt)),
         found.redundant_rows, **matrices)
-    if rest.doubt:
-        warnings.warn(f"{scene.name}: {rest.doubt}", Doubt, stacklevel=3)
-    return rest
 
 
 def start_of(scene: Scene) -> SolvedStart:

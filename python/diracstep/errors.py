@@ -9,8 +9,22 @@ if TYPE_CHECKING:
     from .run import Points
 
 
+_LONGEST_WORD = 1000  # characters of one that is shown whole
+
+
+def shown(text: str) -> str:
+    """Text of unknown origin as it may be shown: control characters and marks that reorder text as \\uXXXX, bytes that are no UTF-8
+    as \\xXX, of a word of many thousand letters its beginning."""
+    text = re.sub("[\udc80-\udcff]", lambda byte: f"\\x{ord(byte[0]) - 0xdc00:02x}", text)
+    text = re.sub("[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-\udfff]", lambda letter: f"\\u{ord(letter[0]):04x}", text)
+    return re.sub(rf"\S{{{_LONGEST_WORD},}}", lambda word: f"{word[0][:100]}… ({len(word[0])} characters)", text)
+
+
 class Error(Exception):
     """Base of the exceptions of this package; the text is the library's."""
+
+    def __init__(self, text: str = "") -> None:
+        super().__init__(shown(text))
 
 
 class Misuse(Error, ValueError):
@@ -40,10 +54,12 @@ class CallbackCost(UserWarning):
 
 def spelled(text: str) -> str:
     """A text of the library or of the command, with options as they are spelled here: --max-time is max_time."""
+    text = shown(text)
     text = text.replace('--drop-redundant, redundant = "drop" in a scene file, or IntegratorOptions::drop_redundant_rows',
                         'drop_redundant=True, or redundant = "drop" in a scene file')
     text = text.replace("; Space::normalised() makes them so", "")
     text = text.replace("(option `fixed`)", "(adaptive=False)")
+    text = text.replace("--method damped/radau:3 --adaptive", 'method="damped/radau:3", adaptive=True')
     text = re.sub(r"(?:set )?IntegratorOptions::(\w+)", r"\1=True", text)
     return re.sub(r"(?<![\w-])--([a-z][a-z-]*)", lambda option: option[1].replace("-", "_"), text)
 

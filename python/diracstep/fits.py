@@ -56,11 +56,11 @@ def _columns(data: Mapping[str, Any]) -> tuple[list[str], np.ndarray, np.ndarray
 
 
 def _pairs(numbers: Mapping[str, float]) -> Any:
-    return (c.Parameter * max(1, len(numbers)))(*(c.Parameter(name.encode(), value) for name, value in numbers.items()))
+    return (c.Parameter * max(1, len(numbers)))(*(c.Parameter(c.encoded(name), value) for name, value in numbers.items()))
 
 
 def _names(names: Sequence[str]) -> Any:
-    return (ctypes.c_char_p * max(1, len(names)))(*(name.encode() for name in names))
+    return (ctypes.c_char_p * max(1, len(names)))(*(c.encoded(name) for name in names))
 
 
 def fit_of(scene: Scene, data: Any, parameters: Sequence[str], start: Any, sigma: Any, confidence: float, max_motions: int,
@@ -68,7 +68,7 @@ def fit_of(scene: Scene, data: Any, parameters: Sequence[str], start: Any, sigma
     wanted, flag = c.Data(), stop_flag()
     wanted.stop = ctypes.pointer(flag)
     if isinstance(data, (str, os.PathLike)):
-        wanted.file = os.fsencode(path(data, "data"))
+        wanted.file = c.encoded(path(data, "data"))
     elif isinstance(data, Mapping):
         names, times, values = _columns(data)
         wanted.columns, wanted.column, wanted.rows = len(names), _names(names), len(times)
@@ -92,8 +92,8 @@ def fit_of(scene: Scene, data: Any, parameters: Sequence[str], start: Any, sigma
             value, interval = (np.ctypeslib.as_array(numbers, (count,)).tolist() for numbers in (found.value, found.interval))
             told.update(parameters=dict(zip(fitted, value)), intervals=dict(zip(fitted, interval)),
                         covariance=np.ctypeslib.as_array(found.covariance, (count, count)).copy(), residual=found.residual,
-                        measured=found.measured, motions=found.motions, ending=found.ending.decode(),
-                        doubt=spelled(found.doubt.decode()))
+                        measured=found.measured, motions=found.motions, ending=c.decoded(found.ending),
+                        doubt=spelled(c.decoded(found.doubt)))
         return code
 
     code, message = c.call_interruptibly(call, flag)

@@ -117,7 +117,7 @@ class Integrator:
             code = self._step(self._handle, count)
             if code == _OK:
                 return
-            message = c.lib.message().decode()
+            message = c.decoded(c.lib.message())
         self.scene._raise(code, message)
 
     def push(self, force: Any) -> None:
@@ -140,7 +140,7 @@ class Integrator:
         read = c.State(**{name: array.ctypes.data for name, array in columns.items()})
         with self._lock:
             self._check(c.lib.read(self._handle, momentum_from(momentum), ctypes.byref(read)))
-            doubt = c.lib.doubt(self._handle).decode()
+            doubt = c.decoded(c.lib.doubt(self._handle))
         if doubt and doubt != self._told:
             self._told = doubt
             warnings.warn(f"{self.scene.name}: {spelled(doubt)}", Doubt, stacklevel=2)
@@ -217,7 +217,7 @@ class Integrator:
 
     @staticmethod
     def _derivatives(steps: int, parameters: Sequence[str]) -> Any:
-        names = (ctypes.c_char_p * max(1, len(parameters)))(*(name.encode() for name in parameters))
+        names = (ctypes.c_char_p * max(1, len(parameters)))(*(c.encoded(name) for name in parameters))
         return c.Derivatives(steps=whole(steps, "steps", 1), parameters=len(parameters), parameter=names)
 
     def _differentiate(self, wanted: Any) -> None:
@@ -276,14 +276,14 @@ class Integrator:
     def doubt(self) -> str:
         """Empty, or why what was read is not to be believed."""
         with self._lock:
-            return c.lib.doubt(self._handle).decode()
+            return c.decoded(c.lib.doubt(self._handle))
 
     @property
     def statistics(self) -> Statistics:
         """Work since the start."""
         read = c.Statistics()
         self._check(c.lib.read_statistics(self._handle, ctypes.byref(read)))
-        return Statistics(read.method.decode(), read.order, read.step, read.steps, read.solves, read.iterations,
+        return Statistics(c.decoded(read.method), read.order, read.step, read.steps, read.solves, read.iterations,
                           read.residuals, read.jacobians, read.retries, read.smallest, read.largest, read.resets,
                           bool(read.stopped))
 

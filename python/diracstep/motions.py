@@ -12,7 +12,7 @@ from . import _library as c
 from .arrays import address, flag, real, table, whole
 from .errors import Doubt, Interrupted, Misuse, spelled
 from .integrator import Integrator
-from .options import momentum_from, options_from, stop_flag
+from .options import momentum_from, options_from, refuse, refuse_unused, stop_flag
 from .points import Points
 from .progress import Progress
 from .run import Ensemble, Event, Run, Search, Statistics, event_from, search_from
@@ -26,9 +26,11 @@ _ROOM = 1024  # points of a run whose number is not known
 def run_of(scene: Scene, course: Any, times: np.ndarray, until: float | None, options: dict[str, Any],
            progress: bool | None) -> Run:
     """A run along a course, which shows these times if there are any."""
+    refuse_unused(options, max_steps=True)
     counted, at_times = course.steps > 0, times.size > 0
     end = None if counted else _end(scene, until, times, options)
     integrator = Integrator(scene, end, False, options, counted)
+    _require_few(scene, integrator.statistics.step, course.steps, end, options.get("max_steps"))
     room = c.lib.expect(integrator._handle, ctypes.byref(course))
     if room > 2**40:
         raise Misuse(f"{room} points would be kept; take a larger every")
@@ -38,7 +40,7 @@ def run_of(scene: Scene, course: Any, times: np.ndarray, until: float | None, op
                                              course.flag, bar.show)
     taken = integrator.statistics
     return _finished(scene, points, code, message, statistics=taken, doubt=integrator.doubt, events=integrator.events,
-                     again=None if at_times else (end, options, taken.steps))
+                     again=None if at_times else (end, {**options, "max_steps": None}, taken.steps))
 
 
 def search_of(scene: Scene, course: Any, times: np.ndarray, error: float, until: float | None, options: dict[str, Any], max_solves: int,
@@ -48,8 +50,12 @@ def search_of(scene: Scene, course: Any, times: np.ndarray, error: float, until:
             raise Misuse(f"{name} goes with no error: the search finds the steps; max_solves and max_time limit it")
     kind = options.pop("adaptive", None)
     kind = None if kind is None else flag(kind, "adaptive")
+    if kind is False:
+        refuse(options, ("control",), "it is for steps that vary, which adaptive=False excludes")
     request = c.ErrorRequest(error=real(error, "error"), steps=0 if kind is None else 2 if kind else 1,
                              max_solves=whole(max_solves, "max_solves"), max_time=real(max_time, "max_time"))
+    if request.max_time < 0.0:
+        raise Misuse(f"max_time is {request.max_time}; a number of seconds above 0 is needed")
     if times.size:
         until = _end(scene, until, times, {})
     chosen, found = options_from(options, until), c.Found()
@@ -117,11 +123,26 @@ def ensemble_of(scene: Scene, q: Any, v: Any, t: Any, until: float | None, steps
 
 def _end(scene: Scene, until: float | None, times: np.ndarray, options: dict[str, Any]) -> float:
     """Where steps are to lead: as far as the times to show, where that is farther than the end of the scene."""
-    if until is not None or not times.size:
+    if not times.size:
         return scene.until if until is None else real(until, "until")
+    if until is not None:
+        end, last = real(until, "until"), float(times[-1])
+        if abs(last - scene.start_time) > (1.0 + 1e-9) * abs(end - scene.start_time) or (last - scene.start_time) * (end - scene.start_time) < 0.0:
+            raise Misuse(f"at: t = {last:g} lies behind t = {end:g}, the end; until moves it")
+        return end
     last, varies = float(times[-1]), bool(options.get("adaptive") or options.get("eps"))
     inside = (last - scene.start_time) * (scene.until - last) >= 0.0
     return scene.until if inside and not varies else last
+
+
+def _require_few(scene: Scene, step: float, steps: int, end: float | None, most: int | None) -> None:
+    """Raises Misuse where steps of one size would be more than ``max_steps``; those that vary end there by themselves."""
+    if most is None or step == 0.0:
+        return
+    where = "" if end is None else f" lead to t = {end:g}"
+    count = steps if end is None else round(abs((end - scene.start_time) / step))
+    if count > most:
+        raise Misuse(f"{count} steps of {abs(step):g}{where}; max_steps allows {most}")
 
 
 def times_every(scene: Scene, between: float, end: float) -> np.ndarray:

@@ -11,6 +11,7 @@ import numpy as np
 
 from . import _library as c
 from .arrays import real, reals
+from .arrays import text as _text
 from .callbacks import CallbackScene, GeneratingFunction
 from .errors import Failure, raised
 from .opening import checked, source_of
@@ -29,7 +30,7 @@ class OpenedScene:
         self._handle = 0
         self._callbacks = callbacks
         self._tolerances = reals(tolerances, "tolerances")
-        self._changes = {key: real(value, f"the parameter {key}") for key, value in (parameters or {}).items()}
+        self._changes = {_text(key, "the name of a parameter"): real(value, f"the parameter {key}") for key, value in (parameters or {}).items()}
         loaded = checked(plugins, methods, drop_redundant)
         self._methods = loaded["methods"]
         self._again: dict[str, Any] = {"name": name, "text": text, "coordinates": coordinates, "tolerances": self._tolerances,
@@ -82,7 +83,7 @@ class OpenedScene:
 
     def _check(self, code: int) -> None:
         if code != c.OK:
-            self._raise(code, c.lib.message().decode())
+            self._raise(code, c.decoded(c.lib.message()))
 
     def _raise(self, code: int, message: str, run: Points | None = None) -> NoReturn:
         """The exception for a code, with what a callback raised as its cause."""

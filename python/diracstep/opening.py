@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import ctypes
-import os
-import re
 from typing import Any, Mapping, Sequence
 
 from . import _library as c
 from .arrays import flag, path, texts
 from .callbacks import CallbackScene, GeneratingFunction
 from .errors import Misuse
-from .scene_text import scene_name
+from .scene_text import require_names
 
 
 def checked(plugins: Any, methods: Any, drop_redundant: Any) -> dict[str, Any]:
@@ -34,13 +32,13 @@ def source_of(name: str | None, text: str | None, callbacks: CallbackScene | Non
     source = c.Source(name=c.encoded(name), text=c.encoded(text), drop_redundant=int(drop_redundant))
     if callbacks is not None:
         source.callbacks = ctypes.pointer(callbacks.struct)
-    parameters = (c.Parameter * max(1, len(changes)))(*(c.Parameter(key.encode(), value) for key, value in changes.items()))
+    parameters = (c.Parameter * max(1, len(changes)))(*(c.Parameter(c.encoded(key), value) for key, value in changes.items()))
     source.parameters, source.parameter = len(changes), parameters
-    files = (ctypes.c_char_p * max(1, len(plugins)))(*(os.fsencode(file) for file in plugins))
+    files = (ctypes.c_char_p * max(1, len(plugins)))(*(c.encoded(file) for file in plugins))
     source.plugins, source.plugin = len(plugins), files
     linked = (ctypes.POINTER(c.Plugin) * max(1, len(methods)))(*(ctypes.pointer(method.struct) for method in methods))
     source.linked, source.linked_plugin = len(methods), linked
-    own = (c.Parameter * max(1, len(tolerances)))(*(c.Parameter(key.encode(), value) for key, value in tolerances.items()))
+    own = (c.Parameter * max(1, len(tolerances)))(*(c.Parameter(c.encoded(key), value) for key, value in tolerances.items()))
     source.tolerances, source.tolerance = len(tolerances), own
     return source, (parameters, files, linked, own)
 
@@ -55,13 +53,6 @@ def names_of(coordinates: Any) -> list[str]:
         raise Misuse(f"coordinates: {twice[0]!r} stands twice")
     require_names(names, "coordinates")
     return names
-
-
-def require_names(names: Sequence[str], what: str) -> None:
-    """Raises Misuse for a name that formulas cannot have."""
-    for name in names:
-        if not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]*", scene_name(name)):
-            raise Misuse(f"{what}: {name!r} is no name; letters, digits and _ are needed, and no digit first")
 
 
 def parts_of(start: Mapping[str, float], coordinates: Sequence[str]) -> tuple[Any, ...]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Mapping, Sequence
 
 import numpy as np
 
+from . import _library as c
 from .arrays import column, real
 from .errors import Misuse
 from .plan import TextTable
@@ -53,7 +54,7 @@ def event_from(read: Any, widths: Mapping[str, int]) -> Event:
     """A copy of what the library tells of an event."""
     q, v, after_q, after_v = (np.ctypeslib.as_array(column, (widths[what],)).copy() if column else None
                               for column, what in ((read.q, "q"), (read.v, "v"), (read.after_q, "q"), (read.after_v, "v")))
-    return Event(read.name.decode(), read.time, q, v, after_q, after_v, read.impulse)  # type: ignore[arg-type]
+    return Event(c.decoded(read.name), read.time, q, v, after_q, after_v, read.impulse)  # type: ignore[arg-type]
 
 
 @dataclass(frozen=True)
@@ -76,8 +77,8 @@ class Search:
 def search_from(found: Any) -> Search:
     """A copy of what the library tells of a search."""
     heading = ("step", "steps", "solves", "difference", "estimate", "order", "")
-    return Search(found.estimate, found.observed_order, found.method.decode(), found.order, found.step, bool(found.varies),
-                  found.solves, found.reason.decode(), found.warning.decode(), TextTable("", heading, found.runs.lines()), bool(found.stopped))
+    return Search(found.estimate, found.observed_order, c.decoded(found.method), found.order, found.step, bool(found.varies),
+                  found.solves, c.decoded(found.reason), c.decoded(found.warning), TextTable("", heading, found.runs.lines()), bool(found.stopped))
 
 
 @dataclass(frozen=True, repr=False, eq=False)

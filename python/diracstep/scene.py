@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import re
+import reprlib
 from typing import Any, Callable, Mapping, Sequence
 
 import numpy as np
@@ -17,11 +19,11 @@ from .fits import Fit, fit_of
 from .integrator import Integrator
 from .motions import ensemble_of, run_of, search_of, times_every
 from .opened_scene import OpenedScene
-from .opening import names_of, parts_of, require_names
-from .options import course_of
+from .opening import names_of, parts_of
+from .options import course_of, refuse_unused, require_fixed
 from .plan import TextTable
 from .run import Ensemble, Run
-from .scene_text import SceneText, start_values
+from .scene_text import SceneText, require_names, start_values
 from .study import Study, run_study
 
 
@@ -63,6 +65,8 @@ class Scene(OpenedScene):
         coordinates, parameters = names_of(coordinates), reals(parameters, "parameters")
         require_names(list(parameters), "parameters")
         name, description = text(name, "name"), text(description, "description")
+        if not re.fullmatch("[A-Za-z0-9_]+", name):
+            raise Misuse(f"name is {reprlib.repr(name)}; letters of ASCII, digits and _ are needed")
         until, step, t = real(until, "until"), real(step, "step"), real(t, "t")
         if start is not None:
             if q is not None or v is not None or p is not None:
@@ -161,7 +165,8 @@ class Scene(OpenedScene):
         progress: shows a bar (tqdm where installed); without it on long runs only.
         tolerances: {coordinate: absolute tolerance in its unit}, see with_tolerances.
         Further options: method, order, step, rule, solver ("newton", "fixed-point", "automatic", "direct"), jacobian, project_start,
-        substeps, compensated_sums; adaptive, eps (radians of a step), control, smallest_step, max_steps for steps that vary.
+        substeps, compensated_sums; max_steps, beyond which there is a Misuse (a Failure where they vary); adaptive, eps (radians of a
+        step), and with one of them control and smallest_step.  What nothing would read is a Misuse.
         What is left open is chosen as by the command ``diracstep run``: a motion that is damped strongly is stepped by
         damped/radau:3 with steps that vary, unless a step, ``steps`` or ``adaptive=False`` is given.
 
@@ -195,6 +200,9 @@ class Scene(OpenedScene):
         Warns with Doubt where the checks of a run, which go along with at most twenty members, find one not to be believed.
         Ctrl-C ends it with KeyboardInterrupt.
         """
+        require_fixed(options, "an ensemble")
+        if steps is not None and until is not None:
+            raise Misuse(f"until is {until!r}; steps goes with no until: so many steps end where they end")
         return ensemble_of(self, q, v, t, until, steps, threads, momentum, options)
 
     def integrator(self, *, until: float | None = None, pushed: bool = False, **options: Any) -> Integrator:
@@ -203,6 +211,7 @@ class Scene(OpenedScene):
 
         until: where the motion will end: a fixed step is then fitted to it.  pushed: ``push`` will be used.
         """
+        refuse_unused(options)
         return Integrator(self, until, pushed, options)
 
     def boundary(self, to: Any = None, *, start: Any = None, periodic: bool = False, until: float | None = None, guess: Any = None,
@@ -218,6 +227,7 @@ class Scene(OpenedScene):
         Raises Misuse where the conditions are too many or too few; Failure, whose ``run`` is the last iterate, where the search
         does not converge.  Warns with Doubt where the steps are too large.  Ctrl-C ends it with KeyboardInterrupt.
         """
+        require_fixed(options, "a motion between two ends")
         return boundary_of(self, to, start, periodic, until, guess, max_iterations, options)
 
     def control(self, to: Any = None, *, start: Any = None, at_least: Mapping[str, float] | None = None,
@@ -232,6 +242,7 @@ class Scene(OpenedScene):
         Raises Misuse without Ipopt or [control]; Failure, whose ``run`` is the last iterate, where the search does not converge.
         Warns with Doubt where a run with these controls ends elsewhere.  Ctrl-C ends it with KeyboardInterrupt.
         """
+        require_fixed(options, "optimal control")
         return control_of(self, to, start, at_least, at_most, degree, until, guess, tolerance, max_iterations, options)
 
     @property
@@ -255,7 +266,8 @@ class Scene(OpenedScene):
         along: a steady motion, in which coordinates with a velocity at the start keep moving.
         modes: so many, by sparse matrices, the nearest to ``near`` or else the slowest; without both all of them, or ten of a scene
         of more than 2000 coordinates and rows.  Events are not looked for.
-        Raises Failure where none is found; warns with Doubt where the linear equations change until the scene's end.
+        Raises Failure where none is found; warns with Doubt where the linear equations change until the scene's end.  Ctrl-C ends it
+        with KeyboardInterrupt.
         """
         return equilibrium_of(self, along, modes, near)
 
@@ -274,6 +286,7 @@ class Scene(OpenedScene):
         Raises Failure where the search does not end at a least sum of squares; warns with Doubt where what is left is far larger
         than sigma.  Ctrl-C ends it with KeyboardInterrupt.
         """
+        require_fixed(options, "a fit")
         return fit_of(self, data, parameters, start, sigma, confidence, max_motions, options)
 
     def sweep(self, grid: Mapping[str, Sequence[float]] | None = None, record: Sequence[str] = (), *,

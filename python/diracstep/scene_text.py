@@ -6,6 +6,7 @@ import inspect
 import json
 import numbers
 import re
+import reprlib
 import unicodedata
 from typing import Any, Callable, Mapping, Sequence
 
@@ -32,6 +33,13 @@ def scene_name(name: str) -> str:
         else:
             parts.append(f"u{ord(letter):x}")
     return "".join(parts)
+
+
+def require_names(names: Sequence[Any], what: str) -> None:
+    """Raises Misuse for a name that formulas cannot have: no text, or other signs, those that do not print among them."""
+    for name in names:
+        if not isinstance(name, str) or not name.isprintable() or not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]*", scene_name(name)):
+            raise Misuse(f"{what}: {reprlib.repr(name)} is no name; letters, digits and _ are needed, and no digit first")
 
 
 class Symbols:
@@ -121,7 +129,8 @@ class SceneText:
             what = "rows" if index == 0 else f"rows[{index}]"
             traced = self.symbols.traced(function, what)
             if isinstance(traced, Mapping):
-                named = {scene_name(str(name)): row for name, row in traced.items()}
+                require_names(list(traced), what)
+                named = {scene_name(name): row for name, row in traced.items()}
             else:
                 listed = list(traced) if isinstance(traced, (list, tuple, np.ndarray)) and np.ndim(traced) > 0 else [traced]
                 count = sum(table == "rows" for table, _ in self._keys)
@@ -137,6 +146,7 @@ class SceneText:
     def add_invariants(self, invariants: Mapping[str, Formula]) -> None:
         if not isinstance(invariants, Mapping):
             raise Misuse(f"invariants is {type(invariants).__name__}; a dictionary of functions by name is needed")
+        require_names(list(invariants), "invariants")
         for name, function in invariants.items():
             self._add("invariants", scene_name(name), _one(self.symbols.traced(function, f"invariant {name}"), f"invariant {name}"))
 

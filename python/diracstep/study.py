@@ -70,6 +70,8 @@ def _listed(values: Any, what: str) -> list[Any]:
 
 def run_study(scene: Scene, *, methods: Sequence[str], orders: Sequence[int], steps: Sequence[float], rtols: Sequence[float],
               until: float | None, ida: bool, erk: bool, repeat: int, budget: float) -> Study:
+    if rtols is not None and len(_listed(rtols, "rtols")) and not (ida or erk):
+        raise Misuse(f"rtols is {rtols!r}; it holds tolerances of IDA and the explicit code, which ida=False and erk=False leave out")
     arguments = ["--repeat", str(whole(repeat, "repeat", 1)), "--budget", repr(real(budget, "budget"))]
     given = {"methods": texts(methods, "methods"), "orders": [str(whole(order, "orders", 1)) for order in _listed(orders, "orders")],
              "steps": [repr(real(step, "steps")) for step in _listed(steps, "steps")],

@@ -19,6 +19,32 @@ bool is_reserved(std::string_view name) {
          std::ranges::any_of(functions, is, &Function::name);
 }
 
+std::string Symbols::velocity_text(int family) const {
+  const auto number = static_cast<std::size_t>(family);
+  if (components.empty()) return "v_" + families[number].name;
+  const auto component =
+      std::ranges::find(components, family, [](const auto& entry) { return entry.second; });
+  const std::string name = "v_" + component->first;
+  for (const auto& [entry, text] : entries)
+    if (entry.starts_with("w_") && text.text == name)
+      return entry + " (" + name + ", in the body frame of " + entry.substr(2, entry.find('[') - 2) + ")";
+  return name;
+}
+
+std::string Symbols::velocity_meant(std::string_view name) const {
+  if (!name.starts_with("v_")) return {};
+  for (const auto& [velocity, indices] : indexed) {
+    if (!velocity.starts_with("w_")) continue;
+    const std::string_view group = std::string_view(velocity).substr(2), rest = name.substr(2);
+    if (rest != group && !(rest.starts_with(group) && rest[group.size()] == '_')) continue;
+    std::string list;
+    for (const auto& [entry, text] : entries)
+      if (entry.starts_with(velocity + '[')) list += (list.empty() ? "" : ", ") + entry;
+    return "; the velocity of " + std::string(group) + ", in its body frame, is " + list;
+  }
+  return {};
+}
+
 Node FormulaParser::formula(const FormulaText& text, const Context& context) {
   return Reader(*this, text, context).whole_formula();
 }

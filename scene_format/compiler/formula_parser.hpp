@@ -63,6 +63,11 @@ struct Symbols {
     return found == components.end() ? none : found->second;
   }
   int parameter(const std::string& name) const { return number(parameter_numbers, name); }
+  /// The velocity that a family stands for, as a file writes it: "v_x", and on groups and spheres "w_R[1]
+  /// (v_R_1, in the body frame of R)".
+  std::string velocity_text(int family) const;
+  /// Empty, or how to write the velocity of a group or a sphere that "v_R" or "v_R_w" means.
+  std::string velocity_meant(std::string_view name) const;
 
   using Numbers = std::unordered_map<std::string, int>;
   static int number(const Numbers& numbers, const std::string& name) {

@@ -122,14 +122,15 @@ class FileKinks final : public Kinks {
         2L, static_cast<long>(std::min({std::max(wanted, double{samples}), most, double{most_samples}})));
   }
 
-  /// Where event r changes its sign between a and b.
+  /// Where event r changes its sign between a and b, to round-off of that time: a step that begins there is
+  /// not to find it again.
   double zero(Eigen::Index r, double a, double at_a, double b, double at_b) const {
     const int before = sign_of(at_a);
     const auto passed = [&](double t) { return sign_of(events_.at(t)[r]) != before; };
     const double guess = a + (b - a) * (at_a / (at_a - at_b));  // exact where the event is affine in t
-    const double margin = round_off * std::max(std::abs(a), std::abs(b));
+    const double margin = round_off * std::abs(guess);
     if (guess > a && guess < b && !passed(guess - margin) && passed(guess + margin)) return guess;
-    for (int i = 0; i < 200 && b - a > margin; ++i) {
+    for (int i = 0; i < 200 && b - a > round_off * std::max(std::abs(a), std::abs(b)); ++i) {
       const double middle = a + (b - a) / 2.0;
       (passed(middle) ? b : a) = middle;
     }

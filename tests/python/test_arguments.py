@@ -70,6 +70,21 @@ RUN = [
     ({"progress": 3}, "progress is 3; True or False"),
     ({"tolerances": 3}, "tolerances is 3; a dictionary"),
     ({"at": "abc"}, "at is of type"),
+    ({"max_steps": 0}, "max_steps is 0; at least 1"),
+    ({"max_steps": 3, "until": 2.0}, "20 steps of 0.1 lead to t = 2; max_steps allows 3"),
+    ({"max_steps": 3, "steps": 4}, "4 steps of 0.1; max_steps allows 3"),
+    ({"max_steps": 3, "at": [0.5, 1.0]}, "max_steps allows 3"),
+    ({"control": "in-step"}, "control is 'in-step'; it is for steps that vary; adaptive=True or eps makes"),
+    ({"control": "in-step", "adaptive": False}, "control is 'in-step'; it is for steps that vary"),
+    ({"control": "in-step", "adaptive": False, "error": 1e-6}, "control is 'in-step'.*which adaptive=False excludes"),
+    ({"smallest_step": 1e-3}, "smallest_step is 0.001; it is for steps that vary"),
+    ({"smallest_step": -1e-3, "eps": 0.2}, "smallest_step is -0.001; 0 or more"),
+    ({"at": [0.5, 2.0], "until": 1.0}, "at: t = 2 lies behind t = 1, the end; until moves it"),
+    ({"at": [-0.5], "until": 1.0}, "at: t = -0.5 lies behind t = 1"),
+    ({"at": [0.5, 2.0], "until": 1.0, "adaptive": True}, "at: t = 2 lies behind t = 1"),
+    ({"at": [0.5], "every": 2}, "every is 2; it counts steps"),
+    ({"every_time": 0.5, "every": 2}, "every is 2; it counts steps"),
+    ({"error": 1e-6, "max_time": -1.0}, "max_time is -1.0; a number of seconds above 0"),
 ]
 
 
@@ -162,3 +177,93 @@ def test_steps_of_another_size_are_counted(spring):
     integrator = spring.integrator(step=0.1)
     integrator.step(3, size=0.05)
     assert integrator.time == pytest.approx(0.15)
+
+
+def test_steps_of_a_size_are_as_few_as_is_asked_for(spring):
+    assert len(spring.run(max_steps=20, until=2.0)) == 21
+    run = spring.run(max_steps=4, steps=4)
+    assert run.jacobian().q.shape == (1, 2)  # which goes on without the limit
+    with pytest.raises(ds.Failure, match="3 steps did not reach the end"):
+        spring.run(adaptive=True, max_steps=3)
+
+
+VARYING = {"eps": 0.2, "control": "in-step", "smallest_step": 1e-3, "max_steps": 9}
+
+
+@pytest.mark.parametrize("what", [*VARYING, "adaptive"])
+def test_what_takes_steps_of_one_size_refuses_the_others(spring, what):
+    option = {what: VARYING.get(what, True)}
+    for call, told in ((lambda: spring.boundary({"x": 0.5}, until=1.0, **option), "a motion between two ends"),
+                       (lambda: spring.control({"x": 0.5}, until=1.0, **option), "optimal control"),
+                       (lambda: spring.fit({"t": [0.1], "x": [0.9]}, ["k"], **option), "a fit"),
+                       (lambda: spring.ensemble([[1.0]], until=1.0, **option), "an ensemble")):
+        with pytest.raises(ds.Misuse, match=f"^{what} is .*; {told} takes steps of one size"):
+            call()
+    if what not in ("eps", "adaptive"):
+        with pytest.raises(ds.Misuse, match=f"^{what} is .*; it is for steps that vary"):
+            spring.integrator(**option)
+
+
+def test_what_nothing_would_read_is_refused(spring):
+    for call, words in ((lambda: spring.ensemble([[1.0]], until=1.0, steps=3), "until is 1.0; steps goes with no until"),
+                        (lambda: spring.sweep({"k": [1.0]}, ["x"], count=3), "count is 3; it is of draws"),
+                        (lambda: spring.sweep({"k": [1.0]}, ["x"], seed=3), "seed is 3; it is of draws"),
+                        (lambda: spring.study(rtols=[1e-6], ida=False, erk=False), r"rtols is \[1e-06\].*leave out")):
+        with pytest.raises(ds.Misuse, match=words):
+            call()
+
+
+LATIN = "f\udcff"  # a path with the byte ff
+
+
+def test_bytes_that_are_no_text(tmp_path, spring):
+    file = tmp_path / (LATIN + ".toml")
+    file.write_text(spring.text)
+    assert len(ds.load(file).run(steps=2)) == 3
+    file.write_text(spring.text + "zz = 1")
+    other = tmp_path / "latin.toml"
+    other.write_bytes(spring.text.replace("spring", "fêler").encode("latin-1"))
+    data = tmp_path / (LATIN + ".csv")
+    data.write_bytes(b"t,x\xfc\n0.1,2\n")
+    for call, words in ((lambda: ds.load(file), r"f\\xff.toml:\d+:1: unknown key 'zz'"),
+                        (lambda: ds.load(other), "latin.toml:1:9: .*utf-8"),
+                        (lambda: ds.load(tmp_path / (LATIN + "g.toml")), r"f\\xffg.toml' cannot be read"),
+                        (lambda: ds.load(LATIN), r"unknown scene 'f\\xff'"),
+                        (lambda: spring.run(method=LATIN), r"unknown method 'f\\xff'"),
+                        (lambda: spring.fit(data, ["k"]), r"f\\xff.csv': the column 'x\\xfc'"),
+                        (lambda: spring.with_tolerances({LATIN: 1.0}), r"no coordinate 'f\\xff'"),
+                        (lambda: spring.boundary({LATIN: 1.0}), r"'f\\xff' is no coordinate"),
+                        (lambda: ds.load("knife_edge", plugins=[LATIN + ".so"]), r"plugin 'f\\xff.so'"),
+                        (lambda: spring.study(methods=[LATIN]), r"unknown method 'f\\xff'"),
+                        (lambda: ds.sweep(LATIN + ".toml"), r"f\\xff.toml' cannot be read")):
+        with pytest.raises(ds.Misuse, match=words):
+            call()
+
+
+def test_a_text_with_an_end_in_its_midst_is_refused(spring):
+    for call in (lambda name: ds.load(name), lambda name: ds.load("knife_edge", **{name: 1.0}), lambda name: ds.parse(name),
+                 lambda name: ds.load("knife_edge", plugins=[name]), lambda name: spring.run(method="type1/gl:3" + name),
+                 lambda name: spring.with_tolerances({"x" + name: 1.0}), lambda name: spring.boundary({"x" + name: 1.0}),
+                 lambda name: spring.fit({"t": [0.1], "x" + name: [0.9]}, ["k"]), lambda name: spring.fit(name, ["k"]),
+                 lambda name: spring.run(steps=2).jacobian(["k" + name]), lambda name: spring.study(methods=[name]),
+                 lambda name: spring.sweep({"k" + name: [1.0]}, ["x"]), lambda name: spring.sweep({"k": [1.0]}, ["x"], out=name),
+                 lambda name: ds.sweep(name), lambda name: ds.Scene(["x"], lagrangian, name=name),
+                 lambda name: ds.GeneratingFunction("type1/" + name, 1, lambda L, q0, q1, h, t: 0.0)):
+        for name in ("\0zz", "\ud800"):
+            with pytest.raises(ds.Misuse, match=r"\\x00zz|\\ud800"):
+                call(name)
+
+
+@pytest.mark.parametrize("name", ["", "  ", "x\ny", "\u202ex", "x\udcff", 3])
+def test_names_are_of_letters_that_print(name):
+    for scene in ({"coordinates": [name]}, {"name": name}, {"name": name, "callback": True},
+                  {"rows": lambda v: {name: v.x}}, {"invariants": {name: lagrangian}}, {"parameters": {name: 1.0}}):
+        with pytest.raises(ds.Misuse) as told:
+            ds.Scene(**{"coordinates": ["x"], "lagrangian": lagrangian, **scene})
+        assert str(told.value).isprintable()
+
+
+def test_messages_are_fit_to_be_shown(spring):
+    for name, shown in (("\x1b[31m", r"'\\u001b\[31m'"), ("a\u202eb", r"'a\\u202eb'"), ("a" * 5000, r"'a{99}… \(5002 characters\)")):
+        with pytest.raises(ds.Misuse, match="unknown scene " + shown):
+            ds.load(name)

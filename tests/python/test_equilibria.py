@@ -86,7 +86,7 @@ def test_a_fit_finds_planted_parameters(spring, tmp_path):
     ({"t": [1.0], "x": [1.0]}, {"parameters": ["m"]}, "'m'"), ({"t": [1.0], "x": [1.0]}, {"parameters": []}, "no parameter"),
     ({"t": [1.0], "x": [1.0]}, {"parameters": "k"}, "a list of texts"), ({"t": [1.0], "x": [1.0]}, {"start": {"m": 1.0}}, "'m'"),
     ({"t": [1.0], "x": [1.0]}, {"sigma": {"y": 1.0}}, "sigma: 'y'"), ({"t": [1.0], "x": [1.0]}, {"confidence": 95}, "confidence"),
-    ({"t": [1.0, 2.0], "x": [1.0, 2.0]}, {"adaptive": True}, "fixed size"), ({"t": [1.0], "x": [1.0]}, {"colour": 1}, "'colour'"),
+    ({"t": [1.0, 2.0], "x": [1.0, 2.0]}, {"adaptive": True}, "one size"), ({"t": [1.0], "x": [1.0]}, {"colour": 1}, "'colour'"),
 ])
 def test_what_cannot_be_fitted_is_refused_with_the_reason(spring, data, changes, words):
     with pytest.raises(ds.Misuse, match=words):

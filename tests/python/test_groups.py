@@ -79,3 +79,31 @@ def test_a_start_that_is_no_rotation_is_refused(top, q, words):
         top.integrator(step=0.001).reset(q=q)
     with pytest.raises(ds.Misuse, match=words):
         top.ensemble([q], steps=1)
+
+
+def turning(rows=""):
+    return ('name = "turning"\nlagrangian = "(w_R[1]^2 + w_R[2]^2 + w_R[3]^2 + v_x^2)/2 - R[3,3]"\n'
+            '[coordinates]\nR = "SO3"\nx = {}\n[start]\nR = { axis = [1, 0, 0], angle = 0.3 }\nv_x = 1\n[span]\nend = 0.5\nstep = 0.05\n' + rows)
+
+
+def row(equation, name="r"):
+    return f'[[rows]]\nname = "{name}"\nequation = "{equation} = 0"\n'
+
+
+@pytest.mark.parametrize("equation, words", [
+    ("w_R[1]*v_x", r"row 'r' is not linear in w_R\[1\] \(v_R_1, in the body frame of R\)"), ("v_x^2", "row 'r' is not linear in v_x;"),
+    ("v_R_w", r"unknown name 'v_R_w' in row 'r'; the velocity of R, in its body frame, is w_R\[1\], w_R\[2\], w_R\[3\]"),
+    ("v_R[1]", r"unknown name 'v_R' in row 'r'; the velocity of R"),
+])
+def test_messages_name_velocities_as_files_write_them(equation, words):
+    with pytest.raises(ds.Misuse, match=words):
+        ds.parse(turning(row(equation)))
+
+
+def test_redundant_rows_are_left_out_where_they_stay_so():
+    tilted = row("R[3,3] - cos(0.3)")
+    once, twice = ds.parse(turning(tilted)).run(), ds.parse(turning(tilted + row("2*R[3,3] - 2*cos(0.3)", "r2"))).run()
+    assert np.allclose(once.q, twice.q, atol=1e-12) and twice.lambda_.shape == (len(twice), 2)
+    # Turned about the first axis alone, R[1,1] = 1 is where all its derivatives vanish.
+    with pytest.raises(ds.Misuse, match="'r'; not so at poses near it: the start is singular"):
+        ds.parse(turning(row("R[1,1] - 1"))).run()

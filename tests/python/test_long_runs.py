@@ -170,3 +170,21 @@ def test_ctrl_c_ends_derivatives(derivatives):
     assert time.perf_counter() - begin < 10.0 and integrator.time > 0.0
     integrator.reset()
     assert np.isfinite(integrator.gradient(3, {"q": [1.0, 0.0, 0.0]}).q).all()
+
+
+def test_ctrl_c_ends_an_equilibrium_by_full_matrices():
+    chain = ds.load("hanging_chain", N=200)
+    timer, begin = interrupt_soon(0.3), time.monotonic()
+    with pytest.raises(KeyboardInterrupt):
+        chain.equilibrium()
+    timer.join()
+    assert time.monotonic() - begin < 3.0
+    assert ds.load("hanging_chain", N=2).equilibrium().modes.shape == (2, 4)
+
+
+def test_ctrl_c_comes_to_the_command_which_keeps_what_it_has(skate, tmp_path):
+    timer, begin = interrupt_soon(1.0), time.monotonic()  # of this process alone, as in a notebook
+    with pytest.raises(KeyboardInterrupt, match="finished blocks are kept"):
+        skate.sweep({"g_sin_alpha": list(np.linspace(0.5, 0.6, 10))}, ["x"], until=4000.0, step=0.001, out=tmp_path / "out")
+    timer.join()
+    assert time.monotonic() - begin < 6.0 and (tmp_path / "out" / "sweep.json").exists()

@@ -198,3 +198,18 @@ step = 1e-4
     integrator = scene.integrator()
     integrator.step()
     assert integrator.state().lambda_.shape == (len(scene.rows),)
+
+
+def test_a_body_that_is_held_still_is_not_doubted():
+    # What pulls at it acts for 1e-5 of the first step, until the brake has taken it up: v = −g/c.
+    held = ds.Scene(["y"], lambda q, v: v.y**2 / 2 - 9.81 * q.y, force=lambda v: {"y": -1e5 * v.y}, until=1.0, step=0.01)
+    run = held.run(method="damped/radau:3", adaptive=False)
+    assert run.doubt == "" and run["v_y"][-1] == pytest.approx(-9.81e-5, rel=1e-12)
+
+
+def test_a_lag_too_fast_for_the_steps_is_told_where_it_runs():
+    lag = ds.parse('name = "lag"\nlagrangian = "v_x^2/2"\n[coordinates]\nx = {}\n[states]\ny = { rate = "(sin(t) - y)/1e-9" }\n[span]\n'
+                   'end = 1\nstep = 0.01\n')
+    with pytest.raises(ds.Failure, match='by damped/radau:3, .*method="damped/radau:3", adaptive=True'):
+        lag.run(method="type1/gl:3")
+    assert lag.run(method="damped/radau:3", adaptive=True)["y"][-1] == pytest.approx(np.sin(1.0), rel=1e-6)

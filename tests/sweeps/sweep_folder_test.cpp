@@ -95,9 +95,8 @@ TEST_F(SweepFolder, TheResultsAreTheSameBytesForAnyDistribution) {
 TEST_F(SweepFolder, GoesOnWithWhatIsMissing) {
   const Sweep sweep = orbit_sweep();
   (void)run(sweep, {.folder = path("whole")});
-  long asked = 0;
   SweepOptions ended{.folder = path("ended"), .threads = 1};
-  ended.goes_on = [&] { return ++asked < 8; };
+  ended.goes_on = [&] { return !std::filesystem::exists(path("ended/blocks/000000000000.csv")); };
   const SweepReport first = run(sweep, ended);
   EXPECT_FALSE(first.complete);
   EXPECT_GT(first.done, 0);
@@ -107,6 +106,14 @@ TEST_F(SweepFolder, GoesOnWithWhatIsMissing) {
   EXPECT_EQ(second.run_here, 12 - first.done);
   EXPECT_EQ(results("ended"), results("whole"));
   EXPECT_EQ(run(sweep, {.folder = path("ended")}).run_here, 0);
+}
+
+TEST_F(SweepFolder, EndsWithinAMember) {
+  long asked = 0;
+  SweepOptions ended{.folder = path("ended"), .threads = 1};
+  ended.goes_on = [&] { return ++asked < 3; };  // before the first member, at its start, at its next node
+  EXPECT_EQ(run(orbit_sweep(), ended).done, 0);
+  EXPECT_LE(asked, 6);
 }
 
 TEST_F(SweepFolder, ADamagedBlockIsRunAgain) {

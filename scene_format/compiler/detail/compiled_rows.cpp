@@ -143,11 +143,10 @@ std::vector<Node> SceneCompiler::require_linear(const SceneFunction& function, c
       const Node slope = graph_.derivative(piece.outputs[r], leaf);
       if (!has_velocity(std::span(&slope, 1))) continue;
       const RowGroup& group = function.groups[static_cast<std::size_t>(piece.groups[r])];
-      const std::string& name = symbols_.families[static_cast<std::size_t>(graph_[leaf].a)].name;
       fail(group.place,
-           fmt::format("row '{}' is not linear in v_{}; expected A(q,t) v + b(q,t) = 0 or, without "
+           fmt::format("row '{}' is not linear in {}; expected A(q,t) v + b(q,t) = 0 or, without "
                        "velocities, f(q,t) = 0",
-                       group.name, name));
+                       group.name, symbols_.velocity_text(graph_[leaf].a)));
     }
     offsets = graph_.substitute(offsets, leaf, graph_.number(0.0));
   }

@@ -186,8 +186,11 @@ std::vector<std::string> FormulaParser::Reader::known_names() const {
   if (context_.time) names.emplace_back("t");
   for (const auto& family : symbols_.families) {
     if (context_.positions) names.push_back(family.name);
-    if (context_.second != 0) names.push_back(std::string(1, context_.second) + '_' + family.name);
+    if (context_.second != 0 && symbols_.components.empty())
+      names.push_back(std::string(1, context_.second) + '_' + family.name);
   }
+  for (const auto& [name, component] : symbols_.components)
+    if (context_.second != 0) names.push_back(std::string(1, context_.second) + '_' + name);
   if (context_.motion)
     for (const auto& row : symbols_.rows) names.push_back("lambda_" + row);
   for (const auto& parameter : symbols_.parameters) names.push_back(parameter.name);

@@ -118,7 +118,9 @@ Node FormulaParser::Reader::named(std::size_t place, const std::string& name) {
   if (name.size() > 2 && name[1] == '_' && (name[0] == 'v' || name[0] == 'p'))
     if (const Node node = coordinate(place, name, Role::second); node != none) return node;
   if (const Node node = force(name); node != none) return node;
-  fail(place, "unknown name '" + name + "' in " + context_.what + suggestion(name, known_names()));
+  const std::string velocity = symbols_.velocity_meant(name);
+  fail(place, "unknown name '" + name + "' in " + context_.what +
+                  (velocity.empty() ? suggestion(name, known_names()) : velocity));
 }
 
 /// lambda_ROW.
