@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstdint>
 #include <diracstep/scene_format/compiler/formula_graph.hpp>
+#include <diracstep/scene_format/compiler/memory_pool.hpp>
 #include <diracstep/scene_format/compiler/operations.hpp>
 #include <utility>
 
@@ -190,17 +191,26 @@ Node FormulaGraph::raise(Node a, Node exponent) {
   return fold({Op::pow, a, exponent});
 }
 
+namespace {
+
+struct Searches {
+  std::vector<std::uint64_t> visits;  ///< the last search that reached each node, of any graph
+  std::uint64_t count = 0;
+};
+
+}  // namespace
+
 /// Visits only what is reached: files of many small formulas are read in a time that grows with their length.
 std::vector<Node> FormulaGraph::reachable(std::span<const Node> roots, bool with_indices) const {
-  // Of this thread alone: scenes of one compiled file are loaded by several at once.
-  thread_local std::vector<std::uint64_t> visits;  // the last search that reached each node, of any graph
-  thread_local std::uint64_t searches = 0;
-  if (visits.size() < nodes_.size()) visits.resize(nodes_.size(), 0);
-  ++searches;
+  // Scenes of one compiled file are loaded by several threads at once, which may outlive what is destroyed at
+  // exit.
+  static MemoryPool<Searches>& pool = *new MemoryPool<Searches>;
+  MemoryPool<Searches>::Loan loan(pool);
+  Searches& kept = *loan;
+  if (kept.visits.size() < nodes_.size()) kept.visits.resize(nodes_.size(), 0);
   std::vector<Node> nodes;
-  const auto reach = [&](Node node) {
-    std::uint64_t& last = visits[static_cast<std::size_t>(node)];
-    if (std::exchange(last, searches) != searches) nodes.push_back(node);
+  const auto reach = [&nodes, last = kept.visits.data(), search = ++kept.count](Node node) {
+    if (std::exchange(last[node], search) != search) nodes.push_back(node);
   };
   for (const Node root : roots) reach(root);
   std::size_t next = 0;

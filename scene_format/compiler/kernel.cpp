@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <diracstep/files/sha256.hpp>
 #include <diracstep/scene_format/compiler/kernel.hpp>
+#include <diracstep/scene_format/compiler/memory_pool.hpp>
 #include <diracstep/scene_format/compiler/operations.hpp>
 #include <set>
 
@@ -64,7 +65,9 @@ Kernel::Kernel(FormulaGraph& graph, const std::vector<Store>& stores, const Piec
 }
 
 void Kernel::run(const KernelCall& call, int instance_width, int position_width) const {
-  thread_local std::vector<double> values;
+  static MemoryPool<std::vector<double>>& pool = *new MemoryPool<std::vector<double>>;
+  MemoryPool<std::vector<double>>::Loan loan(pool);
+  std::vector<double>& values = *loan;
   values.resize(std::max(values.size(), code_.size()));
   for (long i = 0; i < call.count; ++i) {
     const int* const slots = call.slots + i * width_;
