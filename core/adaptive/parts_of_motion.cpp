@@ -3,6 +3,7 @@
 #include <diracstep/core/adaptive/adaptive_integrator.hpp>
 #include <diracstep/core/adaptive/pointwise_motion.hpp>
 #include <diracstep/core/numerics/scales.hpp>
+#include <utility>
 
 /// How the reversible steps of an AdaptiveIntegrator begin behind a kink, where the forces may be far faster
 /// or slower than before it.
@@ -20,10 +21,15 @@ constexpr double same_time = 1e-3;  // of a step: both end at the same kink
 struct Point {
   double time;
   Vector q, p, v;
+  Vector carried;  ///< p or, under rows, whose impulses p may hold, the velocity
 };
 
-Point point_of(const Integrator& at) {
-  return {at.time(), at.position(), at.momentum(), at.velocity_estimate()};
+Point point_of(const Integrator& at, PointwiseMotion& motion) {
+  Point point{at.time(), at.position(), at.momentum(), at.velocity_estimate(), at.momentum()};
+  Vector v = point.v;
+  if (at.scene().rows() > 0 && motion.velocity(point.time, point.q, point.p, v).ok())
+    point.carried = std::move(v);
+  return point;
 }
 
 /// Largest difference of a component, in parts of its size or, of a position, of its way.
@@ -40,27 +46,28 @@ double difference(const Point& start, const Point& whole, const Point& parts) {
   Vector ways = whole.q.cwiseAbs().cwiseMax(start.q.cwiseAbs());
   if (start.v.size() == ways.size()) ways = ways.cwiseMax(h * start.v.cwiseAbs());
   add(whole.q, parts.q, ways);
-  add(whole.p, parts.p, whole.p.cwiseAbs().cwiseMax(start.p.cwiseAbs()));
+  add(whole.carried, parts.carried, whole.carried.cwiseAbs().cwiseMax(start.carried.cwiseAbs()));
   return worst;
 }
 
 }  // namespace
 
-/// Whether a step of the side integrator ends where two parts of it do, to eps^(p + 1) of q and p for order
-/// p; it is left where it was.
+/// Whether a step of the side integrator ends where two parts of it do, to eps^(p + 1) of q and p (v under
+/// rows) for order p; it is left where it was.
 bool AdaptiveIntegrator::agree(double size, double eps) {
-  const Point start = point_of(side_);
+  const Point start = point_of(side_, meter_->motion());
   const auto back = [&] { side_.restart(start.time, start.q, start.p, start.v); };
   if (!side_.step(size).ok()) {
     back();
     return false;
   }
-  const Point whole = point_of(side_);
+  const Point whole = point_of(side_, meter_->motion());
   const double taken = whole.time - start.time;  // to a kink
   back();
+  if (taken == 0.0) return false;  // it stands at a kink that it cannot leave
   bool ok = side_.step(first_of_two * taken).ok() && side_.kinks_passed().empty();
   if (const double left = whole.time - side_.time(); ok && left * taken > 0.0) ok = side_.step(left).ok();
-  const Point parts = point_of(side_);
+  const Point parts = point_of(side_, meter_->motion());
   back();
   const double allowed = std::clamp(std::pow(eps, options_.order + 1), least_difference, largest_difference);
   return ok && std::abs(parts.time - whole.time) <= same_time * std::abs(taken) &&

@@ -41,6 +41,8 @@ class ImpactRow final : public ConstraintRows {
   double shift_;
 };
 
+constexpr double least_rebound = 1e-12;  // of the speed before
+
 /// A_c v + b_c.
 double rate_of_row(const ConstraintRows& contact, double t, const Vector& q, const Vector& v) {
   ConstraintsAtPoint row({std::shared_ptr<const ConstraintRows>(std::shared_ptr<void>(), &contact)},
@@ -170,8 +172,24 @@ EventActions::Outcome EventActions::act(const Event& event, const Sample& at, co
       with_contact->constraints.insert(with_contact->constraints.begin(),
                                        std::make_shared<ImpactRow>(event.contact, -wanted));
     }
+    const Vector v = outcome.v;
     outcome.failure =
         solve_velocity(*with_contact, solvers_, at.time, outcome.q, outcome.p, outcome.v, first_impulse);
+    if (event.restitution && !outcome.failure.empty() && scene->rows() > 0) {
+      // The rows may hold the contact, so that its equation is one of theirs.
+      outcome.v = v;
+      const std::string by_rows =
+          solve_velocity(*scene, solvers_, at.time, outcome.q, outcome.p, outcome.v, first_impulse);
+      const double after = by_rows.empty() ? rate_of_row(*event.contact, at.time, outcome.q, outcome.v) : 0.0;
+      const double before = rate_of_row(*event.contact, at.time, outcome.q, v);
+      if (by_rows.empty())
+        outcome.failure = std::abs(after - wanted) <= least_rebound * std::abs(before)
+                              ? ""
+                              : "the rows that are on behind it hold the contact at a speed of " +
+                                    to_text(after) + ", where its restitution asks for " + to_text(wanted) +
+                                    "; a plastic impact onto rows needs no 'restitution'";
+      first_impulse = 0.0;  // the rows have it
+    }
     if (event.restitution) outcome.impulse = first_impulse;
     if (outcome.failure.empty()) scene->lagrangian->gradient(at.time, outcome.q, outcome.v, lq, outcome.p);
   }

@@ -89,5 +89,30 @@ TEST_F(HardContacts, LeaveAtRestWhatHasLanded) {
   }
 }
 
+/// The row that the landing switches on holds what its restitution asks for, or something else.
+TEST_F(HardContacts, ARestitutionBesideARowOfTheSameContactIsMetOrRefused) {
+  const auto landing = [&](const char* restitution) {
+    return run("run " +
+               scene("landing", std::string(R"toml(
+lagrangian = "(v_x^2 + v_y^2)/2 - 9.81*y"
+coordinates = { x = {}, y = {} }
+start = { y = 1, v_x = 1 }
+span = { end = 2, step = 0.01 }
+rows = [{ name = "floor", equation = "y = 0", on = false }]
+events = [{ name = "lands", when = "y", on = "floor", restitution = )toml") +
+                                    restitution + " }]\n") +
+               " --json");
+  };
+  const Outcome plastic = landing("0");
+  ASSERT_EQ(plastic.status, 0) << plastic.err;
+  const auto end = nlohmann::json::parse(plastic.out)["end"];
+  EXPECT_NEAR(end["q"]["x"].get<double>(), 2.0, 1e-13);
+  EXPECT_NEAR(end["q"]["y"].get<double>(), 0.0, 1e-13);
+  EXPECT_NEAR(end["v"]["y"].get<double>(), 0.0, 1e-13);
+  const Outcome elastic = landing("0.5");
+  EXPECT_EQ(elastic.status, 1);
+  EXPECT_NE(elastic.err.find("hold the contact at a speed of"), std::string::npos) << elastic.err;
+}
+
 }  // namespace
 }  // namespace diracstep::testing

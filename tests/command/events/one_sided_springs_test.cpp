@@ -120,5 +120,38 @@ step = 0.036
   EXPECT_NEAR(end_of(outcome, "x"), 4.2 - 0.9 - 0.5 * 9.81 * 1.8 * 1.8 + 1.2 * (1.8 - 1.25075), 1e-10);
 }
 
+/// A skate on a slope that turns at a rate of 1, x = 0.35 sin² t; the row's impulses in p differ from size to
+/// size of the steps, of which a kink where nothing begins to act therefore asks nothing.
+TEST_F(OneSidedSprings, VariableStepsUnderRowsKeepTheirSize) {
+  const Outcome outcome = run("run " + scene("skate", R"toml(
+lagrangian = "(v_x^2 + v_y^2 + v_a^2)/2 + 0.7*x - k*max(0, x - 0.3)^2/2"
+coordinates = { x = {}, y = {}, a = {} }
+parameters = { k = 0 }
+start = { v_a = 1 }
+span = { end = 4, step = 0.02 }
+[[rows]]
+name = "blade"
+equation = "v_x*sin(a) - v_y*cos(a) = 0"
+)toml") + " --json --adaptive");
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_LE(nlohmann::json::parse(outcome.out)["steps"].get<int>(), 60);
+  EXPECT_NEAR(end_of(outcome, "x"), 0.35 * std::pow(std::sin(4.0), 2), 1e-6);
+  EXPECT_NEAR(end_of(outcome, "y"), 1.4 - 0.175 * std::sin(8.0), 1e-6);
+}
+
+/// Dry friction that never holds: a step tried from its jump may end where it begins.
+TEST_F(OneSidedSprings, VariableStepsTurnBackUnderDryFriction) {
+  const Outcome outcome = run("run " + scene("friction", R"toml(
+lagrangian = "v_x^2/2 - x^2/2"
+coordinates = { x = {} }
+force = { x = "-0.2*sign(v_x)" }
+start = { x = 1 }
+span = { end = 4, step = 0.01 }
+)toml") + " --json --method type1/gl:3 --adaptive --eps 0.05");
+  ASSERT_LE(outcome.status, 3) << outcome.err;
+  ASSERT_NE(outcome.status, 2) << outcome.err;
+  EXPECT_NEAR(end_of(outcome, "x"), -0.2 - 0.4 * std::cos(4.0 - M_PI), 1e-8);
+}
+
 }  // namespace
 }  // namespace diracstep::testing
