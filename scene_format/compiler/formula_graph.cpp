@@ -2,8 +2,8 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
+#include <diracstep/scene_format/compiler/detail/memory_pool.hpp>
 #include <diracstep/scene_format/compiler/formula_graph.hpp>
-#include <diracstep/scene_format/compiler/memory_pool.hpp>
 #include <diracstep/scene_format/compiler/operations.hpp>
 #include <utility>
 

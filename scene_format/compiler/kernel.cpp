@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <diracstep/files/sha256.hpp>
+#include <diracstep/scene_format/compiler/detail/memory_pool.hpp>
 #include <diracstep/scene_format/compiler/kernel.hpp>
-#include <diracstep/scene_format/compiler/memory_pool.hpp>
 #include <diracstep/scene_format/compiler/operations.hpp>
 #include <set>
 
@@ -73,41 +73,43 @@ void Kernel::run(const KernelCall& call, int instance_width, int position_width)
     const int* const slots = call.slots + i * width_;
     const int* const positions = call.positions + i * position_width;
     const double* const instance = call.instance + i * instance_width;
-    for (std::size_t k = 0; k < code_.size(); ++k) {
-      const NodeData& data = code_[k].data;
+    double* next = values.data();
+    for (const Instruction& instruction : code_) {
+      const NodeData& data = instruction.data;
+      double& result = *next++;
       const auto value = [&](int a) { return values[static_cast<std::size_t>(a)]; };
-      switch (code_[k].from) {
+      switch (instruction.from) {
         case From::literal:
-          values[k] = data.value;
+          result = data.value;
           break;
         case From::known:
-          values[k] = call.known[data.a];
+          result = call.known[data.a];
           break;
         case From::instance:
-          values[k] = instance[data.a];
+          result = instance[data.a];
           break;
         case From::coordinate:
-          values[k] = call.in[data.c][slots[data.a]];
+          result = call.in[data.c][slots[data.a]];
           break;
         case From::multiplier:
-          values[k] = call.multipliers[slots[data.a]];
+          result = call.multipliers[slots[data.a]];
           break;
         case From::force:
-          values[k] = call.multipliers[data.a];
+          result = call.multipliers[data.a];
           break;
         case From::time:
-          values[k] = call.t;
+          result = call.t;
           break;
         case From::scale:
-          values[k] = call.s;
+          result = call.s;
           break;
         case From::computed:
           if (data.op == Op::table) {
             const auto number = static_cast<std::size_t>(data.c / LookupTable::width);
-            values[k] = (*tables_)[number].value(value(data.a), data.c % LookupTable::width);
+            result = (*tables_)[number].value(value(data.a), data.c % LookupTable::width);
             break;
           }
-          values[k] = computed(data, value(data.a), arity(data.op) == 2 ? value(data.b) : 0.0);
+          result = computed(data, value(data.a), arity(data.op) == 2 ? value(data.b) : 0.0);
           break;
       }
     }
@@ -280,15 +282,15 @@ std::string Kernel::source(const std::string& name, int instance_width, int posi
   std::set<std::string> pointers, tables;  // those that are used: no compiler shall warn
   std::string body =
       instructions([](int role, int slot) { return fmt::format("in{}[slots[{}]]", role, slot); });
-  for (std::size_t k = 0; k < code_.size(); ++k) {
-    const From from = code_[k].from;
+  for (const Instruction& instruction : code_) {
+    const From from = instruction.from;
     if (from == From::known) pointers.insert("const double* const known = call->known;");
     if (from == From::instance)
       tables.insert(fmt::format("const double* const instance = call->instance + i * {};", instance_width));
     if (from == From::multiplier || from == From::force)
       pointers.insert("const double* const multipliers = call->multipliers;");
     if (from == From::coordinate)
-      pointers.insert(fmt::format("const double* const in{0} = call->in[{0}];", code_[k].data.c));
+      pointers.insert(fmt::format("const double* const in{0} = call->in[{0}];", instruction.data.c));
     if (from == From::coordinate || from == From::multiplier)
       tables.insert(fmt::format("const int* const slots = call->slots + i * {};", width_));
   }
