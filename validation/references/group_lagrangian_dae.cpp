@@ -56,8 +56,7 @@ GroupLagrangianDae::GroupLagrangianDae(const Scene& scene, DaeFormulation formul
       size_(dae_unknowns(scene, formulation)),
       pattern_(SparsityPattern::dense(size_, size_)) {}
 
-const ConstVectorRef& GroupLagrangianDae::multipliers(const ConstVectorRef& y,
-                                                      const ConstVectorRef& rate) const {
+ConstVectorRef GroupLagrangianDae::multipliers(ConstVectorRef y, ConstVectorRef rate) const {
   return formulation_ == DaeFormulation::index_2 ? y : rate;
 }
 
@@ -74,7 +73,7 @@ Vector GroupLagrangianDae::moving_velocity(double t, ConstVectorRef y, ConstVect
 
 void GroupLagrangianDae::residual(double t, ConstVectorRef y, ConstVectorRef rate, VectorRef f) {
   const auto q = y.head(numbers_), v = y.segment(numbers_, n_), p = y.segment(numbers_ + n_, n_);
-  const ConstVectorRef& known = multipliers(y, rate);
+  ConstVectorRef known = multipliers(y, rate);
   Vector lq(n_), lv(n_), b;
   scene_.lagrangian->gradient(t, q, v, lq, lv);
   f.segment(numbers_ + n_, n_) = p - lv;
@@ -101,7 +100,7 @@ void GroupLagrangianDae::residual(double t, ConstVectorRef y, ConstVectorRef rat
 void GroupLagrangianDae::jacobian(double t, double cj, ConstVectorRef y, ConstVectorRef rate,
                                   VectorRef values) {
   const auto q = y.head(numbers_), v = y.segment(numbers_, n_), p = y.segment(numbers_ + n_, n_);
-  const ConstVectorRef& known = multipliers(y, rate);
+  ConstVectorRef known = multipliers(y, rate);
   const double of_multiplier = formulation_ == DaeFormulation::index_2 ? 1.0 : cj;
   const Columns basis = space_.tangent_basis(q);
   const Columns along = (basis.transpose() * basis).ldlt().solve(basis.transpose());  // B⁺

@@ -31,7 +31,7 @@ class GroupLagrangianDae final : public ContinuousDae {
   /// v + A_holᵀ M, the velocity that moves q.
   Vector moving_velocity(double t, ConstVectorRef y, ConstVectorRef multipliers) const;
   void add_across(double t, ConstVectorRef y, ConstVectorRef rate, const Columns& basis, VectorRef values);
-  const ConstVectorRef& multipliers(const ConstVectorRef& y, const ConstVectorRef& rate) const;
+  ConstVectorRef multipliers(ConstVectorRef y, ConstVectorRef rate) const;
 
   const Scene& scene_;
   const Space& space_;

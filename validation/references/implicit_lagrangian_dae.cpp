@@ -75,7 +75,7 @@ void ImplicitLagrangianDae::for_each_block(double cj, Visit visit) {
 void ImplicitLagrangianDae::residual(double t, ConstVectorRef y, ConstVectorRef rate, VectorRef f) {
   const Eigen::Index n = n_;
   const auto q = y.head(n), v = y.segment(n, n), p = y.segment(2 * n, n);
-  const ConstVectorRef& multipliers = formulation_ == DaeFormulation::index_2 ? y : rate;
+  ConstVectorRef multipliers = formulation_ == DaeFormulation::index_2 ? y : rate;
   lagrangian_->gradient(t, q, v, lq_, lv_);
   if (force_) force_->value(t, q, v, f_);
   f.head(n) = rate.head(n) - v;
@@ -96,7 +96,7 @@ void ImplicitLagrangianDae::residual(double t, ConstVectorRef y, ConstVectorRef 
 void ImplicitLagrangianDae::jacobian(double t, double cj, ConstVectorRef y, ConstVectorRef rate,
                                      VectorRef values) {
   const auto q = y.head(n_), v = y.segment(n_, n_);
-  const ConstVectorRef& multipliers = formulation_ == DaeFormulation::index_2 ? y : rate;
+  ConstVectorRef multipliers = formulation_ == DaeFormulation::index_2 ? y : rate;
   lagrangian_->hessian(t, q, v, lqq_, lqv_, lvv_);
   if (force_) force_->derivatives(t, q, v, fq_, fv_);
   for (Rows& r : rows_) {
