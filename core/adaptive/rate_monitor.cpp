@@ -110,7 +110,6 @@ double RateMeter::generic_rate(int place, ConstVectorRef v, double delta) const 
 /// ω0 is to be no less than the rate that the point alone tells, sqrt(|ȧ|/|v|), at most |ȧ|/|a|: behind the
 /// kink of a spring that begins to act that is the spring's, with which ω stays it all through the contact.
 void RateMeter::fit_typical(ConstVectorRef v, double step) {
-  typical_ = scales_.typical;
   if (!generic()) return;
   const double jerk = (a_.col(3) - a_.col(1)).norm() / (2.0 * difference_width * std::abs(step)),
                by_v = std::sqrt(jerk / v.norm()), by_a = jerk / a_.col(2).norm();

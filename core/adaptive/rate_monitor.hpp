@@ -60,7 +60,7 @@ class RateMeter {
 
   /// ω alone; `step` sets the width of the differences.
   Rate rate(double t, ConstVectorRef q, ConstVectorRef v, double step);
-  /// Of the generic monitor: ω0 for a part of a motion, from the point where ω was taken last on.
+  /// Of the generic monitor: raises ω0 for a part of a motion, from the point where ω was taken last on.
   void fit_typical(ConstVectorRef v, double step);
   void set_typical(double typical) { typical_ = typical; }
   double typical() const { return typical_; }

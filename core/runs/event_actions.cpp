@@ -158,9 +158,9 @@ EventActions::Outcome EventActions::act(const Event& event, const Sample& at, co
   double first_impulse = 0.0;
   if (has_velocity) {
     auto with_contact = std::make_shared<Scene>(*scene);
-    double wanted = 0.0;
+    double before = 0.0, wanted = 0.0;
     if (event.restitution) {
-      const double before = rate_of_row(*event.contact, at.time, outcome.q, outcome.v);
+      before = rate_of_row(*event.contact, at.time, outcome.q, outcome.v);
       const double restitution = event.restitution(point);
       if (!(restitution >= 0.0 && std::isfinite(restitution))) {
         outcome.failure = "event '" + event.name + "' at t = " + to_text(at.time, 10) + ": restitution is " +
@@ -181,7 +181,6 @@ EventActions::Outcome EventActions::act(const Event& event, const Sample& at, co
       const std::string by_rows =
           solve_velocity(*scene, solvers_, at.time, outcome.q, outcome.p, outcome.v, first_impulse);
       const double after = by_rows.empty() ? rate_of_row(*event.contact, at.time, outcome.q, outcome.v) : 0.0;
-      const double before = rate_of_row(*event.contact, at.time, outcome.q, v);
       if (by_rows.empty())
         outcome.failure = std::abs(after - wanted) <= least_rebound * std::abs(before)
                               ? ""

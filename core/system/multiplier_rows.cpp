@@ -173,8 +173,7 @@ std::string fault_of_multipliers(const Scene& scene, const Columns& directions) 
   l.position_gradient_rate(scene.start.time + later, q, v, rate);
   if (!vanishes_beside(directions.transpose() * rate, rate))
     return "what it is a multiplier of depends on the time: state that as a row, whose force is the "
-           "multiplier, "
-           "and leave the coordinate out";
+           "multiplier, and leave the coordinate out";
   if (rank < directions.cols())
     return "they are multipliers of the same, so that only a sum of them is determined: leave out all but " +
            std::to_string(rank);
