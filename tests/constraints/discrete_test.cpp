@@ -156,8 +156,8 @@ struct FiniteDifferenceMaps {
   }
   std::shared_ptr<const DiscreteRows> rows(bool plus) const {
     return discrete_rows<3, 1>(
-        [*this, plus]<class T>(const std::array<T, 3>& q0, const std::array<T, 3>& q1) {
-          return row(plus ? q0 : q1, q0, q1);
+        [maps = *this, plus]<class T>(const std::array<T, 3>& q0, const std::array<T, 3>& q1) {
+          return maps.row(plus ? q0 : q1, q0, q1);
         });
   }
   std::shared_ptr<const Scene> scene() const {
