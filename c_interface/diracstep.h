@@ -24,7 +24,7 @@ extern "C" {
 
 /* Raised when a struct here or in diracstep_scene.h, or what a function does, changes; not for new functions.
  */
-#define DIRACSTEP_VERSION_OF_C_INTERFACE 7u
+#define DIRACSTEP_VERSION_OF_C_INTERFACE 8u
 
 #if defined(_WIN32)
 #define DIRACSTEP_API __declspec(dllexport)
@@ -165,6 +165,9 @@ typedef struct diracstep_equilibrium {
       *eigenvalue;       /* modes × 2, real and imaginary part, of a pair that with imaginary part above 0 */
   const double *shape;   /* modes × n × 2, the largest component 1 */
   int zeros;             /* further eigenvalues, which are 0 */
+  double zeros_below;    /* the fastest rate that may be behind one of them, 1/time; 0: none is */
+  int free_directions;   /* in which the equilibrium goes on as a family, by full matrices */
+  const double *free;    /* free_directions × n, the largest component 1 and 0 in the others */
   const char *stability; /* in words */
   double near;           /* the number that the modes are nearest to; NaN where they are all */
   double variation;      /* of the linear equations on the way to the end of the scene, of their size */

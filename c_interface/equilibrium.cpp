@@ -58,6 +58,9 @@ void tell_motions(const SmallMotions& small, diracstep_equilibrium& found) {
   found.eigenvalue = keep_numbers(std::move(values));
   found.shape = keep_numbers(std::move(shapes));
   found.zeros = small.modes.zeros;
+  found.zeros_below = small.modes.zeros_below;
+  found.free_directions = static_cast<int>(small.modes.free_directions.cols());
+  found.free = keep_matrix(small.modes.free_directions.transpose());
   found.stability = describe(small.modes.stability);
   found.variation = small.variation;
   if (small.nearest) found.near = small.nearest->near;

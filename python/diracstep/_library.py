@@ -14,7 +14,7 @@ from typing import Any, Callable
 
 from .errors import raised
 
-VERSION = 7  # DIRACSTEP_VERSION_OF_C_INTERFACE
+VERSION = 8  # DIRACSTEP_VERSION_OF_C_INTERFACE
 PLUGIN_VERSION = 1  # DIRACSTEP_PLUGIN_VERSION
 FILE = "libdiracstep.so.0.1"
 
@@ -174,8 +174,9 @@ class Rest(Structure):
 
 class Equilibrium(Structure):
     _fields_ = [("time", c_double), ("iterations", c_int), ("q", Numbers), ("v", Numbers), ("lambda_", Numbers), ("modes", c_int),
-                ("eigenvalue", Numbers), ("shape", Numbers), ("zeros", c_int), ("stability", c_char_p), ("near", c_double),
-                ("variation", c_double), ("redundant_rows", c_int), ("positions", c_int), ("velocities", c_int),
+                ("eigenvalue", Numbers), ("shape", Numbers), ("zeros", c_int), ("zeros_below", c_double),
+                ("free_directions", c_int), ("free", Numbers), ("stability", c_char_p), ("near", c_double), ("variation", c_double),
+                ("redundant_rows", c_int), ("positions", c_int), ("velocities", c_int),
                 ("of_positions", Numbers), ("of_velocities", Numbers), ("drift", Numbers), ("mass", Numbers), ("damping", Numbers),
                 ("stiffness", Numbers), ("doubt", c_char_p)]
 

@@ -36,6 +36,8 @@ class Equilibrium:
     eigenvalues: np.ndarray  #: k complex numbers, 1/time, of a pair the one with imaginary part above 0
     modes: np.ndarray  #: k × n, complex, a row for each eigenvalue, its largest component 1
     zeros: int  #: further eigenvalues, which are 0: motions that nothing draws back
+    zeros_below: float  #: the fastest rate that may be behind one of them, 1/time; 0: none is
+    free_directions: np.ndarray  #: f × n: in which it goes on as a family, the largest component 1 and 0 in the others
     stability: str  #: in words
     near: float | None  #: the number that the eigenvalues are nearest to; None where they are all
     variation: float  #: of the linear equations on the way to the end of the scene, relative to their size
@@ -105,8 +107,8 @@ def _copied(scene: Scene, found: c.Equilibrium) -> Equilibrium:
     return Equilibrium(
         scene, found.time, _numbers(found.q, scene._widths["q"]), _numbers(found.v, n), _numbers(found.lambda_, len(scene._rows)),
         found.iterations, _numbers(found.eigenvalue, k, 2).view(complex).reshape(k), _numbers(found.shape, k, n, 2).view(complex).reshape(k, n),
-        found.zeros, c.decoded(found.stability), None if full else found.near, found.variation, spelled(c.decoded(found.doubt)),
-        found.redundant_rows, **matrices)
+        found.zeros, found.zeros_below, _numbers(found.free, found.free_directions, n), c.decoded(found.stability),
+        None if full else found.near, found.variation, spelled(c.decoded(found.doubt)), found.redundant_rows, **matrices)
 
 
 def start_of(scene: Scene) -> SolvedStart:

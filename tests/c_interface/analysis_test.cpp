@@ -63,6 +63,7 @@ TEST_F(CInterface, FindsAnEquilibriumAndItsModes) {
   EXPECT_NEAR(found.shape[2 * 2 + 2], 1.0, 1e-12);  // the second moves y
   EXPECT_NEAR(found.mass[0] + found.mass[3], 5.0, 1e-12);
   EXPECT_TRUE(std::isnan(found.near));
+  EXPECT_EQ(found.free_directions, 0);
   EXPECT_STREQ(found.doubt, "");
   diracstep_rest rest{};
   rest.modes = 2000;

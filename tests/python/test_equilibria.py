@@ -24,6 +24,13 @@ def test_an_equilibrium_and_its_eigenvalues(spring):
         spring.equilibrium(along=1)
 
 
+def test_directions_of_a_family():
+    """A particle in a round valley: it rests anywhere on the circle."""
+    found = ds.Scene(["x", "y"], lambda q, v: v @ v / 2 - (q @ q - 1) ** 2 / 4, q=[0.9, 0.0]).equilibrium()
+    assert found.zeros == 2 and found.eigenvalues.imag == pytest.approx([np.sqrt(2.0)])
+    assert found.free_directions == pytest.approx(np.array([[0.0, 1.0]]), abs=1e-9)
+
+
 def test_rows_that_depend_on_their_surface_alone():
     """A pendulum on two rows for one circle, from where Newton's path ends: the search crashed."""
     found = ds.Scene(["x", "y"], lambda q, v: v @ v / 2 - 9.81 * q.y, rows=lambda q: [q @ q - 1, (q @ q - 1) * (2 + q.x)],

@@ -144,6 +144,8 @@ def test_an_equilibrium_is_that_of_the_command(name, options, ours):
     assert [[value.real, value.imag] for value in found.eigenvalues] == [mode["eigenvalue"] for mode in theirs["modes"]]
     assert [[[z.real, z.imag] for z in mode] for mode in found.modes] == [list(mode["mode"].values()) for mode in theirs["modes"]]
     assert (found.zeros, found.stability, found.variation) == (theirs["zero_eigenvalues"], theirs["stability"], theirs["variation"])
+    assert found.zeros_below == theirs["zeros_below"]
+    assert [list(free) for free in found.free_directions] == [list(free.values()) for free in theirs["free_directions"]]
     assert found.near == theirs.get("near")
     for what in ("positions", "velocities", "drift", "mass", "damping", "stiffness"):
         values = getattr(found, what)
