@@ -2,7 +2,7 @@
 #include <cmath>
 #include <diracstep/boundary_values/named_ends.hpp>
 #include <diracstep/core/numerics/errors.hpp>
-#include <diracstep/core/numerics/near_names.hpp>
+#include <diracstep/core/numerics/names.hpp>
 #include <limits>
 #include <utility>
 

@@ -11,7 +11,7 @@
 #include <diracstep/command/command_line.hpp>
 #include <diracstep/command/verbs.hpp>
 #include <diracstep/core/numerics/errors.hpp>
-#include <diracstep/core/numerics/near_names.hpp>
+#include <diracstep/core/numerics/names.hpp>
 #include <memory>
 #include <new>
 #include <string_view>

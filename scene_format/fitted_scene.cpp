@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <diracstep/core/numerics/errors.hpp>
-#include <diracstep/core/numerics/near_names.hpp>
+#include <diracstep/core/numerics/names.hpp>
 #include <diracstep/scene_format/fitted_scene.hpp>
 #include <diracstep/scene_format/parametric_scene_file.hpp>
 #include <diracstep/scene_format/position_names.hpp>

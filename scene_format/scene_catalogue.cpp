@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <diracstep/core/numerics/errors.hpp>
-#include <diracstep/core/numerics/near_names.hpp>
+#include <diracstep/core/numerics/names.hpp>
 #include <diracstep/core/system/contradictory_rows.hpp>
 #include <diracstep/core/system/redundant_rows.hpp>
 #include <diracstep/files/input_file.hpp>
@@ -54,13 +54,7 @@ void drop_redundant_rows(CatalogueScene& entry) {
     entry.all_rows = entry.scene;
     entry.scene = with_rows_left_out(entry.scene, dependent);
   }
-  constexpr std::size_t most_names = 50;
-  std::string names;
-  for (std::size_t a = 0; a < std::min(dependent.size(), most_names); ++a)
-    names += (names.empty() ? "'" : ", '") + dependent[a] + "'";
-  if (dependent.size() > most_names)
-    names += " and " + std::to_string(dependent.size() - most_names) + " more";
-  entry.changes.push_back("redundant constraints left out: " + names +
+  entry.changes.push_back("redundant constraints left out: " + name_list(dependent) +
                           "; forces of rows are the least ones that act as theirs do");
 }
 

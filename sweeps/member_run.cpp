@@ -7,7 +7,7 @@
 #include <diracstep/core/adaptive/error_control.hpp>
 #include <diracstep/core/adaptive/error_with_events.hpp>
 #include <diracstep/core/adaptive/variable_run_checks.hpp>
-#include <diracstep/core/numerics/near_names.hpp>
+#include <diracstep/core/numerics/names.hpp>
 #include <diracstep/core/runs/event_steps.hpp>
 #include <diracstep/core/runs/run.hpp>
 #include <diracstep/core/spaces/space.hpp>

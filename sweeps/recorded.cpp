@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <diracstep/core/numerics/errors.hpp>
-#include <diracstep/core/numerics/near_names.hpp>
+#include <diracstep/core/numerics/names.hpp>
 #include <diracstep/scene_format/position_names.hpp>
 #include <diracstep/sweeps/recorded.hpp>
 #include <limits>

@@ -7,7 +7,7 @@
 #include <diracstep/command/verbs.hpp>
 #include <diracstep/command/verbs/published_orders.hpp>
 #include <diracstep/core/numerics/errors.hpp>
-#include <diracstep/core/numerics/near_names.hpp>
+#include <diracstep/core/numerics/names.hpp>
 #include <diracstep/reports/json.hpp>
 #include <diracstep/reports/report.hpp>
 #include <diracstep/validation/studies/convergence_study.hpp>

@@ -6,6 +6,7 @@
 #include <diracstep/core/adaptive/pointwise_motion.hpp>
 #include <diracstep/core/adaptive/rate_survey.hpp>
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/spaces/space.hpp>
 #include <vector>
 
 namespace diracstep {
@@ -130,9 +131,7 @@ class SurveyRun {
             0.5 * (a_[0].squaredNorm() + next_.squaredNorm()), (next_ - a_[0]).squaredNorm() / (h * h)};
   }
 
-  Vector moved(ConstVectorRef x) const {
-    return motion_.space() != nullptr ? motion_.space()->moved(q_, x) : Vector(q_ + x);
-  }
+  Vector ahead(ConstVectorRef x) const { return moved(motion_.space(), q_, x); }
 
   void advance(double h) {
     t_ += std::copysign(h, end_ - t_);
@@ -144,12 +143,12 @@ class SurveyRun {
   /// From (q, v, a) to (next_q, next_v, next).
   bool runge_kutta(double h) {
     const Vector v2 = v_ + 0.5 * h * a_[0];
-    if (!motion_.acceleration(t_ + 0.5 * h, moved(0.5 * h * v_), v2, a_[1]).ok()) return false;
+    if (!motion_.acceleration(t_ + 0.5 * h, ahead(0.5 * h * v_), v2, a_[1]).ok()) return false;
     const Vector v3 = v_ + 0.5 * h * a_[1];
-    if (!motion_.acceleration(t_ + 0.5 * h, moved(0.5 * h * v2), v3, a_[2]).ok()) return false;
+    if (!motion_.acceleration(t_ + 0.5 * h, ahead(0.5 * h * v2), v3, a_[2]).ok()) return false;
     const Vector v4 = v_ + h * a_[2];
-    if (!motion_.acceleration(t_ + h, moved(h * v3), v4, a_[3]).ok()) return false;
-    next_q_ = moved(h / 6.0 * (v_ + 2.0 * v2 + 2.0 * v3 + v4));
+    if (!motion_.acceleration(t_ + h, ahead(h * v3), v4, a_[3]).ok()) return false;
+    next_q_ = ahead(h / 6.0 * (v_ + 2.0 * v2 + 2.0 * v3 + v4));
     next_v_ = v_ + h / 6.0 * (a_[0] + 2.0 * a_[1] + 2.0 * a_[2] + a_[3]);
     return motion_.acceleration(t_ + h, next_q_, next_v_, next_).ok() && next_q_.allFinite() &&
            next_v_.allFinite() && next_.allFinite();

@@ -3,6 +3,7 @@
 #include <diracstep/core/adaptive/adaptive_integrator.hpp>
 #include <diracstep/core/adaptive/pointwise_motion.hpp>
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/spaces/space.hpp>
 
 /// The reversible steps of an AdaptiveIntegrator, and the irreversible ones for comparison: their sizes by
 /// the monitor.
@@ -25,10 +26,8 @@ Rate AdaptiveIntegrator::rate_of(const Integrator& at, double size, double ahead
     return growth ? meter_->rate_and_growth(at.time() + ahead, q, v, size)
                   : meter_->rate(at.time() + ahead, q, v, size);
   };
-  const Space* space = meter_->motion().space();
-  Rate rate = ahead == 0.0       ? rate_at(at.position())
-              : space != nullptr ? rate_at(space->moved(at.position(), Vector(ahead * v)))
-                                 : rate_at(at.position() + ahead * v);
+  Rate rate = ahead == 0.0 ? rate_at(at.position())
+                           : rate_at(moved(meter_->motion().space(), at.position(), ahead * v));
   if (const double largest = largest_rate(); rate.ok() && rate.rate > largest) rate = {largest, 0.0, {}};
   return rate;
 }

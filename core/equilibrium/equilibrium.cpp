@@ -118,8 +118,8 @@ class EquilibriumSearch {
     return point;
   }
 
-  Vector moved(const Point& from, const Vector& change) const {
-    return moved_position(scene_, from.q, change);
+  Vector beside(const Point& from, const Vector& change) const {
+    return moved(scene_.space.get(), from.q, change);
   }
 
   /// The residual at one point with its forces along what is allowed at another, whose Jacobian it is for.
@@ -157,13 +157,13 @@ class EquilibriumSearch {
       const Vector off = residual_along(here.allowed, there.residual - (1.0 - part) * here.residual);
       return off.allFinite() && correction(off).norm() <= off_path * part * change.norm();
     };
-    if (change.norm() <= near_the_end * size_) return evaluate(moved(here, change));
+    if (change.norm() <= near_the_end * size_) return evaluate(beside(here, change));
     for (double part = 1.0; part >= shortest_path_step; part /= 2.0) {
       const bool begins_there = std::ranges::all_of(std::array{0.125, 0.25, 0.5}, [&](double fraction) {
-        return on_path(evaluate(moved(here, fraction * part * change)), fraction * part);
+        return on_path(evaluate(beside(here, fraction * part * change)), fraction * part);
       });
       if (!begins_there) continue;
-      Point there = evaluate(moved(here, part * change));
+      Point there = evaluate(beside(here, part * change));
       if (on_path(there, part)) return there;
     }
     return std::nullopt;
@@ -184,7 +184,7 @@ class EquilibriumSearch {
       Columns jacobian = here.jacobian;
       jacobian.topRows(here.mass.rows()) += here.mass / time;  // more where rows of A depend
       factor(jacobian);
-      Point next = evaluate(moved(here, correction(residual_along(here.allowed, here.residual))));
+      Point next = evaluate(beside(here, correction(residual_along(here.allowed, here.residual))));
       if (!next.residual.allFinite()) return here;
       const double falls = here.residual.norm() / next.residual.norm();
       time *= std::min(10.0, falls > not_away ? growth * falls : falls);

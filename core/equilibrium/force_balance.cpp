@@ -226,10 +226,6 @@ bool needs_sparse_matrices(const Scene& scene) {
   return scene.dimension() > most_full || scene.rows() > most_full;
 }
 
-Vector moved_position(const Scene& scene, const Vector& q, const Vector& change) {
-  return scene.space ? scene.space->moved(q, change) : Vector(q + change);
-}
-
 std::shared_ptr<const Scene> with_start(const Scene& scene, const Start& start) {
   auto copy = std::make_shared<Scene>(scene);
   copy->start = start;

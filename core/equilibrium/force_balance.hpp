@@ -57,9 +57,6 @@ class ForceBalance {
   Vector free_sizes_;
 };
 
-/// q + change, on a group q τ(change).
-Vector moved_position(const Scene& scene, const Vector& q, const Vector& change);
-
 /// The scene with a Lagrangian and another start, completed.
 std::shared_ptr<const Scene> with_start(const Scene& scene, const Start& start);
 

@@ -5,6 +5,7 @@
 #include <diracstep/core/equilibrium/force_balance.hpp>
 #include <diracstep/core/equilibrium/linearisation.hpp>
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/spaces/space.hpp>
 #include <utility>
 
 namespace diracstep {
@@ -57,7 +58,7 @@ Columns change_with_position(const Scene& scene, const BalanceAt& at, const Equi
     for (Eigen::Index i = 0; i < sizes.size(); ++i)
       direction[i] = part * sizes[i] * (std::cos(pattern * static_cast<double>(i + 1)) < 0.0 ? -1.0 : 1.0);
     const auto from_here = [&](double side) {
-      there.evaluate(point.time, moved_position(scene, point.q, side * direction), point.v);
+      there.evaluate(point.time, moved(scene.space.get(), point.q, side * direction), point.v);
       there.set_multipliers(lambda);
       return Columns((Columns(there.stiffness) - here).cwiseAbs() / part);
     };
@@ -167,7 +168,7 @@ Linearisation linearise(const Scene& given, const Equilibrium& at, double later)
   const double reach = std::max(given.start.q.lpNorm<Eigen::Infinity>(), at.q.lpNorm<Eigen::Infinity>());
   for (const double part : {0.382, 0.618}) {  // unequal, so that a period does not hide between them
     const double t = part * (later - at.time);
-    const BalanceAt there(*scene, at.time + t, moved_position(*scene, at.q, t * at.v), at.v);
+    const BalanceAt there(*scene, at.time + t, moved(scene->space.get(), at.q, t * at.v), at.v);
     linear.variation = std::max(linear.variation, variation_between(here, there, reach));
   }
   return linear;

@@ -1,7 +1,7 @@
-#include <algorithm>
 #include <diracstep/core/integrator/integrator.hpp>
 #include <diracstep/core/integrator/kept_momenta.hpp>
 #include <diracstep/core/integrator/step_sequence.hpp>
+#include <diracstep/core/numerics/names.hpp>
 #include <diracstep/core/spaces/space.hpp>
 #include <diracstep/core/steps/groups/step.hpp>
 #include <diracstep/core/system/first_order_motions.hpp>
@@ -22,13 +22,9 @@ PlanLine space_line(const Scene& scene) {
 
 /// The first of them by name, and how many more.
 PlanLine kept_momenta_line(const Scene& scene, const std::vector<std::string>& names) {
-  constexpr std::size_t named = 6;
-  std::string text;
-  for (std::size_t i = 0; i < std::min(named, names.size()); ++i) text += (i > 0 ? ", " : "") + names[i];
-  if (names.size() > named) text += " and " + std::to_string(names.size() - named) + " more";
   const std::string function = scene.by_hamiltonian() ? "H" : "L";
   return {
-      "cyclic coordinates", text,
+      "cyclic coordinates", name_list(names, 6, {}),
       function + (scene.space ? " does not change along them, as axes of space, and neither rows nor forces "
                                 "act there: these momenta in space are kept"
                               : " does not depend on them, and neither rows nor forces act along them: "

@@ -1,7 +1,7 @@
-#include <algorithm>
 #include <diracstep/core/integrator/point_reader.hpp>
 #include <diracstep/core/integrator/prepared_scene.hpp>
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/numerics/names.hpp>
 #include <diracstep/core/system/consistent_start.hpp>
 #include <diracstep/core/system/contradictory_rows.hpp>
 #include <diracstep/core/system/first_order_motions.hpp>
@@ -9,22 +9,12 @@
 #include <diracstep/core/system/hidden_rows.hpp>
 #include <diracstep/core/system/kernel_motions.hpp>
 #include <diracstep/core/system/redundant_rows.hpp>
-#include <span>
 #include <sstream>
 #include <utility>
 
 namespace diracstep {
 
 namespace {
-
-std::string joined(const std::vector<std::string>& names) {
-  constexpr std::size_t most = 50;
-  std::string list;
-  for (const std::string& name : std::span(names).first(std::min(most, names.size())))
-    list += (list.empty() ? "'" : ", '") + name + "'";
-  if (names.size() > most) list += " and " + std::to_string(names.size() - most) + " more";
-  return list;
-}
 
 void require_start(const Scene& scene, const FirstOrderMotions& motions = {}) {
   try {
@@ -53,14 +43,15 @@ std::vector<std::string> dependent_rows(const Scene& scene, bool may_be_left_out
     if (row_dependence(scene, scene.start, nearly, nearly_dependent) == RowDependence::at_start_only)
       return {};
     throw Misuse(
-        of_scene + "nearly redundant constraints, to within 3e-8 of their size: " + joined(nearly) +
-        " beside " + joined(combined_rows(scene, scene.start, nearly.front(), nearly)) +
+        of_scene + "nearly redundant constraints, to within 3e-8 of their size: " + name_list(nearly) +
+        " beside " + name_list(combined_rows(scene, scene.start, nearly.front(), nearly)) +
         "; their forces cannot be told apart: write rows that differ by more, such as the difference of "
         "two divided by what is small in it");
   }
   if (const std::string against = contradiction(scene, scene.start, dependent); !against.empty())
     throw Misuse(of_scene + "contradictory constraints: " + against);
-  const std::string redundant = of_scene + "redundant constraints at the start: " + joined(dependent) + "; ";
+  const std::string redundant =
+      of_scene + "redundant constraints at the start: " + name_list(dependent) + "; ";
   const std::string kept_for = why_not_left_out(row_dependence(scene, scene.start, dependent));
   if (!kept_for.empty()) throw Misuse(redundant + kept_for);
   if (!may_be_left_out)
@@ -86,7 +77,7 @@ PreparedScene prepared(std::shared_ptr<const Scene> given, const IntegratorOptio
   require_size("scene '" + scene->name + "': the start q", scene->start.q.size(), scene->storage_size());
   scene = with_independent_rows(scene, options.drop_redundant_rows);
   if (scene->whole)
-    result.lines.push_back({"dropped rows", joined(rows_left_out(*scene)),
+    result.lines.push_back({"dropped rows", name_list(rows_left_out(*scene)),
                             "redundant constraints at the start; forces_of_whole() gives the forces of all"});
   if (scene->by_hamiltonian()) require_regular_rows(*scene);
   const int own_rows = scene->rows();
@@ -95,7 +86,7 @@ PreparedScene prepared(std::shared_ptr<const Scene> given, const IntegratorOptio
     std::vector<std::string> names = scene->row_names();
     names.erase(names.begin(), names.begin() + own_rows);
     result.lines.push_back(
-        {"hidden rows", joined(names), "motions without momentum; these rows determine them"});
+        {"hidden rows", name_list(names), "motions without momentum; these rows determine them"});
   }
   if (const FirstOrderMotions motions = first_order_motions(*scene);
       motions.exist() && scene->start.v.size() == scene->dimension() && !by_two_form_alone(*scene, motions)) {

@@ -6,7 +6,7 @@
 #include <diracstep/core/methods/quadrature.hpp>
 #include <diracstep/core/methods/registry.hpp>
 #include <diracstep/core/numerics/errors.hpp>
-#include <diracstep/core/numerics/near_names.hpp>
+#include <diracstep/core/numerics/names.hpp>
 #include <optional>
 #include <utility>
 

@@ -48,9 +48,7 @@ bool BranchCheck::rows_depend_on_the_way(const Integrator& integrator) {
   rows_.evaluate(t, integrator.position());
   const Eigen::MatrixXd after = rows_.pattern().full(rows_.coefficients());
   const Vector back = -h * integrator.velocity_estimate();
-  const Space* const space = integrator.scene().space.get();
-  rows_.evaluate(t - h, space != nullptr ? space->moved(integrator.position(), back)
-                                         : Vector(integrator.position() + back));
+  rows_.evaluate(t - h, moved(integrator.scene().space.get(), integrator.position(), back));
   const Eigen::MatrixXd before = rows_.pattern().full(rows_.coefficients());
   const Eigen::MatrixXd ratio =
       (before * before.transpose()).partialPivLu().solve(before * after.transpose());

@@ -3,6 +3,7 @@
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/core/runs/jump_check.hpp>
+#include <diracstep/core/spaces/space.hpp>
 
 namespace diracstep {
 
@@ -19,7 +20,7 @@ bool jumps_at(const KinkPassed& kink, const Integrator& end, Integrator& reader)
   const auto force_at = [&](double away) {
     Vector force(n), momentum(n), more(n);
     const Vector v = at.v + away * bend;
-    const Vector q = scene.space ? scene.space->moved(kink.at.q, away * at.v) : kink.at.q + away * at.v;
+    const Vector q = moved(scene.space.get(), kink.at.q, away * at.v);
     scene.force_and_momentum(kink.time, q, v, kink.at.p, force, momentum);
     if (!scene.force) return force;
     scene.force->value(kink.time, q, v, more);

@@ -249,4 +249,8 @@ Columns Space::basis_curvature(ConstVectorRef q, ConstVectorRef w) const {
   return whole;
 }
 
+Vector moved(const Space* space, ConstVectorRef q, ConstVectorRef x) {
+  return space != nullptr ? space->moved(q, x) : Vector(q + x);
+}
+
 }  // namespace diracstep

@@ -202,6 +202,9 @@ class FactorOf final : public SpaceFactor {
 
 }  // namespace detail
 
+/// q τ(x) on a space, q + x in R^n, where `space` is null.
+Vector moved(const Space* space, ConstVectorRef q, ConstVectorRef x);
+
 /// The product of factors: `space(spaces::SO3{}, spaces::R<3>{})`; a type of one's own is a factor as well.
 template <class... Factors>
 std::shared_ptr<const Space> space(const Factors&...) {

@@ -8,6 +8,7 @@
 #include <diracstep/core/system/constraint_distribution.hpp>
 #include <diracstep/core/system/detail/kernel_start.hpp>
 #include <diracstep/core/system/detail/nearest_point.hpp>
+#include <diracstep/core/system/detail/poses.hpp>
 #include <diracstep/core/system/first_order_motions.hpp>
 #include <diracstep/core/system/hamiltonian_point.hpp>
 #include <diracstep/core/system/hidden_rows.hpp>
@@ -72,8 +73,9 @@ std::shared_ptr<const Scene> independent(std::shared_ptr<const Scene> scene, con
   if (scene->rows() == 0 || scene->rows() > largest_full) return scene;
   const Start& start = scene->start;
   ConstraintsAtPoint rows(scene->constraints, scene->dimension());
-  rows.evaluate(start.time,
-                pose_near(only_holonomic(scene->constraints), start.time, start.q, held).value_or(start.q));
+  rows.evaluate(
+      start.time,
+      pose_near(nullptr, only_holonomic(scene->constraints), start.time, start.q, held).value_or(start.q));
   const std::vector<std::string> names = scene->row_names();
   std::vector<std::string> left;
   for (const int r : dependent_columns(full_one_forms(rows, held), independence_tolerance))

@@ -47,14 +47,14 @@ class RowsBesideOthers {
 
   /// Empty, or what contradicts at this time, from a pose near q.
   std::string at(double t, const Vector& near) {
-    const auto pose = pose_near_on(space_, others_, t, near, {});
+    const auto pose = pose_near(space_, others_, t, near, {});
     if (!pose || !pose->allFinite()) return {};
     if (std::string rates = different_rates(t, *pose); !rates.empty()) return rates;
     return no_common_pose(t, *pose);
   }
 
   std::string different_rates_near(double t, const Vector& near) {
-    const auto pose = pose_near_on(space_, others_, t, near, {});
+    const auto pose = pose_near(space_, others_, t, near, {});
     return pose && pose->allFinite() ? different_rates(t, *pose) : std::string();
   }
 
@@ -99,7 +99,7 @@ class RowsBesideOthers {
   std::string no_common_pose(double t, const Vector& q) {
     const double off = distance_of(holonomic_these_, t, q);
     if (!(off > differs)) return {};
-    const auto common = pose_near_on(space_, all_, t, q, {});
+    const auto common = pose_near(space_, all_, t, q, {});
     if (!common || !(distance_of(all_, t, *common) > differs)) return {};
     rows_.evaluate(t, q);
     std::ostringstream text;
@@ -162,7 +162,7 @@ std::string contradiction(const Scene& scene, const Start& start, const std::vec
   for (int k = -12; k <= 12; ++k) times.push_back(start.time + std::pow(10.0, 0.5 * k));
   for (const double t : times)
     for (const double distance : {0.0, -0.1, 0.1})
-      if (std::string text = rows.at(t, moved_on(scene.space.get(), start, distance)); !text.empty())
+      if (std::string text = rows.at(t, moved_start(scene.space.get(), start, distance)); !text.empty())
         return text;
   return {};
 }

@@ -7,6 +7,7 @@
 #include <diracstep/core/numerics/kernel_basis.hpp>
 #include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/core/system/detail/constraint_levels.hpp>
+#include <diracstep/core/system/detail/poses.hpp>
 #include <diracstep/core/system/kernel_motions.hpp>
 #include <diracstep/core/system/rows_along_motions.hpp>
 #include <sstream>
@@ -21,18 +22,6 @@ constexpr double difference = 1e-5;  ///< of central differences, in relation to
 constexpr double no_dependence = 1e-8, regular_along_rows = 1e-11;
 
 Eigen::Index count(const std::vector<int>& places) { return static_cast<Eigen::Index>(places.size()); }
-
-Vector varied(const Vector& x, double part, double phase) {
-  Vector near = x;
-  for (Eigen::Index i = 0; i < x.size(); ++i)
-    near[i] += part * size_or_one(max_norm(x)) * std::sin(phase + 1.7 * static_cast<double>(i));
-  return near;
-}
-
-/// Two points near the start that share no special position with it.
-Start near_start(const Start& start, double phase) {
-  return {start.time + 0.37 * phase, varied(start.q, 1e-2, phase), varied(start.v, 0.3, 2.0 * phase)};
-}
 
 /// Tells those equations with entries beside their size from hidden ones.
 void keep_if_none(const Columns& derivatives, double size, Eigen::Index first, std::vector<bool>& hidden) {

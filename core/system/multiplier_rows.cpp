@@ -3,10 +3,10 @@
 #include <diracstep/core/numerics/kernel_basis.hpp>
 #include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/core/system/constraint_distribution.hpp>
+#include <diracstep/core/system/detail/poses.hpp>
 #include <diracstep/core/system/lagrangian_derivatives.hpp>
 #include <diracstep/core/system/multiplier_rows.hpp>
 #include <diracstep/core/system/rows_along_motions.hpp>
-#include <utility>
 
 namespace diracstep {
 
@@ -101,20 +101,8 @@ void MultiplierRows::annihilator_derivative(double t, ConstVectorRef q, ConstVec
 
 namespace {
 
-constexpr double later = 0.37;  // than the start
-
 bool vanishes_beside(const Columns& small, const Columns& whole) {
   return max_norm(small) <= 1e-11 * size_or_one(max_norm(whole));
-}
-
-/// q and v of no special place.
-std::pair<Vector, Vector> near_start(const Scene& scene) {
-  Vector q = scene.start.q, v = scene.start.v;
-  for (Eigen::Index i = 0; i < q.size(); ++i) {
-    q[i] += 1e-2 * size_or_one(max_norm(scene.start.q)) * std::sin(1.0 + 1.7 * static_cast<double>(i));
-    v[i] += 0.3 * size_or_one(max_norm(scene.start.v)) * std::cos(0.3 + 2.3 * static_cast<double>(i));
-  }
-  return {std::move(q), std::move(v)};
 }
 
 /// How many of the rows ∂g/∂q = Uᵀ ∂²L/∂q² are independent.
@@ -131,8 +119,9 @@ Eigen::Index rank_of_factors(const Columns& directions, const Columns& qq) {
 bool are_multipliers(const Scene& scene, const Columns& directions) {
   const Lagrangian& l = *scene.lagrangian;
   const Eigen::Index n = directions.rows();
-  const auto [q, v] = near_start(scene);
-  for (const double t : {scene.start.time, scene.start.time + later}) {
+  const Start near = near_start(scene.start, 1.0);
+  const Vector &q = near.q, &v = near.v;
+  for (const double t : {scene.start.time, near.time}) {
     LagrangianDerivatives at(l);
     at.take_second(l, t, q, v);
     const Columns qq = l.pattern().full(at.qq), qv = l.pattern().full(at.qv);
@@ -163,14 +152,15 @@ bool are_multipliers(const Scene& scene, const Columns& directions) {
 
 std::string fault_of_multipliers(const Scene& scene, const Columns& directions) {
   const Lagrangian& l = *scene.lagrangian;
-  const auto [q, v] = near_start(scene);
+  const Start near = near_start(scene.start, 1.0);
+  const Vector &q = near.q, &v = near.v;
   LagrangianDerivatives at(l);
-  at.take_second(l, scene.start.time + later, q, v);
+  at.take_second(l, near.time, q, v);
   const Columns qq = l.pattern().full(at.qq);
   const Eigen::Index rank = rank_of_factors(directions, qq);
   if (rank == 0 || !vanishes_beside(directions.transpose() * qq * directions, qq)) return {};
   Vector rate(q.size());
-  l.position_gradient_rate(scene.start.time + later, q, v, rate);
+  l.position_gradient_rate(near.time, q, v, rate);
   if (!vanishes_beside(directions.transpose() * rate, rate))
     return "what it is a multiplier of depends on the time: state that as a row, whose force is the "
            "multiplier, and leave the coordinate out";
@@ -185,11 +175,9 @@ std::string rows_said_twice(const Scene& scene, const MultiplierRows& rows) {
   if (m == 0) return {};
   ConstraintsAtPoint own(scene.constraints, scene.dimension());
   Columns dependent;
-  for (const double phase : {0.0, 1.0}) {
-    Vector q = scene.start.q, a(2 * k * n), b(2 * k);
-    for (Eigen::Index i = 0; i < n; ++i)
-      q[i] +=
-          1e-2 * size_or_one(max_norm(scene.start.q)) * std::sin(1.0 + phase + 1.7 * static_cast<double>(i));
+  for (const double phase : {1.0, 2.0}) {
+    const Vector q = near_start(scene.start, phase).q;
+    Vector a(2 * k * n), b(2 * k);
     own.evaluate(scene.start.time, q);
     rows.coefficients(scene.start.time, q, a, b);
     Columns all(m + k, n);

@@ -63,8 +63,8 @@ std::vector<Columns> one_forms_around(const Scene& scene, const Start& start) {
   std::vector<Columns> all{at(start.q)};
   const ConstraintBlocks holonomic = only_holonomic(scene.constraints);
   for (const double distance : {-0.3, -0.1, 0.1, 0.3}) {
-    const auto pose = pose_near_on(scene.space.get(), holonomic, start.time,
-                                   moved_on(scene.space.get(), start, distance), {});
+    const auto pose = pose_near(scene.space.get(), holonomic, start.time,
+                                moved_start(scene.space.get(), start, distance), {});
     if (!pose) continue;
     if (Columns there = at(*pose); there.allFinite()) all.push_back(std::move(there));
   }
@@ -125,7 +125,7 @@ bool broken_by_the_others(const Scene& scene, const Start& start, const std::vec
   bool any = false;
   for (const double distance : {-0.1, -0.03, -0.01, 0.01, 0.03, 0.1}) {
     const auto pose =
-        pose_near_on(scene.space.get(), others, start.time, moved_on(scene.space.get(), start, distance), {});
+        pose_near(scene.space.get(), others, start.time, moved_start(scene.space.get(), start, distance), {});
     if (!pose) continue;
     if (distance_from(these, start.time, *pose) <= met) return false;
     any = true;
@@ -134,49 +134,6 @@ bool broken_by_the_others(const Scene& scene, const Start& start, const std::vec
 }
 
 }  // namespace
-
-Vector moved(const Start& start, double distance) { return moved_on(nullptr, start, distance); }
-
-Vector moved_on(const Space* space, const Start& start, double distance) {
-  const double size = std::max(start.q.lpNorm<Eigen::Infinity>(), 1e-2);
-  Vector change(space != nullptr ? space->dimension() : start.q.size());
-  for (Eigen::Index i = 0; i < change.size(); ++i)
-    change[i] = distance * size * std::sin(1.0 + 1.7 * static_cast<double>(i));
-  return space != nullptr ? space->moved(start.q, change) : Vector(start.q + change);
-}
-
-std::optional<Vector> pose_near(const ConstraintBlocks& holonomic, double t, Vector q,
-                                const std::vector<int>& held) {
-  return pose_near_on(nullptr, holonomic, t, std::move(q), held);
-}
-
-std::optional<Vector> pose_near_on(const Space* space, const ConstraintBlocks& holonomic, double t, Vector q,
-                                   const std::vector<int>& held) {
-  constexpr int most = 50;
-  constexpr double small = 1e-10, dependent = 1e-6;
-  const double from = q.norm();
-  ConstraintsAtPoint rows(holonomic, space != nullptr ? space->dimension() : static_cast<int>(q.size()));
-  for (int iteration = 0; rows.rows() > 0 && iteration < most; ++iteration) {
-    Vector phi(rows.rows());
-    int row = 0;
-    for (const auto& block : holonomic) {
-      block->position(t, q, phi.segment(row, block->rows()));
-      row += block->rows();
-    }
-    rows.evaluate(t, q);
-    Columns a = rows.pattern().full(rows.coefficients());
-    for (const int i : held) a.col(i).setZero();
-    if (!phi.allFinite() || !a.allFinite()) return std::nullopt;
-    Eigen::CompleteOrthogonalDecomposition<Columns> solver;
-    solver.setThreshold(dependent);
-    solver.compute(a);
-    const Vector change = solver.solve(phi);
-    q = space != nullptr ? space->moved(q, -change) : Vector(q - change);
-    if (change.norm() <= small * size_or_one(std::max(from, q.norm()))) return q;
-    if (iteration + 1 == most) return std::nullopt;
-  }
-  return q;
-}
 
 Columns full_one_forms(const ConstraintsAtPoint& rows, const std::vector<int>& held) {
   Columns one_forms = rows.pattern().full(rows.coefficients()).transpose();

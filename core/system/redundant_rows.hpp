@@ -3,19 +3,10 @@
 #include <diracstep/core/system/constraint_distribution.hpp>
 #include <diracstep/core/system/row_subset.hpp>
 #include <diracstep/core/system/scene.hpp>
-#include <optional>
 #include <string>
 #include <vector>
 
 namespace diracstep {
-
-/// The positions of a start, all coordinates moved by this part of their size.
-Vector moved(const Start& start, double distance);
-
-/// A point of the holonomic rows near q that differs from it in what is not `held`, by Gauss and Newton's
-/// method in least squares, so that the rows may depend on each other; nothing where it does not converge.
-std::optional<Vector> pose_near(const ConstraintBlocks& holonomic, double t, Vector q,
-                                const std::vector<int>& held);
 
 /// The one-forms of the rows at a point, Aᵀ, with columns of size 1, since rows may come in any units; the
 /// coordinates `held` do not count.

@@ -1,7 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <diracstep/core/numerics/near_names.hpp>
+#include <diracstep/core/numerics/names.hpp>
 #include <diracstep/scene_format/compiler/input_table.hpp>
 
 namespace diracstep::scene_compiler {

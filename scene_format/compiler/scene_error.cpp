@@ -1,5 +1,5 @@
 #include <algorithm>
-#include <diracstep/core/numerics/near_names.hpp>
+#include <diracstep/core/numerics/names.hpp>
 #include <diracstep/files/shown_text.hpp>
 #include <diracstep/scene_format/compiler/scene_error.hpp>
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <diracstep/core/numerics/errors.hpp>
-#include <diracstep/core/numerics/near_names.hpp>
+#include <diracstep/core/numerics/names.hpp>
 #include <diracstep/scene_format/fields/field_expansion.hpp>
 #include <diracstep/scene_format/fields/field_grid.hpp>
 #include <optional>

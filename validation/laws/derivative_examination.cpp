@@ -53,7 +53,7 @@ struct Line {
   const Space* space = nullptr;  ///< null in R^n
 
   /// x + s dx, or x τ(s dx).
-  Vector position(double s) const { return space != nullptr ? space->moved(x, s * dx) : Vector(x + s * dx); }
+  Vector position(double s) const { return moved(space, x, s * dx); }
 };
 
 Vector one(double value) { return Vector::Constant(1, value); }

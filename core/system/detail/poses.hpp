@@ -7,10 +7,16 @@
 
 namespace diracstep {
 
-/// moved() and pose_near() of redundant_rows.hpp on a space, where q moves by q τ(x) and x is a velocity
-/// times a time; without one in R^n.
-Vector moved_on(const Space* space, const Start& start, double distance);
-std::optional<Vector> pose_near_on(const Space* space, const ConstraintBlocks& holonomic, double t, Vector q,
-                                   const std::vector<int>& held);
+/// The position of a start, all coordinates moved by this part of their size; on a space q τ(x), where x is
+/// a velocity times a time; in R^n where `space` is null.
+Vector moved_start(const Space* space, const Start& start, double distance);
+
+/// A later instant, position and velocity in R^n near a start, of no special place; another for each phase.
+Start near_start(const Start& start, double phase);
+
+/// A point of the holonomic rows near q that differs from it in what is not `held`, by Gauss and Newton's
+/// method in least squares, so that the rows may depend on each other; nothing where it does not converge.
+std::optional<Vector> pose_near(const Space* space, const ConstraintBlocks& holonomic, double t, Vector q,
+                                const std::vector<int>& held);
 
 }  // namespace diracstep

@@ -1,5 +1,5 @@
 #include <algorithm>
-#include <diracstep/core/numerics/near_names.hpp>
+#include <diracstep/core/numerics/names.hpp>
 #include <numeric>
 
 namespace diracstep {
@@ -42,6 +42,14 @@ std::string near_name(std::string_view given, const std::vector<std::string>& kn
 std::string did_you_mean(std::string_view name, const std::vector<std::string>& known) {
   const std::string near = near_name(name, known);
   return near.empty() ? "" : " (did you mean '" + near + "'?)";
+}
+
+std::string name_list(const std::vector<std::string>& names, std::size_t most, std::string_view quote) {
+  std::string list;
+  for (std::size_t i = 0; i < std::min(most, names.size()); ++i)
+    (list += i > 0 ? ", " : "").append(quote).append(names[i]).append(quote);
+  if (names.size() > most) list += " and " + std::to_string(names.size() - most) + " more";
+  return list;
 }
 
 }  // namespace diracstep

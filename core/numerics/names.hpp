@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -12,5 +13,9 @@ std::string near_name(std::string_view name, const std::vector<std::string>& kno
 
 /// The same for messages about an unknown name: " (did you mean 'NAME'?)", or empty.
 std::string did_you_mean(std::string_view name, const std::vector<std::string>& known);
+
+/// "'a', 'b' and 3 more": the first `most` of them, each in quotation marks unless `quote` is empty.
+std::string name_list(const std::vector<std::string>& names, std::size_t most = 50,
+                      std::string_view quote = "'");
 
 }  // namespace diracstep
