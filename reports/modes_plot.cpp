@@ -70,11 +70,13 @@ std::string draw_modes(const std::string& scene, const std::vector<std::string>&
                         eigenvalue_plot("eigenvalues of " + scene, modes));
   script += fmt::format("set ylabel ''\nset yrange [-1.05:1.05]\nset ytics 0.5\nset xrange [0.5:{}.5]\n{}",
                         coordinates.size(), names_of_axis(coordinates));
-  for (std::size_t k = 0; k < shapes; ++k)
-    script += fmt::format("set size 0.31,{:.4f}\nset origin {:.2f},{:.4f}\n{}",
-                          1.0 / static_cast<double>(rows), k % 2 == 0 ? 0.37 : 0.68,
-                          1.0 - static_cast<double>(k / 2 + 1) / static_cast<double>(rows),
-                          shape_plot(k, modes.modes[k], coordinates.size()));
+  for (std::size_t k = 0; k < shapes; ++k) {
+    const std::size_t row = k / 2 + 1;
+    script +=
+        fmt::format("set size 0.31,{:.4f}\nset origin {:.2f},{:.4f}\n{}", 1.0 / static_cast<double>(rows),
+                    k % 2 == 0 ? 0.37 : 0.68, 1.0 - static_cast<double>(row) / static_cast<double>(rows),
+                    shape_plot(k, modes.modes[k], coordinates.size()));
+  }
   return render(script + "unset multiplot\n", stem, 1300, std::max<std::size_t>(480, 240 * rows));
 }
 

@@ -110,7 +110,7 @@ bodies::Formula BodyReader::positive(const toml::table& table, const char* key, 
                                      bool zero) {
   const toml::node* node = table.get(key);
   if (node == nullptr) tables_.fail(place_of(table.source()), fmt::format("{} needs '{}'", what, key));
-  const Formula value = formula(*node, fmt::format("'{}' of {}", key, what));
+  Formula value = formula(*node, fmt::format("'{}' of {}", key, what));
   if (!(zero ? value.value() >= 0.0 : value.value() > 0.0))
     tables_.fail(place_of(node->source()), fmt::format("'{}' of {} is {:g}; it must be {}", key, what,
                                                        value.value(), zero ? "at least 0" : "above 0"));

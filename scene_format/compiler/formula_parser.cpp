@@ -24,7 +24,7 @@ std::string Symbols::velocity_text(int family) const {
   if (components.empty()) return "v_" + families[number].name;
   const auto component =
       std::ranges::find(components, family, [](const auto& entry) { return entry.second; });
-  const std::string name = "v_" + component->first;
+  std::string name = "v_" + component->first;
   for (const auto& [entry, text] : entries)
     if (entry.starts_with("w_") && text.text == name)
       return entry + " (" + name + ", in the body frame of " + entry.substr(2, entry.find('[') - 2) + ")";

@@ -28,7 +28,7 @@ const CompiledKernel* table_of(const LoadedScene& scene, const SceneFunction& fu
 
 }  // namespace
 
-LoadedFunction::LoadedFunction(LoadedScenePtr scene, const SceneFunction& function, KeepTurn keep)
+LoadedFunction::LoadedFunction(LoadedScenePtr scene, const SceneFunction& function, const KeepTurn& keep)
     : scene_(std::move(scene)), function_(&function), table_(table_of(*scene_, function)) {
   place_rows();
   for (const Piece& piece : function.pieces) load(piece, keep);

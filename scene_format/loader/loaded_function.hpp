@@ -20,7 +20,7 @@ class LoadedFunction {
 
   /// With `keep`, a function of those turns alone, of coordinates as they are numbered there.
   LoadedFunction(LoadedScenePtr scene, const scene_compiler::SceneFunction& function,
-                 KeepTurn keep = nullptr);
+                 const KeepTurn& keep = nullptr);
   LoadedFunction(LoadedFunction&&) = default;  // its jobs point into its pieces
 
   const scene_compiler::SceneFunction& function() const { return *function_; }

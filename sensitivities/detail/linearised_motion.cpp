@@ -52,7 +52,7 @@ std::optional<ConstraintRule> asked_rule(const IntegratorOptions& options, std::
 template <class Matrix>
 std::unique_ptr<StageEquations<Matrix>> equations_of(const Integrator& integrator, const Method& method,
                                                      std::size_t number, bool full,
-                                                     std::shared_ptr<ExtendedScene> extended) {
+                                                     const std::shared_ptr<ExtendedScene>& extended) {
   const Scene& scene = integrator.scene();
   const std::optional<ConstraintRule> rule = asked_rule(integrator.options(), number);
   const bool forced = integrator.options().force_degenerate;

@@ -88,8 +88,8 @@ inline Sparse part_of<Sparse>(const SparsityPattern& pattern, const double* valu
   part.reserve(pattern.nonzeros());
   for (int c = 0; c < columns; ++c) {  // in the order of the pattern
     part.startVec(c);
-    for (int e = starts[static_cast<std::size_t>(column + c)];
-         e < starts[static_cast<std::size_t>(column + c) + 1]; ++e)
+    const auto in_pattern = static_cast<std::size_t>(column) + static_cast<std::size_t>(c);
+    for (int e = starts[in_pattern]; e < starts[in_pattern + 1]; ++e)
       if (const int r = indices[static_cast<std::size_t>(e)]; r >= row && r < row + rows)
         part.insertBack(r - row, c) = values[e];
   }

@@ -145,10 +145,10 @@ inline V3 top_torque(const Column& y) {
   return cross(gamma, gradient);
 }
 
-GroupScene heavy_top(std::shared_ptr<const Space> space = rotations());
+GroupScene heavy_top(const std::shared_ptr<const Space>& space = rotations());
 /// The same top under friction and a torque that depends on the time: a last entry of the numbers by hand.
-GroupScene driven_top(std::shared_ptr<const Space> space = rotations());
-GroupScene suslov(std::shared_ptr<const Space> space = rotations());
+GroupScene driven_top(const std::shared_ptr<const Space>& space = rotations());
+GroupScene suslov(const std::shared_ptr<const Space>& space = rotations());
 
 /// A top whose centre of mass x = R r is a coordinate of its own with three holonomic rows; SO3 x R3.
 template <Retraction kind = Retraction::exponential>

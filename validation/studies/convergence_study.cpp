@@ -51,7 +51,7 @@ class StudyInProgress {
     study_.momentum = options.momentum;
     natural_step_ = std::copysign(scene.natural_step, study_.t_end - study_.t_start);
     require_options();
-    if (!options_.series.empty() || options_.rtols.size() > 0)
+    if (!options_.series.empty() || !options_.rtols.empty())
       surveyed_ = surveyed_motion(entry_.scene, registry_, solvers_, study_.t_end, natural_step_);
     if (damped() && !options_.series.empty())
       for (const char* method : {"damped/radau:3", "damped/radau:5"})

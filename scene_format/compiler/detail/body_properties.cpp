@@ -53,8 +53,8 @@ Vec BodyReader::end_to_end(const toml::table& table, const Body& body, const std
   for (const char* key : {"from", "to"})
     if (!table.contains(key))
       tables_.fail(place_of(table.source()), fmt::format("{} needs both 'from' and 'to'", what));
-  const Vec along = vector(*table.get("to"), fmt::format("'to' of {}", what), body.plane) -
-                    vector(*table.get("from"), fmt::format("'from' of {}", what), body.plane);
+  Vec along = vector(*table.get("to"), fmt::format("'to' of {}", what), body.plane) -
+              vector(*table.get("from"), fmt::format("'from' of {}", what), body.plane);
   if (!(norm(along).value() > 0.0))
     tables_.fail(place_of(table.get("to")->source()), fmt::format("'to' of {} is its 'from'", what));
   return along;

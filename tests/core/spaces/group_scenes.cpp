@@ -18,7 +18,7 @@ static auto top_lagrangian() {
         return value;
       });
 }
-GroupScene heavy_top(std::shared_ptr<const Space> space) {
+GroupScene heavy_top(const std::shared_ptr<const Space>& space) {
   auto scene = scene_of("heavy top", std::move(space), top_lagrangian(), generic_rotation(),
                         (Vector(3) << 0.6, -1.2, 1.4).finished());
   const auto rates = [J = generic_inertia()](const Column& y) {
@@ -27,13 +27,13 @@ GroupScene heavy_top(std::shared_ptr<const Space> space) {
     turn(y, w, rate);
     const ExtendedVector a =
         solved(J.cast<Real>(), (ExtendedVector(3) << torque[0], torque[1], torque[2]).finished());
-    for (int i = 0; i < 3; ++i) rate[static_cast<std::size_t>(9 + i)] = a[i];
+    for (int i = 0; i < 3; ++i) rate[9 + static_cast<std::size_t>(i)] = a[i];
     return rate;
   };
   return {"heavy top", scene, entries, rates};
 }
 
-GroupScene driven_top(std::shared_ptr<const Space> space) {
+GroupScene driven_top(const std::shared_ptr<const Space>& space) {
   GroupScene top = heavy_top(space);
   auto scene = std::make_shared<Scene>(*top.scene);
   scene->name = top.name = "driven top";
@@ -50,14 +50,14 @@ GroupScene driven_top(std::shared_ptr<const Space> space) {
         J.cast<Real>(),
         (ExtendedVector(3) << Real(0.5) * std::sin(2 * t) - Real(0.3) * y[9], -Real(0.2) * y[10], Real(0.1))
             .finished());
-    for (int i = 0; i < 3; ++i) rate[static_cast<std::size_t>(9 + i)] += a[i];
+    for (int i = 0; i < 3; ++i) rate[9 + static_cast<std::size_t>(i)] += a[i];
     if (y.size() > 12) rate.push_back(1);
     return rate;
   };
   return top;
 }
 
-GroupScene suslov(std::shared_ptr<const Space> space) {
+GroupScene suslov(const std::shared_ptr<const Space>& space) {
   constexpr std::array<double, 3> a{0.2, -0.3, 1.0};
   auto scene = scene_of("Suslov with gravity", space, top_lagrangian(), generic_rotation(),
                         (Vector(3) << 0.9, -1.1, -0.51).finished());
@@ -74,7 +74,7 @@ GroupScene suslov(std::shared_ptr<const Space> space) {
     for (int i = 0; i < 3; ++i) m(i, 3) = m(3, i) = Real(a[static_cast<std::size_t>(i)]);
     const ExtendedVector x =
         solved(m, (ExtendedVector(4) << torque[0], torque[1], torque[2], Real(0)).finished());
-    for (int i = 0; i < 3; ++i) rate[static_cast<std::size_t>(9 + i)] = x[i];
+    for (int i = 0; i < 3; ++i) rate[9 + static_cast<std::size_t>(i)] = x[i];
     return rate;
   };
   return {"Suslov with gravity", scene, entries, rates};
@@ -151,7 +151,7 @@ GroupScene chaplygin_ball() {
     b[4] = -Real(stiffness) * y[10] - Real(mass) * pull[1];
     b[5] = b[6] = 0;  // (Rω)' = Rω'
     const ExtendedVector x = solved(m, b);
-    for (int i = 0; i < 5; ++i) rate[static_cast<std::size_t>(11 + i)] = x[i];
+    for (int i = 0; i < 5; ++i) rate[11 + static_cast<std::size_t>(i)] = x[i];
     return rate;
   };
   return {"Chaplygin ball", scene, entries, rates};
