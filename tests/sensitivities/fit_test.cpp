@@ -36,7 +36,7 @@ FitData measured(unsigned seed) {
   std::normal_distribution<double> error(0.0, noise);
   FitData data{{{0}, {1}, {2, true, 2.0}}, Vector(20), Columns(20, 3)};
   for (int k = 0; k < 20; ++k) {
-    const Sample& point = motion[static_cast<std::size_t>(2 * k + 2)];
+    const Sample& point = motion[2 * static_cast<std::size_t>(k) + 2];
     data.times[k] = point.time;
     data.values.row(k) << point.q[0] + error(random), point.q[1] + error(random),
         point.v[2] + 2.0 * error(random);
@@ -71,7 +71,7 @@ TEST(Fit, FindsPlantedParametersToRoundOffWithoutNoise) {
   const CatalogueScene entry = make_scene("chaplygin_sleigh");
   const std::vector<Sample> motion = samples_of(entry.scene, problem.steps, 40);
   for (int k = 0; k < 20; ++k) {
-    const Sample& point = motion[static_cast<std::size_t>(2 * k + 2)];
+    const Sample& point = motion[2 * static_cast<std::size_t>(k) + 2];
     data.values.row(k) << point.q[0], point.q[1], point.v[2];
   }
   const FitReport report = fit(problem, data, Vector{{0.35, 0.3}});
@@ -132,8 +132,8 @@ TEST(Fit, AParameterThatCancelsOutIsNotDetermined) {
   std::mt19937 random(1);
   std::normal_distribution<double> error(0.0, 1e-3);
   for (int k = 0; k < 40; ++k) {
-    data.times[k] = motion[static_cast<std::size_t>(k + 1)].time;
-    data.values(k, 0) = motion[static_cast<std::size_t>(k + 1)].q[0] + error(random);
+    data.times[k] = motion[static_cast<std::size_t>(k) + 1].time;
+    data.values(k, 0) = motion[static_cast<std::size_t>(k) + 1].q[0] + error(random);
   }
   const FitReport report = fit(problem, data, Vector{{0.9, 1.7}});
   EXPECT_TRUE(report.converged) << report.ending;
@@ -216,7 +216,7 @@ TEST(Fit, ColumnsOfOutputs) {
   const std::vector<Sample> motion = samples_of(make_scene("chaplygin_sleigh").scene, problem.steps, 40);
   FitData data{{{0, false, 1.0, 1}}, Vector(20), Columns(20, 1)};
   for (int k = 0; k < 20; ++k) {
-    const Sample& at = motion[static_cast<std::size_t>(2 * k + 2)];
+    const Sample& at = motion[2 * static_cast<std::size_t>(k) + 2];
     data.times[k] = at.time;
     data.values(k, 0) = 0.1 * at.v[2] + 0.04 * at.p[0];
   }

@@ -99,7 +99,7 @@ ParametricScene parametric(const Kind& kind) {
   ParametricScene result;
   result.scene = scene_for(kind, usual());
   Scene extended = functions_of<with_parameters>(
-      kind, [](const auto& q, int i) { return q[static_cast<std::size_t>(3 + i)]; });
+      kind, [](const auto& q, int i) { return q[3 + static_cast<std::size_t>(i)]; });
   extended.start = {0.0, join(result.scene->start.q, usual()), join(result.scene->start.v, Vector::Zero(3))};
   result.extended = std::make_shared<const Scene>(extended);
   result.parameters = usual();
@@ -164,7 +164,7 @@ TEST(ParameterSensitivities, TheAdjointIsTheTranspose) {
     Directions z = sensitivities.by_parameters();
     ASSERT_TRUE(sensitivities.jvp(5, z).ok());
     const ReadDirections read = sensitivities.read(z);
-    const ReadDirections weights{some_vector(3, 0.1), some_vector(3, 0.7), some_vector(3, 1.9)};
+    ReadDirections weights{some_vector(3, 0.1), some_vector(3, 0.7), some_vector(3, 1.9)};
     const Columns forward =
         weights.q.transpose() * read.q + weights.v.transpose() * read.v + weights.p.transpose() * read.p;
     integrator.restore(start);

@@ -97,7 +97,7 @@ TEST(Sensitivities, TheAdjointIsTheTranspose) {
     Directions z = sensitivities.from_velocities(dq, dv, Columns::Zero(0, 1));
     ASSERT_TRUE(sensitivities.jvp(steps, z).ok());
     const ReadDirections moved = sensitivities.read(z);
-    const ReadDirections weights{some_vector(n, 0.1), some_vector(n, 0.7), some_vector(n, 1.9)};
+    ReadDirections weights{some_vector(n, 0.1), some_vector(n, 0.7), some_vector(n, 1.9)};
     const double forward = (weights.q.transpose() * moved.q + weights.v.transpose() * moved.v +
                             weights.p.transpose() * moved.p)(0);
     for (const long every : {0L, 1L, 3L}) {
