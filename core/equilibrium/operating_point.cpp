@@ -15,11 +15,7 @@ namespace {
 constexpr Eigen::Index most_unknowns_of_operating_point = 2000;
 constexpr double contradicted_from = 1e-7;  // of the terms of an equation
 
-Columns kernel_of_balanced_rows(Columns matrix) {
-  for (Eigen::Index r = 0; r < matrix.rows(); ++r)
-    matrix.row(r) /= size_or_one(max_norm(matrix.row(r).transpose()));
-  return kernel_basis(matrix, 1e-12);
-}
+constexpr double no_pivot = 1e-12;  // of the largest, of what stays as it is at the start
 
 /// The equations of the header.  Unknowns x: of each coordinate its position where it rests, else its
 /// velocity; then λ.  Coordinates behind those of `resting` are parameters.
@@ -130,12 +126,12 @@ class OperatingPointEquations {
     if (m_ > 0) {
       Columns charges = Columns::Zero(m_, scene_.dimension());
       charges(Eigen::all, resting_) = a(Eigen::all, resting_);
-      charges = Columns(kernel_of_balanced_rows(moved.transpose()).transpose() * charges);
+      charges = Columns(balanced_kernel_basis(moved.transpose(), no_pivot).transpose() * charges);
       if (max_norm(charges) > 0.0) kept_charges_ = charges;
     }
     Columns resisting(m_ + n_, static_cast<Eigen::Index>(moving_.size()));
     resisting << moved, by_v(Eigen::all, moving_).topRows(n_);
-    const Columns free = kernel_of_balanced_rows(resisting);
+    const Columns free = balanced_kernel_basis(resisting, no_pivot);
     kept_fluxes_ = Columns::Zero(free.cols(), scene_.dimension());
     kept_fluxes_(Eigen::all, moving_) = free.transpose();
     point_.evaluate(start_.time, start_.q, start_.v, none);

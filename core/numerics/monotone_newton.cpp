@@ -29,27 +29,17 @@ std::optional<Vector> monotone_step(const Residual& residual, const BalancedMatr
 
 }  // namespace
 
-BalancedMatrix::BalancedMatrix(Columns matrix)
-    : rows_(Vector::Ones(matrix.rows())), columns_(Vector::Ones(matrix.cols())) {
-  constexpr int rounds = 12;
-  const auto scale = [](double largest) { return largest > 0.0 ? 1.0 / std::sqrt(largest) : 1.0; };
-  for (int k = 0; k < rounds; ++k) {
-    const Vector r = matrix.cwiseAbs().rowwise().maxCoeff().unaryExpr(scale);
-    const Vector c = matrix.cwiseAbs().colwise().maxCoeff().transpose().unaryExpr(scale);
-    matrix = r.asDiagonal() * matrix * c.asDiagonal();
-    rows_ = rows_.cwiseProduct(r);
-    columns_ = columns_.cwiseProduct(c);
-  }
+BalancedMatrix::BalancedMatrix(Columns matrix) : by_(balance(matrix)) {
   factors_.setThreshold(singular_below);
   factors_.compute(matrix);
 }
 
 Columns BalancedMatrix::solve(const Columns& right) const {
-  return columns_.asDiagonal() * factors_.solve(Columns(rows_.asDiagonal() * right));
+  return by_.columns.asDiagonal() * factors_.solve(Columns(by_.rows.asDiagonal() * right));
 }
 
 Vector BalancedMatrix::sizes_in_rows(const Vector& x) const {
-  return max_norm(x.cwiseQuotient(columns_)) * rows_.cwiseInverse();
+  return max_norm(x.cwiseQuotient(by_.columns)) * by_.rows.cwiseInverse();
 }
 
 MonotoneNewton solve_monotonically(const Residual& residual,

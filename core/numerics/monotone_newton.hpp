@@ -1,26 +1,25 @@
 #pragma once
 
 #include <Eigen/QR>
-#include <diracstep/core/numerics/types.hpp>
+#include <diracstep/core/numerics/balance.hpp>
 #include <functional>
 #include <string>
 
 namespace diracstep {
 
-/// A matrix with its rows and columns scaled to entries of about 1 (Ruiz, 2001), and its solutions of least
-/// norm in these units.
+/// A matrix with its rows and columns scaled by balance(), and its solutions of least norm in these units.
 class BalancedMatrix {
  public:
   explicit BalancedMatrix(Columns matrix);
 
   Columns solve(const Columns& right) const;
   /// In the units of the columns.
-  double norm(const Vector& x) const { return x.cwiseQuotient(columns_).norm(); }
+  double norm(const Vector& x) const { return x.cwiseQuotient(by_.columns).norm(); }
   /// How large the largest of x is in each row.
   Vector sizes_in_rows(const Vector& x) const;
 
  private:
-  Vector rows_, columns_;
+  Balance by_;
   Eigen::CompleteOrthogonalDecomposition<Columns> factors_;
 };
 

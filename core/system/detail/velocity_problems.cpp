@@ -153,10 +153,7 @@ Columns open_directions(const Scene& scene, const FirstOrderMotions& motions) {
   problem->begin(start.time, start.q, p);
   problem->jacobian(x, values);
   if (!values.allFinite()) return Columns(n + m, 0);  // the step says so itself
-  Columns matrix = values.reshaped(n + m, n + m);
-  for (Eigen::Index r = 0; r < matrix.rows(); ++r)
-    matrix.row(r) /= size_or_one(max_norm(matrix.row(r).transpose()));
-  return kernel_basis(matrix, motions.hide_equations() ? 1e-7 : regular_to);
+  return balanced_kernel_basis(values.reshaped(n + m, n + m), motions.hide_equations() ? 1e-7 : regular_to);
 }
 
 void require_determined(const Scene& scene, const FirstOrderMotions& motions) {
