@@ -72,6 +72,7 @@ LocalErrorControl::LocalErrorControl(double eps, int order, double span, double 
 void LocalErrorControl::start(const Integrator& at) {
   seen_ = {at.position().cwiseAbs(), at.momentum().cwiseAbs()};
   least_ = Vector::Zero(seen_.q.size() + seen_.p.size());
+  rest_.emplace(at.scene());
   refused_ = 0;
   stuck_ = 0;
   sliding_ = 0;
@@ -128,13 +129,15 @@ Vector LocalErrorControl::differences(const Integrator& fine, const Integrator& 
 }
 
 LocalErrorControl::Worst LocalErrorControl::error(const Integrator& fine, const Integrator& whole,
-                                                  double size) {
+                                                  double size, bool by_forces) {
   const Vector difference = differences(fine, whole);
   Worst worst;
-  const auto add = [&](const Vector& start, const Vector& end, const Vector& seen, Eigen::Index first) {
+  const auto add = [&](const Vector& start, const Vector& end, const Vector& seen, Eigen::Index first,
+                       double by_rest) {
     const double rate = of_the_rate * span_ / std::abs(size);
     sizes_ = seen.cwiseMax(end.cwiseAbs()).cwiseMax(rate * (end - start).cwiseAbs());
-    const double least = std::max(of_the_largest, above_round_off / eps_) * max_norm(sizes_);
+    const double least =
+        std::max(of_the_largest, above_round_off / eps_) * std::max(max_norm(sizes_), by_rest);
     for (Eigen::Index i = 0; i < start.size(); ++i) {
       const double e = difference[first + i];
       const double allowed = eps_ * std::max({sizes_[i], least, least_[first + i]});
@@ -142,9 +145,23 @@ LocalErrorControl::Worst LocalErrorControl::error(const Integrator& fine, const 
       if (e != 0.0 && std::abs(e) / allowed > worst.part) worst = {std::abs(e) / allowed, e, first + i};
     }
   };
-  add(q_, fine.position(), seen_.q, 0);
-  add(p_, fine.momentum(), seen_.p, q_.size());
+  add(q_, fine.position(), seen_.q, 0, by_forces ? std::abs(size) * rest_->speed(size) : 0.0);
+  add(p_, fine.momentum(), seen_.p, q_.size(), by_forces ? rest_->momentum(size) : 0.0);
   return worst;
+}
+
+/// Forces are asked for where the step would be refused without them.
+LocalErrorControl::Worst LocalErrorControl::error(const Integrator& fine, const Integrator& whole,
+                                                  double size) {
+  const Worst worst = error(fine, whole, size, false);
+  if (worst.part <= 1.0 || !std::isfinite(worst.part) || fine.scene().space) return worst;
+  Sample start;
+  start.time = fine.time() - size;
+  start.q = q_;
+  start.p = p_;
+  start.v = v_;
+  rest_->see(start);
+  return error(fine, whole, size, true);
 }
 
 /// Takes the step again with a size that hardly differs; what is allowed grows where differences are
@@ -205,7 +222,8 @@ StepReport LocalErrorControl::advance(Integrator& fine, Integrator& whole, doubl
     }
     ++refused_;
     const bool shorter = std::abs(size) <= 0.5 * std::abs(refused_size);
-    const bool stays = shorter && taken && std::isfinite(part) && part > hardly_less * refused_part;
+    const bool stays = shorter && taken && std::isfinite(part) &&
+                       part * std::abs(refused_size) > hardly_less * refused_part * std::abs(size);
     const bool round_off = stays && is_round_off(fine, whole, start, size, worst);
     if (refused_size == 0.0 || shorter) {
       refused_size = size;

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <diracstep/core/integrator/integrator.hpp>
+#include <diracstep/core/runs/rest_sizes.hpp>
+#include <optional>
 #include <vector>
 
 namespace diracstep {
@@ -21,21 +23,23 @@ bool may_change_later(const Scene& scene, double end);
 /// A step of size h is taken whole and in two halves; the halves count.  Their difference e, in q and p, is
 /// to stay below eps:
 ///
-///   max_i |e_i| / s_i ≤ eps,   s_i = max(|y_i| so far, 1e-6 T |ẏ_i|, 1e-10 of the largest s, 1e-13/eps of
+///   max_i |e_i| / s_i ≤ eps,   s_i = max(|y_i| so far, 1e-6 T |ẏ_i|, 1e-10 of the largest s, 4e-16/eps of
 ///   it)
 ///
-/// for positions and momenta apart, T being the time to the end; the difference is about 2^p − 1 times the
-/// error of the halves of a method of order p.  The next step is 0.9 eps/|e| to the power 1/(p + 1) times as
-/// long, at most ten times; a step that is refused shrinks by the power 1/(s + 1) of its s stages, which is
-/// how its error falls where it is stiff (Hairer, Wanner, Solving Ordinary Differential Equations II, IV.8),
-/// at most to a tenth.
+/// for positions and momenta apart, T being the time to the end.  The largest s is no less than what the
+/// forces at the start would do in the step, were they not balanced (RestSizes): at rest all else is
+/// round-off of it.  The difference is about 2^p − 1 times the error of the halves of a method of order p.
+/// The next step is 0.9 eps/|e| to the power 1/(p + 1) times as long, at most ten times; a step that is
+/// refused shrinks by the power 1/(s + 1) of its s stages, which is how its error falls where it is stiff
+/// (Hairer, Wanner, Solving Ordinary Differential Equations II, IV.8), at most to a tenth.
 ///
 /// A step ends behind the first kink in q and v that the motion crosses, the halves where the whole does:
 /// each side is judged by its own error, and a first step is taken behind it.
 ///
-/// Where e does not fall with the size and becomes another one for a size that differs by a thousandth, it is
-/// round-off, as that of the charge of 100 µF beside junctions of 1 pF before anything has charged it: ten
-/// times as much is then allowed of that component.
+/// Where e falls no faster than the size and becomes another one for a size that differs by a thousandth, it
+/// is round-off, as that of the charge of 100 µF beside junctions of 1 pF before anything has charged it, or
+/// of what moves with a velocity that is round-off: a hundred times as much is then allowed of that
+/// component.
 class LocalErrorControl {
  public:
   /// `span` is T; steps below `smallest` are accepted, with 0 none are.
@@ -71,6 +75,7 @@ class LocalErrorControl {
 
   bool is_round_off(Integrator& fine, Integrator& whole, double start, double size, const Worst& worst);
   bool take_both(Integrator& fine, Integrator& whole, double& size, StepReport& report);
+  Worst error(const Integrator& fine, const Integrator& whole, double size, bool by_forces);
   Worst error(const Integrator& fine, const Integrator& whole, double size);
   Vector differences(const Integrator& fine, const Integrator& whole) const;
 
@@ -81,7 +86,8 @@ class LocalErrorControl {
   int sliding_ = 0;  ///< tiny steps one after the other that cross kinks
   bool crossed_ = false;
   Sizes seen_;
-  Vector least_;              ///< of the sizes of (q, p), by round-off
+  Vector least_;  ///< of the sizes of (q, p), by round-off
+  std::optional<RestSizes> rest_;
   Vector q_, p_, v_, sizes_;  ///< where the step starts; workspace
 };
 

@@ -20,8 +20,9 @@ class VariableRunChecks {
       : integrator_(integrator),
         side_(std::move(side)),
         energy_(integrator.integrator().scene(), integrator.integrator().method().damped),
-        nodes_(integrator.integrator().scene(), 0),
-        comparison_(integrator.integrator().scene(), integrator.integrator().method().order),
+        nodes_(integrator.integrator().scene(), 0, !integrator.integrator().method().damped),
+        comparison_(integrator.integrator().scene(), integrator.integrator().method().order,
+                    !integrator.integrator().method().damped),
         kinks_(integrator.integrator(),
                integrator.adaptive().end.value_or(integrator.time() +
                                                   100.0 * integrator.integrator().options().step)),

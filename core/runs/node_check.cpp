@@ -16,10 +16,11 @@ constexpr double frozen = 1e-3;
 
 }  // namespace
 
-NodeCheck::NodeCheck(const Scene& scene, long steps)
+NodeCheck::NodeCheck(const Scene& scene, long steps, bool alternation)
     : scene_(scene),
       rows_(scene.constraints, scene.dimension()),
       growing_(steps == 0),
+      alternation_(alternation),
       between_(growing_ ? 2L * static_cast<long>(window)
                         : std::clamp(steps / fewest_windows, static_cast<long>(window), steps_for_a_window)) {
 }
@@ -35,9 +36,11 @@ void NodeCheck::see(long step, const Sample& node) {
 
 void NodeCheck::judge() {
   // First: a force that alternates has large impulses, which cancel in the momentum.
-  look_for_alternation("velocity", &Sample::v, scene_.coordinates);
-  look_for_alternation("momentum", &Sample::p, scene_.coordinates);
-  look_for_alternation("multiplier", &Sample::lambda, scene_.row_names());
+  if (alternation_) {
+    look_for_alternation("velocity", &Sample::v, scene_.coordinates);
+    look_for_alternation("momentum", &Sample::p, scene_.coordinates);
+    look_for_alternation("multiplier", &Sample::lambda, scene_.row_names());
+  }
   look_for_rest();
 }
 

@@ -20,8 +20,9 @@ namespace diracstep {
 class NodeCheck {
  public:
   /// For a run of about so many steps; 0 where that is not known: windows then come less and less often.  The
-  /// scene, a completed one, must outlive this.
-  NodeCheck(const Scene& scene, long steps);
+  /// scene, a completed one, must outlive this.  Without `alternation` frozen momenta alone are looked for: a
+  /// method that damps, with steps by their local error, has four of them in a turn of what it follows.
+  NodeCheck(const Scene& scene, long steps, bool alternation = true);
 
   /// Whether the node after so many steps, counted by the caller, is to be shown; nodes are asked for in
   /// order.
@@ -41,7 +42,7 @@ class NodeCheck {
 
   const Scene& scene_;
   ConstraintsAtPoint rows_;
-  bool growing_;
+  bool growing_, alternation_;
   long between_, first_ = 0;
   std::size_t seen_ = 0;
   std::array<Sample, window> nodes_;

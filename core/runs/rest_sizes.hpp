@@ -16,15 +16,16 @@ class RestSizes {
   /// Reads the forces ∂L/∂q + f and the masses ∂²L/∂v_i² at a point; −∂H/∂q + f and 1/m = ∂²H/∂p_i² where the
   /// scene is given by a Hamiltonian alone.
   void see(const Sample& point);
-  /// max h |F_i|/m_i over the coordinates with a mass.
+  /// max h |F_i|/m_i over the coordinates with a mass, and of these max h |F_i|.
   double speed(double h) const { return std::abs(h) * speed_; }
+  double momentum(double h) const { return std::abs(h) * largest_force_; }
   /// Σ (h F_i)²/m_i
   double energy(double h) const { return h * h * energy_; }
 
  private:
   const Scene& scene_;
   Vector force_, momentum_, own_, qq_, qy_, yy_;
-  double speed_ = 0.0, energy_ = 0.0;
+  double speed_ = 0.0, energy_ = 0.0, largest_force_ = 0.0;
 };
 
 }  // namespace diracstep

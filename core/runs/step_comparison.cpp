@@ -107,7 +107,7 @@ std::string StepComparison::text() const {
   if (steps_ < fewest_steps) return {};
   if (momentum_.doubted())
     return line(momentum_.time, momentum_.largest / momentum_.way, "the change of the momentum");
-  if (velocity_.doubted())
+  if (velocities_ && velocity_.doubted())
     return line(velocity_.time, velocity_.largest / velocity_.way, "the change of the velocity");
   return {};
 }

@@ -30,8 +30,11 @@ class StepComparison {
   /// Of a step: where it is looked at for no reason, at a kink, or where the motion turned fast.
   enum class Place { usual, at_kink, fast };
 
-  /// The scene, one with a Lagrangian, must outlive this.
-  explicit StepComparison(const Scene& scene, int order = 1) : rest_(scene), order_(order) {}
+  /// The scene, one with a Lagrangian, must outlive this.  Without `velocities` positions and momenta count
+  /// alone: for steps by their local error, where the velocity of what stores nothing, as the voltage of a
+  /// diode beside a tight transformer, is read from momenta whose round-off it amplifies.
+  explicit StepComparison(const Scene& scene, int order = 1, bool velocities = true)
+      : rest_(scene), order_(order), velocities_(velocities) {}
 
   /// A step of size h from `start`, where it led, and where its parts did.  q, v and p are read.
   void add(const Sample& start, double h, const Sample& whole, const Sample& parts,
@@ -60,6 +63,7 @@ class StepComparison {
   double out_of_rest_ = 0.0, out_of_rest_time_ = 0.0, rounding_ = 0.0;  ///< a difference; of positions
   Differences velocity_, momentum_, position_;
   int order_;
+  bool velocities_;
   Vector first_;  ///< position
   double extent_ = 0.0;
   struct Worst {
