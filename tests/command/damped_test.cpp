@@ -376,5 +376,23 @@ step = 0.005
   EXPECT_NEAR(drum["outputs"]["w"].get<double>(), 0.4 * 2.0 / 0.01, 1e-5);
 }
 
+/// At rest in the origin velocities are round-off of what the weight would give them.
+TEST_F(DampedCommand, RowsHoldAWeightAtRest) {
+  for (const char* row : {"v_y = 0", "v_y + 0.3*v_x = 0.3*v_x", "y = 0"})
+    for (const char* method :
+         {"damped/radau:3", "damped/radau:2", "damped/radau:3 --adaptive", "type1/gl:3"}) {
+      const Json end =
+          json("run " +
+               scene("held",
+                     "lagrangian = \"(v_x^2 + v_y^2)/2 - 9.81*y\"\ncoordinates = { x = {}, y = {} }\n"
+                     "force = { x = \"-0.5*v_x\", y = \"-1e6\" }\nspan = { end = 0.1, step = 0.01 }\n"
+                     "rows = [{ name = \"rail\", equation = \"" +
+                         std::string(row) + "\" }]\n") +
+               " --method " + method)["end"];
+      EXPECT_NEAR(of(end, "q", "y"), 0.0, 1e-15) << row << method;
+      EXPECT_NEAR(of(end, "lambda", "rail"), 1e6 + 9.81, 1e-8) << row << method;
+    }
+}
+
 }  // namespace
 }  // namespace diracstep::testing

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <diracstep/core/steps/state.hpp>
 
 namespace diracstep {
@@ -37,5 +39,11 @@ struct StageSizes {
     return size_of_p0 + h * force + h * curvature * position;
   }
 };
+
+/// The size that velocities in rows are measured by: that which the terms of momenta would give the largest
+/// mass, where that is more, since at rest under forces that rows take up all velocities are round-off of it.
+inline double speed_at_rest(double speed, double terms, double mass) {
+  return std::max(speed, mass > 0.0 && std::isfinite(terms) ? terms / mass : 0.0);
+}
 
 }  // namespace diracstep

@@ -202,8 +202,8 @@ class GaussLobattoStep final : public StepProblem {
     terms = std::max(terms, m_ > 0 ? impulse_scale(impulse) : 0.0);
     if (std::isfinite(terms)) blocks_[0].scale = std::max(known_[0], part() * terms);
     if (m_ == 0) return;
-    const double velocity = std::max(speed, mass > 0.0 ? terms / mass : 0.0);
-    blocks_[1].scale = std::max(known_[1], scale_of(part() * form_size(rows_) * velocity));
+    blocks_[1].scale =
+        std::max(known_[1], scale_of(part() * form_size(rows_) * speed_at_rest(speed, terms, mass)));
   }
 
   /// What an iteration leaves of the residual is no random error: it is a smooth function of the state and

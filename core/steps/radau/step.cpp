@@ -163,8 +163,9 @@ class RadauStep final : public StepProblem {
     if (m_ > 0) terms = std::max(terms, rows_.impulse_size(x.data() + n_ * s_));
     if (std::isfinite(terms)) blocks_[0].scale = std::max(known_momentum_, terms);
     if (m_ == 0) return;
-    const double position = largest_entry(points_.gauss.data(), n_ * s_);
-    scale_rows(rows_.form_size(), largest_entry(x.data(), n_ * s_), position);
+    const double position = largest_entry(points_.gauss.data(), n_ * s_),
+                 mass = largest_entry(momentum_.mass(0).data(), momentum_.mass(0).size());
+    scale_rows(rows_.form_size(), speed_at_rest(largest_entry(x.data(), n_ * s_), terms, mass), position);
     blocks_[1].scale = std::max(blocks_[1].scale, rows_.rate_size(points_.gauss));
   }
 
