@@ -2,6 +2,7 @@
 #include <cmath>
 #include <diracstep/core/integrator/prepared_scene.hpp>
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/core/runs/event_actions.hpp>
 #include <diracstep/core/system/consistent_start.hpp>
 #include <diracstep/core/system/contradictory_rows.hpp>
@@ -41,16 +42,44 @@ class ImpactRow final : public ConstraintRows {
   double shift_;
 };
 
-constexpr double least_rebound = 1e-12;  // of the speed before
+constexpr double least_rebound = 1e-12;  // of the speed before and of its terms
 
-/// A_c v + b_c.
-double rate_of_row(const ConstraintRows& contact, double t, const Vector& q, const Vector& v) {
+/// A_c v + b_c, and the sizes of its terms, |A_c| |v| + |b_c|.
+struct RateOfRow {
+  double value, terms;
+};
+
+RateOfRow rate_of_row(const ConstraintRows& contact, double t, const Vector& q, const Vector& v) {
   ConstraintsAtPoint row({std::shared_ptr<const ConstraintRows>(std::shared_ptr<void>(), &contact)},
                          static_cast<int>(v.size()));
   row.evaluate(t, q);
-  Vector rate(1);
+  Vector rate(1), terms = row.offsets().cwiseAbs();
   row.velocity_residual(v, rate);
-  return rate[0];
+  row.pattern().multiply_add(row.coefficients().cwiseAbs().eval().data(), v.cwiseAbs().eval().data(),
+                             terms.data());
+  return {rate[0], terms[0]};
+}
+
+/// Whether the holonomic rows are off at (t, q) by no more than a motion from `first` to there loses to
+/// round-off of its positions and of the time: |φ| ≤ 1e-12 (|A| (|q| + |t − first| |v|) + |t − first| |b|).
+bool off_by_round_off(const Scene& scene, double first, const Sample& at, const Vector& q) {
+  constexpr double round_off = 1e-12;
+  const double since = std::abs(at.time - first);
+  const ConstraintBlocks holonomic = only_holonomic(scene.constraints);
+  ConstraintsAtPoint rows(holonomic, scene.dimension());
+  rows.evaluate(at.time, q);
+  Vector way = since * at.v.cwiseAbs(), phi(rows.rows()), terms = since * rows.offsets().cwiseAbs();
+  if (scene.space)
+    way.array() += max_norm(q);
+  else
+    way += q.cwiseAbs();
+  rows.pattern().multiply_add(rows.coefficients().cwiseAbs().eval().data(), way.data(), terms.data());
+  int row = 0;
+  for (const auto& block : holonomic) {
+    block->position(at.time, q, phi.segment(row, block->rows()));
+    row += block->rows();
+  }
+  return (phi.cwiseAbs().array() <= round_off * terms.array()).all();
 }
 
 /// The velocity of the class of p on the rows of the scene, from a guess in v; the first of the impulses
@@ -160,7 +189,7 @@ EventActions::Outcome EventActions::act(const Event& event, const Sample& at, co
     auto with_contact = std::make_shared<Scene>(*scene);
     double before = 0.0, wanted = 0.0;
     if (event.restitution) {
-      before = rate_of_row(*event.contact, at.time, outcome.q, outcome.v);
+      before = rate_of_row(*event.contact, at.time, outcome.q, outcome.v).value;
       const double restitution = event.restitution(point);
       if (!(restitution >= 0.0 && std::isfinite(restitution))) {
         outcome.failure = "event '" + event.name + "' at t = " + to_text(at.time, 10) + ": restitution is " +
@@ -180,13 +209,14 @@ EventActions::Outcome EventActions::act(const Event& event, const Sample& at, co
       outcome.v = v;
       const std::string by_rows =
           solve_velocity(*scene, solvers_, at.time, outcome.q, outcome.p, outcome.v, first_impulse);
-      const double after = by_rows.empty() ? rate_of_row(*event.contact, at.time, outcome.q, outcome.v) : 0.0;
-      if (by_rows.empty())
-        outcome.failure = std::abs(after - wanted) <= least_rebound * std::abs(before)
+      if (by_rows.empty()) {
+        const RateOfRow after = rate_of_row(*event.contact, at.time, outcome.q, outcome.v);
+        outcome.failure = std::abs(after.value - wanted) <= least_rebound * (std::abs(before) + after.terms)
                               ? ""
                               : "the rows that are on behind it hold the contact at a speed of " +
-                                    to_text(after) + ", where its restitution asks for " + to_text(wanted) +
-                                    "; a plastic impact onto rows needs no 'restitution'";
+                                    to_text(after.value) + ", where its restitution asks for " +
+                                    to_text(wanted) + "; a plastic impact onto rows needs no 'restitution'";
+      }
       first_impulse = 0.0;  // the rows have it
     }
     if (event.restitution) outcome.impulse = first_impulse;
@@ -209,18 +239,16 @@ EventActions::Outcome EventActions::act(const Event& event, const Sample& at, co
 }
 
 void EventActions::settle(const Scene& scene, const Sample& at, Vector& q) const {
-  constexpr double round_off = 1e-12;
+  if (!off_by_round_off(scene, start_->start.time, at, q)) return;
   try {
-    const Vector on_rows = project_start(scene, {at.time, q, at.v}, solvers_).start.q;
-    const Vector way = q.cwiseAbs() + std::abs(at.time - start_->start.time) * at.v.cwiseAbs();
-    if (((on_rows - q).cwiseAbs().array() <= round_off * way.array()).all()) q = on_rows;
+    q = project_start(scene, {at.time, q, at.v}, solvers_).start.q;
   } catch (const Misuse&) {
     return;  // what is not met there is told behind the event
   }
 }
 
 double EventActions::contact_rate(const Event& event, const Sample& at) {
-  return rate_of_row(*event.contact, at.time, at.q, at.v);
+  return rate_of_row(*event.contact, at.time, at.q, at.v).value;
 }
 
 std::shared_ptr<const Scene> EventActions::scene_with(const std::vector<bool>& on, const Start& start) const {

@@ -114,5 +114,43 @@ events = [{ name = "lands", when = "y", on = "floor", restitution = )toml") +
   EXPECT_NE(elastic.err.find("hold the contact at a speed of"), std::string::npos) << elastic.err;
 }
 
+/// Falls from rest at x = 0 onto y + x/2 = 0 and slides down it: no size of x tells what the time is known
+/// to.
+TEST_F(HardContacts, ALandingOnASlopeIsMetToTheRoundOffOfItsTime) {
+  for (const double height : {10.0, 1e4}) {
+    const double flight = std::sqrt(2.0 * height / 9.81), end = 1.2 * flight;
+    std::ostringstream text;
+    text.precision(17);
+    text
+        << "lagrangian = \"(v_x^2 + v_y^2)/2 - 9.81*y\"\ncoordinates = { x = {}, y = {} }\nstart = { y = "
+        << height << " }\nspan = { end = " << end << ", step = " << end / 33.0 << " }\n"
+        << "rows = [{ name = \"floor\", equation = \"y + 0.5*x = 0\", on = false }]\n"
+           "events = [{ name = \"lands\", when = \"y + 0.5*x\", direction = \"falling\", on = \"floor\" }]\n";
+    const double fall = end - flight, along = 0.5 / 1.25;  // of what points down, in x
+    const double x = along * (9.81 * flight * fall + 0.5 * 9.81 * fall * fall);
+    for (const char* how : {"", " --adaptive"}) {
+      const Outcome outcome = run("run " + scene("slope", text.str()) + " --json" + how);
+      ASSERT_EQ(outcome.status, 0) << height << how << outcome.err;
+      EXPECT_NEAR(end_of(outcome), x, 1e-11 * x) << height << how;
+    }
+  }
+}
+
+/// Floor and ball move at 1e4, and meet at 1e-3: what the impact leaves is the round-off of the former.
+TEST_F(HardContacts, ARestitutionOfZeroBesideAFastRowIsMetToItsRoundOff) {
+  for (const char* step : {"0.1", "0.07", "0.033"}) {
+    const Outcome outcome = run("run " + scene("meets", R"toml(
+lagrangian = "v_x^2/2"
+coordinates = { x = {} }
+start = { x = 1e-3, v_x = 12345.6779 }
+span = { end = 2 }
+rows = [{ name = "floor", equation = "x - 12345.6789*t = 0", on = false }]
+events = [{ name = "meets", when = "x - 12345.6789*t", on = "floor", restitution = 0 }]
+)toml") + " --json --step " + step);
+    ASSERT_EQ(outcome.status, 0) << step << outcome.err;
+    EXPECT_NEAR(end_of(outcome), 2 * 12345.6789, 1e-10) << step;
+  }
+}
+
 }  // namespace
 }  // namespace diracstep::testing
