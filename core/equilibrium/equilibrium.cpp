@@ -6,6 +6,7 @@
 #include <diracstep/core/equilibrium/force_balance.hpp>
 #include <diracstep/core/equilibrium/sparse_equilibrium.hpp>
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/core/spaces/space.hpp>
 #include <diracstep/core/system/multiplier_rows.hpp>
 #include <optional>
@@ -37,7 +38,7 @@ class EquilibriumSearch {
     if (along_start) wanted_v_ = start.v;
     for (Eigen::Index i = 0; i < wanted_v_.size(); ++i)
       if (wanted_v_[i] != 0.0) moving_.push_back(static_cast<int>(i));
-    size_ = start.q.lpNorm<Eigen::Infinity>();
+    size_ = max_norm(start.q);
     at_ = start.q;
     reach_ = Vector::Ones(scene.dimension());
     hold_constant_rows();
@@ -49,14 +50,13 @@ class EquilibriumSearch {
     for (; iterations_ < max_path_steps; ++iterations_) {
       if (!here.residual.allFinite()) return failed("the forces are not finite", here);
       const Vector change = newton_step(here);
-      const bool at_end = change.lpNorm<Eigen::Infinity>() <= smallest_change * size_;
+      const bool at_end = max_norm(change) <= smallest_change * size_;
       if (at_end && (relaxed || finish(here).ok())) return finish(here);
-      std::optional<Point> next;
-      if (!at_end) next = along_path(here, change);
+      std::optional<Point> next = at_end ? std::nullopt : along_path(here, change);
       if (!next && relaxed) return failed("Newton's path ends", here);
       if (!next) relaxed = true;
-      here = next ? std::move(*next) : relax(std::move(here));
-      size_ = std::max(size_, here.q.lpNorm<Eigen::Infinity>());
+      here = next ? std::move(*next) : relax(here);
+      size_ = std::max(size_, max_norm(here.q));
     }
     return failed("none is reached in " + std::to_string(max_path_steps) + " steps", here);
   }
@@ -66,14 +66,13 @@ class EquilibriumSearch {
   void hold_constant_rows() {
     constexpr double held = 1e-12;
     balance_.evaluate(time_, at_, wanted_v_);
-    const Columns a = balance_.one_forms;
     std::vector<int> constant;
     int row = 0;
     for (const auto& block : balance_.blocks())
       for (int r = 0; r < block->rows(); ++r, ++row)
         if (!block->holonomic() && is_on_positions(*block)) constant.push_back(row);
     if (constant.empty()) return;
-    free_ = null_space(a(constant, Eigen::all));
+    free_ = null_space(Columns(balance_.one_forms)(constant, Eigen::all));
     reach_ = free_.rowwise().norm();
     for (double& reach : reach_) reach = reach > held ? reach : 0.0;
   }
@@ -118,10 +117,6 @@ class EquilibriumSearch {
     return point;
   }
 
-  Vector beside(const Point& from, const Vector& change) const {
-    return moved(scene_.space.get(), from.q, change);
-  }
-
   /// The residual at one point with its forces along what is allowed at another, whose Jacobian it is for.
   static Vector residual_along(const Columns& allowed, const Vector& residual) {
     const Eigen::Index n = allowed.rows(), k = allowed.cols();
@@ -134,7 +129,6 @@ class EquilibriumSearch {
     factor(point.jacobian);
     return correction(residual_along(point.allowed, point.residual));
   }
-
   void factor(const Columns& jacobian) {
     scales_ = jacobian.rowwise().norm();
     for (double& scale : scales_) scale = scale > 0.0 ? 1.0 / scale : 0.0;
@@ -157,39 +151,55 @@ class EquilibriumSearch {
       const Vector off = residual_along(here.allowed, there.residual - (1.0 - part) * here.residual);
       return off.allFinite() && correction(off).norm() <= off_path * part * change.norm();
     };
-    if (change.norm() <= near_the_end * size_) return evaluate(beside(here, change));
+    if (change.norm() <= near_the_end * size_) return evaluate(moved(scene_.space.get(), here.q, change));
     for (double part = 1.0; part >= shortest_path_step; part /= 2.0) {
       const bool begins_there = std::ranges::all_of(std::array{0.125, 0.25, 0.5}, [&](double fraction) {
-        return on_path(evaluate(beside(here, fraction * part * change)), fraction * part);
+        return on_path(evaluate(moved(scene_.space.get(), here.q, fraction * part * change)),
+                       fraction * part);
       });
       if (!begins_there) continue;
-      Point there = evaluate(beside(here, part * change));
+      Point there = evaluate(moved(scene_.space.get(), here.q, part * change));
       if (on_path(there, part)) return there;
     }
     return std::nullopt;
   }
 
+  /// Whether a small correction meets all equations, as none does where nothing resists a force, as a weight
+  /// above its support; or round-off of them alone is left.
+  bool nearly_there(const Point& here) {
+    const Vector change = newton_step(here), residual = residual_along(here.allowed, here.residual);
+    const Vector left = here.jacobian * change + residual,
+                 terms = here.jacobian.cwiseAbs() * change.cwiseAbs() + residual.cwiseAbs();
+    return max_norm(change) <= 1e-4 * size_ &&
+           ((left.cwiseAbs().array() <= 1e-8 * terms.array()).all() ||
+            (here.residual.cwiseAbs().array() <= 1e-4 * allowed(here).array()).all());
+  }
+
   /// Where Newton's path ends, implicit Euler steps of the overdamped motion  M q̇ = forces  whose size grows
   /// as these fall (pseudo-transient continuation: Kelley and Keyes, SIAM J. Numer. Anal. 35, 1998), until
-  /// Newton's method converges.
-  Point relax(Point here) {
-    const Eigen::Index n = here.v.size(), k = here.allowed.cols();
-    const double masses = here.mass.norm();
-    const double forces =
-        std::max(here.jacobian.topRows(k).norm(), size_ > 0.0 ? here.residual.head(n).norm() / size_ : 0.0);
-    if (!(masses > 0.0 && forces > 0.0)) return here;
+  /// Newton's method converges.  A body falls onto a one-sided support so, for 1e6 of the size of the start.
+  Point relax(const Point& start) {
+    constexpr double size_of_origin = 1e-3, farthest = 1e6;
     constexpr double not_away = 0.9, growth = 1.5;  // along a stiff valley forces stay as they are for long
+    const Eigen::Index n = start.v.size(), k = start.allowed.cols();
+    const double size = size_ > 0.0 ? size_ : size_of_origin, masses = start.mass.norm();
+    const double forces = std::max(start.jacobian.topRows(k).norm(), start.residual.head(n).norm() / size);
+    if (!(masses > 0.0 && forces > 0.0)) return start;
     double time = 0.1 * masses / forces;
+    Point here = start;
     for (; iterations_ < max_path_steps; ++iterations_) {
       Columns jacobian = here.jacobian;
       jacobian.topRows(here.mass.rows()) += here.mass / time;  // more where rows of A depend
       factor(jacobian);
-      Point next = evaluate(beside(here, correction(residual_along(here.allowed, here.residual))));
+      Point next = evaluate(
+          moved(scene_.space.get(), here.q, correction(residual_along(here.allowed, here.residual))));
       if (!next.residual.allFinite()) return here;
+      if (max_norm(next.q - start.q) > farthest * size) return start;
       const double falls = here.residual.norm() / next.residual.norm();
       time *= std::min(10.0, falls > not_away ? growth * falls : falls);
       here = std::move(next);
-      if (newton_step(here).lpNorm<Eigen::Infinity>() <= 1e-4 * size_) return here;
+      size_ = std::max(size_, max_norm(here.q));
+      if (nearly_there(here)) return here;
     }
     return here;
   }
@@ -197,8 +207,7 @@ class EquilibriumSearch {
   /// What each equation may be off by: parts of its terms, and of what a change of q makes of them, by way of
   /// λ too.
   Vector allowed(const Point& point) const {
-    const Vector q = balance_.position_sizes(point.q);
-    const Vector change = size_ * reach_;
+    const Vector q = balance_.position_sizes(point.q), change = size_ * reach_;
     Vector sizes(point.residual.size());
     const Vector along = Columns(point.allowed.transpose() * balance_.stiffness).cwiseAbs() * change;
     sizes << balance_.sizes + balance_.stiffness.cwiseAbs() * change + point.allowed.cwiseAbs() * along,
@@ -253,14 +262,12 @@ class EquilibriumSearch {
   const Scene& scene_;
   const std::function<bool()>& go_on_;
   ForceBalance balance_;
-  double time_;
-  Vector wanted_v_, at_;
+  double time_, size_ = 0.0;
+  Vector wanted_v_, at_, scales_;
   Columns free_;  ///< an orthonormal basis of where q may move, n×f; empty: everywhere
   Vector reach_;  ///< of each coordinate there: 0 where rows hold it
   std::vector<int> moving_;
-  double size_ = 0.0;
   int iterations_ = 0;
-  Vector scales_;
   Eigen::CompleteOrthogonalDecomposition<Columns> factors_;
 };
 

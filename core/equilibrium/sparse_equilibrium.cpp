@@ -1,8 +1,12 @@
+#include <algorithm>
 #include <cmath>
 #include <diracstep/core/equilibrium/sparse_equilibrium.hpp>
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/core/system/contradictory_rows.hpp>
 #include <diracstep/core/system/redundant_rows.hpp>
+#include <functional>
+#include <numeric>
 #include <optional>
 
 namespace diracstep {
@@ -79,8 +83,7 @@ class SparseSearch {
       if (go_on && !go_on()) return ended("interrupted", residual);
       if (!residual.allFinite()) return ended("the forces are not finite", residual);
       const SaddleFactors factors(balance_.stiffness, balance_.one_forms, balance_.one_forms);
-      if (factors.singular())
-        return ended("nothing draws a coordinate back, so that the matrix is singular", residual);
+      if (factors.singular()) return ended(nothing_draws_back(), residual);
       const Vector change = -factors.solve(residual);
       const double moved = change.head(q_.size()).lpNorm<Eigen::Infinity>();
       if (moved <= least_change * size_) return ended({}, residual);
@@ -95,6 +98,15 @@ class SparseSearch {
   }
 
  private:
+  std::string nothing_draws_back() const {
+    const std::string along =
+        free_direction(scene_, balance_.stiffness, balance_.one_forms, balance_.one_forms);
+    return "nothing draws " + (along.empty() ? "a coordinate" : "the direction " + along) +
+           " back, so that the matrix is singular: there equilibria are a family, or none; a weak spring "
+           "along it "
+           "chooses one";
+  }
+
   /// The least ones that take up the forces.
   void set_first_multipliers() {
     balance_.evaluate(scene_.start.time, q_, rest_);
@@ -171,6 +183,36 @@ SaddleFactors::SaddleFactors(const SparseMatrix& block, const SparseMatrix& one_
   const Vector probe = without_pattern(matrix.rows());
   const Vector answer = factors_.solve(probe);
   singular_ = !(answer.lpNorm<Eigen::Infinity>() <= singular_matrix);
+}
+
+std::string free_direction(const Scene& scene, const SparseMatrix& block, const SparseMatrix& one_forms,
+                           const SparseMatrix& rows) {
+  constexpr double beside = 1e-6, shown_from = 0.01;  // of the block; of the largest entry
+  constexpr std::size_t most_shown = 6;
+  const Eigen::Index n = block.rows();
+  SparseMatrix shift(n, n);
+  shift.setIdentity();
+  shift *= beside * size_or_one(largest_entry(block));
+  const SaddleFactors factors(block + shift, one_forms, rows);
+  if (factors.singular()) return {};
+  Vector x = without_pattern(n + rows.rows());
+  for (int k = 0; k < 4; ++k) {
+    x.tail(rows.rows()).setZero();
+    x = factors.solve(x);
+    Eigen::Index largest = 0;
+    if (!(x.head(n).cwiseAbs().maxCoeff(&largest) > 0.0)) return {};
+    x /= x[largest];
+  }
+  std::vector<Eigen::Index> order(static_cast<std::size_t>(n));
+  std::iota(order.begin(), order.end(), 0);
+  std::ranges::stable_sort(order, std::greater<>(), [&](Eigen::Index i) { return std::abs(x[i]); });
+  std::string text;
+  for (std::size_t k = 0; k < order.size() && std::abs(x[order[k]]) >= shown_from; ++k) {
+    if (k == most_shown) return text + ", …";
+    text += (k == 0 ? "" : ", ") + scene.coordinates[static_cast<std::size_t>(order[k])] + ' ' +
+            to_text(x[order[k]], 3);
+  }
+  return text;
 }
 
 Vector SaddleFactors::solve(const Vector& right) const {

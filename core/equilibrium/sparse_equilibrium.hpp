@@ -22,6 +22,12 @@ class SaddleFactors {
   bool singular_ = false;
 };
 
+/// A direction along which nothing draws back on the rows, where such a matrix is singular: by inverse
+/// iteration of the matrix with a small multiple of the identity in its block.  "x 1, y 0.5", the largest
+/// entries first; empty where rows depend on each other.
+std::string free_direction(const Scene& scene, const SparseMatrix& block, const SparseMatrix& one_forms,
+                           const SparseMatrix& rows);
+
 /// find_equilibrium() of a scene that is too large for full matrices: Newton's method for q and λ at once,
 /// damped by the natural monotonicity test (Deuflhard, Newton Methods for Nonlinear Problems, 2004, 3.3).
 /// Rows are on positions, or on velocities with constant coefficients; redundant ones are left out, and the

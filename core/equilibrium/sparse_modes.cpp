@@ -12,7 +12,8 @@ namespace {
 
 constexpr double zero_of_shift = 1e-6;
 constexpr double real_part_of_round_off = 1e-12;
-constexpr double converged = 1e-8;  // residual of an eigenpair
+constexpr double converged = 1e-8;            // residual of an eigenpair
+constexpr double root_of_round_off = 1.2e-7;  // of s² beside the fastest one, by a stiffness of zero
 
 /// The fastest rate that the sizes of the matrices allow.
 double fastest_rate(const ForceBalance& balance) {
@@ -52,6 +53,12 @@ class ShiftInverse {
         scale_(scale) {}
 
   bool singular() const { return factors_.singular(); }
+  /// Where the factors are singular: the position of the motion at this eigenvalue.
+  std::string direction(const Scene& scene, const ForceBalance& balance) const {
+    return free_direction(
+        scene, balance.stiffness + shift_ * moved_, balance.one_forms,
+        rows_of(balance.one_forms, balance.row_derivative, balance.on_positions) + shift_ * of_velocity_);
+  }
 
   void apply(ConstVectorRef in, VectorRef out) const {
     const Eigen::Index n = mass_.rows(), m = of_velocity_.rows();
@@ -113,8 +120,11 @@ Eigen::VectorXcd with_unit_largest(Eigen::VectorXcd shape) {
   return shape;
 }
 
-void add_mode(NearestModes& result, std::complex<double> s, double error, const Eigen::VectorXcd& shape) {
-  if (std::abs(s) <= zero_of_shift * std::abs(result.near)) {
+/// A double zero comes out as the root of round-off: nothing below `slowest` is told from it.
+void add_mode(NearestModes& result, std::complex<double> s, double error, double slowest,
+              const Eigen::VectorXcd& shape) {
+  if (std::abs(s) <= std::max(slowest, zero_of_shift * std::abs(result.near))) {
+    if (std::abs(s) <= slowest) result.found.zeros_below = slowest;
     ++result.found.zeros;
     return;
   }
@@ -147,12 +157,17 @@ NearestModes nearest_modes(const Scene& given, const Equilibrium& at, int count,
   result.variation = variation_of(*scene, balance, at, lambda, later, reach);
   const ShiftInverse map(balance, result.near,
                          result.near != 0.0 ? std::abs(result.near) : fastest_rate(balance));
-  if (map.singular())
+  if (map.singular()) {
+    const std::string along = map.direction(*scene, balance);
     throw Misuse("scene '" + given.name + "': the matrix is singular: there is an eigenvalue at " +
-                 to_text(result.near) + "; choose another number to be near to");
+                 to_text(result.near) + (along.empty() ? "" : ", of the direction " + along) +
+                 "; choose another number to be near to, --near S");
+  }
   const Eigenpairs pairs =
       eigenpairs([&](ConstVectorRef in, VectorRef out) { map.apply(in, out); }, start_of(map, n), wanted);
   result.failure = pairs.failure;
+  const bool vibrates = largest_entry(balance.mass) > 0.0 && largest_entry(balance.damping) == 0.0;
+  const double slowest = vibrates ? root_of_round_off * fastest_rate(balance) : 0.0;
   const double largest = pairs.values.size() > 0 ? pairs.values.cwiseAbs().maxCoeff() : 0.0;
   for (Eigen::Index k = 0; k < pairs.values.size(); ++k) {
     const std::complex<double> theta = pairs.values[k];
@@ -161,7 +176,7 @@ NearestModes nearest_modes(const Scene& given, const Equilibrium& at, int count,
       continue;
     }
     const double error = real_part_of_round_off * largest / std::norm(theta);
-    add_mode(result, result.near + 1.0 / theta, error, pairs.vectors.col(k).head(n));
+    add_mode(result, result.near + 1.0 / theta, error, slowest, pairs.vectors.col(k).head(n));
   }
   finish(result.found);
   return result;

@@ -261,9 +261,11 @@ std::string describe_moves(const Scene& scene, const Start& from, const Start& t
   constexpr double by_round_off = 1e-13;  // of the largest component
   const auto collect = [&](const char* prefix, const Vector& before, const Vector& after) {
     const double least = by_round_off * std::max(max_norm(before), max_norm(after));
+    const auto shown = [&](double number) { return std::abs(number) > least ? number : 0.0; };
     for (Eigen::Index i = 0; i < std::min(before.size(), after.size()); ++i)
       if (std::abs(before[i] - after[i]) > least)
-        moves.push_back({prefix + scene.coordinates[static_cast<std::size_t>(i)], before[i], after[i]});
+        moves.push_back(
+            {prefix + scene.coordinates[static_cast<std::size_t>(i)], shown(before[i]), shown(after[i])});
   };
   collect("", from.q, to.q);
   collect("v_", from.v, to.v);

@@ -275,5 +275,51 @@ TEST_F(EquilibriumVerb, AKinkAtTheEquilibriumIsDoubted) {
   EXPECT_EQ(outcome_of("if(x > 0.1, -3*x, 0)").status, 0);  // elsewhere
 }
 
+/// Bodies above their supports, which nothing but their weight acts on at the start: m g = 19.62.
+TEST_F(EquilibriumVerb, BodiesFallOntoOneSidedSupports) {
+  const std::string weight = "\nparameters = { m = 2, k = 1e6 }\nspan = { end = 1, step = 0.01 }\n";
+  const double depth = 19.62e-6;
+  const auto rests = [&](const std::string& potential, const std::string& start, const char* name,
+                         double expected) {
+    const Json json =
+        found(scene("falls", "lagrangian = \"m*(v_x^2 + v_y^2)/2 - m*9.81*" + potential +
+                                 "\"\ncoordinates = { x = {}, y = {} }\nstart = " + start + weight));
+    EXPECT_NEAR(json["q"][name].get<double>(), expected, 1e-9 * depth + 1e-13 * std::abs(expected))
+        << potential;
+  };
+  rests("y - k*max(0, -y)^2/2 - 50*(x - 1)^2/2", "{ y = 2 }", "y", -depth);
+  rests("y - k*max(0, -100 - y)^2/2 - x^2/2", "{}", "y", -100.0 - depth);
+  // One upon the other.
+  rests("(x + y) - k*max(0, -x)^2/2 - k*max(0, 1 - (y - x))^2/2", "{ x = 3, y = 7 }", "y", 1.0 - 3.0 * depth);
+  // Between two slopes: two thirds and one third of the weight.
+  rests("y - k*max(0, -(y + 0.5*x))^2/2 - k*max(0, x - y)^2/2", "{ x = 0.3, y = 2 }", "x", -depth / 4.5);
+  for (const char* slides : {"y - k*max(0, -(y + 0.5*x))^2/2", "y"}) {
+    const Outcome none =
+        run("equilibrium " +
+            scene("falls", "lagrangian = \"m*(v_x^2 + v_y^2)/2 - m*9.81*" + std::string(slides) +
+                               "\"\ncoordinates = { x = {}, y = {} }\nstart = { y = 2 }" + weight));
+    EXPECT_EQ(none.status, 1) << slides;
+    EXPECT_NE(none.err.find("no equilibrium found: a force of"), std::string::npos) << none.err;
+  }
+}
+
+/// Springs between three masses that nothing holds: round-off of a double zero is no growth.
+TEST_F(EquilibriumVerb, SparseModesOfAFamilyNameIt) {
+  const std::string chain = scene("chain", R"toml(
+lagrangian = "(v_x^2 + v_y^2 + v_z^2)/2 - (x - y)^2/2 - 3*(y - z)^2/2"
+coordinates = { x = {}, y = {}, z = {} }
+start = { x = 0.1 }
+span = { end = 1, step = 0.01 }
+)toml");
+  const Outcome at_zero = run("equilibrium " + chain + " --modes 1 --near 0");
+  if (!has_sparse_modes()) GTEST_SKIP() << "built without Spectra";
+  EXPECT_EQ(at_zero.status, 2);
+  for (const char* name : {"direction", "x 1", "y 1", "z 1", "--near"})
+    EXPECT_NE(at_zero.err.find(name), std::string::npos) << at_zero.err;
+  const Json beside = found(chain + " --modes 1");
+  EXPECT_EQ(beside["zero_eigenvalues"], 2);
+  EXPECT_EQ(beside["stability"].get<std::string>().substr(0, 7), "neutral");
+}
+
 }  // namespace
 }  // namespace diracstep::testing
