@@ -41,16 +41,20 @@ std::vector<std::string> verb_names(const CLI::App& app) {
 
 /// The first word of the command line that nothing takes, with what may have been meant; or CLI11's message.
 std::string complaint(const CLI::App& app, const CLI::ParseError& error) {
+  constexpr std::string_view value_of_flag = " was given a disallowed flag override";
+  const std::string text = error.what();
+  if (text.ends_with(value_of_flag))
+    return fmt::format("{} takes no value", text.substr(0, text.size() - value_of_flag.size()));
   const auto verbs = app.get_subcommands();
   if (verbs.empty() && app.remaining_size() > 0) {
     const std::string word = app.remaining().front();
     return fmt::format("unknown verb '{}'{}", word, did_you_mean(word, verb_names(app)));
   }
-  if (verbs.empty()) return error.what();
+  if (verbs.empty()) return text;
   const auto rest = verbs.front()->remaining();
   const auto option =
       std::ranges::find_if(rest, [](const std::string& word) { return word.starts_with("-"); });
-  if (option == rest.end()) return error.what();
+  if (option == rest.end()) return text;
   std::vector<std::string> known;
   for (const auto* each : verbs.front()->get_options())
     for (const std::string& name : each->get_lnames()) known.push_back("--" + name);
@@ -81,6 +85,13 @@ void add_help(CLI::App& app) {
       print(app.get_subcommand(*about)->help("diracstep"));
     }
   });
+}
+
+/// --adaptive=1e-4 would be --adaptive: what takes no value is given none.
+void refuse_values_of_flags(CLI::App& app) {
+  for (CLI::App* verb : app.get_subcommands({}))
+    for (CLI::Option* option : verb->get_options())
+      if (option->get_items_expected_max() == 0) option->disable_flag_override();
 }
 
 /// --plugin before or after every verb; the plugins are there when the verb runs, if it does.
@@ -174,6 +185,7 @@ int with_all_verbs(int count, char** arguments, bool run_verbs, const Processes&
   add_start(app, session);
   add_study(app, session);
   add_sweep(app, session);
+  refuse_values_of_flags(app);
   take_plugins(app, session, run_verbs);
   return read_and_run(app, session, count, arguments);
 }

@@ -158,7 +158,7 @@ void run(const RunArguments& given, Session& session) {
   RunResult result;
   result.momentum = momentum(options.momentum);
   const bool ends_there = options.adaptive && !options.at.empty();
-  const double end = ends_there ? numbers("--at", options.at).back() : options.end.value_or(entry.t_end);
+  const double end = options.end.value_or(ends_there ? numbers("--at", options.at).back() : entry.t_end);
   if (!options.error && !options.adaptive) {
     take_recommendation(entry, options.method, options.step);
     if (!given.step && options.step)

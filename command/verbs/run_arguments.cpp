@@ -82,11 +82,10 @@ void add_run_arguments(CLI::App& verb, Session& session, RunArguments& options) 
   verb.add_option("--control", options.control,
                   "How its size is found: integrating (without), in-step, or irreversible (for comparison);\n"
                   "for damped/radau:S always local-error");
-  verb.add_option(
-          "--at", options.at,
-          "Times T1,T2,… to show instead of the steps, each by a step of the method from the last\n"
-          "node, and behind an event at its time; the motion keeps its bits.  With --adaptive the last\n"
-          "of them ends the run")
+  verb.add_option("--at", options.at,
+                  "Times T1,T2,… to show instead of the steps, each by a step of the method from the last\n"
+                  "node, and behind an event at its time; the motion keeps its bits.  With --adaptive and\n"
+                  "without --end the last of them ends the run")
       ->type_name("T1,T2,…");
   verb.add_option("--sensitivities", options.sensitivities,
                   "Exact derivatives of the motion by parameters of the scene and by q0, v0, p0, its start:\n"

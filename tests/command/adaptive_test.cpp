@@ -36,6 +36,15 @@ TEST_F(AdaptiveCommand, ShowsTheMotionAtGivenTimes) {
   EXPECT_EQ(times, (std::vector<double>{0.5, 1.0, 1.25}));
 }
 
+TEST_F(AdaptiveCommand, AnEndBesideGivenTimesIsTheEnd) {
+  expect_misuse("run kepler_e06 --adaptive --at 0.2 --end 0.1", {"--at", "t = 0.2", "t = 0.1, the end"});
+  const Outcome outcome =
+      run("run kepler_e06 --adaptive --at 0.1,0.2 --end 0.3 --json --out " + path("k.csv"));
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_EQ(Json::parse(outcome.out)["end"]["t"], 0.3);
+  EXPECT_EQ(lines(contents(path("k.csv"))).size(), 3U);
+}
+
 TEST_F(AdaptiveCommand, DeliversTheErrorAskedForAndReportsTheSearch) {
   const Outcome outcome = run("run pendulum_cartesian --error 1e-6 --json --out " + path("p.csv"));
   ASSERT_EQ(outcome.status, 0) << outcome.err;
@@ -82,6 +91,7 @@ TEST_F(AdaptiveCommand, PlanSaysWhetherVariableStepsPay) {
 TEST_F(AdaptiveCommand, MisuseNamesTheValueAndWhatIsAllowed) {
   expect_misuse("run knife_edge --error 0", {"error = 0", "between 0 and 1"});
   expect_misuse("run knife_edge --adaptive --eps=-1", {"eps = -1", "above 0"});
+  expect_misuse("run knife_edge --adaptive=1e-4", {"--adaptive takes no value", "--eps"});
   expect_misuse("run knife_edge --adaptive --control fast",
                 {"fast", "integrating", "in-step", "irreversible"});
   expect_misuse("run knife_edge --at 11 --error 1e-4", {"--at", "t = 11", "t = 10, the end", "--end"});
