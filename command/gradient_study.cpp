@@ -5,6 +5,7 @@
 #include <cmath>
 #include <diracstep/command/files/written_file.hpp>
 #include <diracstep/command/gradient_study.hpp>
+#include <diracstep/command/interrupt.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/files/csv_table.hpp>
 #include <diracstep/files/input_file.hpp>
@@ -13,6 +14,8 @@
 #include <diracstep/reports/report.hpp>
 #include <diracstep/scene_format/loader/compiler_process.hpp>
 #include <filesystem>
+#include <optional>
+#include <string_view>
 
 namespace diracstep::command {
 
@@ -53,13 +56,20 @@ std::string program_for_gradients() {
       "IDAS");
 }
 
-CsvTable gradients_of(const std::string& program, const GradientStudy& study, const std::string& scene,
-                      const TemporaryDirectory& directory) {
+/// After an interrupt those that were computed, nothing where there are none.
+std::optional<CsvTable> gradients_of(const std::string& program, const GradientStudy& study,
+                                     const std::string& scene, const TemporaryDirectory& directory) {
   const std::string file = directory.file("gradients.csv"), messages = directory.file("messages");
   std::vector<std::string> words{program, file, scene, fmt::format("{:.17g}", study.end.value_or(0.0))};
   words.insert(words.end(), study.set.begin(), study.set.end());
-  const ProcessEnd end = run_process(words, messages, most_gradient_seconds);
-  if (end.kind != ProcessEnd::Kind::exited || end.status != 0) {
+  std::filesystem::remove(file);
+  const ProcessEnd end = run_process(words, messages, most_gradient_seconds, [] { return !interrupted(); });
+  if (interrupted()) {
+    constexpr std::string_view head = "side,setting,seconds,error\n";
+    std::error_code missing;
+    const auto size = std::filesystem::file_size(file, missing);
+    if (missing || size <= head.size()) return std::nullopt;
+  } else if (end.kind != ProcessEnd::Kind::exited || end.status != 0) {
     std::string why =
         end.kind == ProcessEnd::Kind::out_of_time ? "out of time" : read_file(messages, "messages", 10'000);
     while (!why.empty() && why.back() == '\n') why.pop_back();
@@ -123,8 +133,11 @@ void study_gradients(const GradientStudy& study, Session& session) {
   const std::filesystem::path out = study.out.empty() ? std::filesystem::path{} : output_directory(study.out);
   const TemporaryDirectory directory;
   Json all = Json::array();
+  catch_interrupts();
   for (const std::string& scene : scenes) {
-    const CsvTable table = gradients_of(program, study, scene, directory);
+    const std::optional<CsvTable> gradients = gradients_of(program, study, scene, directory);
+    if (!gradients) break;
+    const CsvTable& table = *gradients;
     const std::string name = file_name(std::filesystem::path(scene).stem().string());
     if (study.json)
       all.push_back(gradient_json(table, scene));
@@ -138,8 +151,12 @@ void study_gradients(const GradientStudy& study, Session& session) {
       say(failure);
       session.exit_status = failed;
     }
+    if (interrupted()) break;
   }
   if (study.json) print(to_text(all, 2) + '\n');
+  if (!interrupted()) return;
+  say("interrupted; what was finished is there");
+  session.exit_status = failed;
 }
 
 }  // namespace diracstep::command

@@ -260,7 +260,8 @@ void compare(const std::string& file, const std::string& name, double stated_end
   const Columns reference = by_steps(scene, shared, "type1/gl:6", end, 4 * base).derivatives;
   if (reference.size() == 0)
     throw Error("scene '" + scene.name + "': the motion that is the reference fails");
-  std::string text = "side,setting,seconds,error\n";
+  OutputFile out(file, OutputFile::Mode::fresh);
+  out.write("side,setting,seconds,error\n");
   const auto add = [&](int side, double setting, const Measured& measured) {
     std::array<char, 120> line{};
     const double error = error_of(measured, reference);
@@ -268,7 +269,7 @@ void compare(const std::string& file, const std::string& name, double stated_end
       std::snprintf(line.data(), line.size(), "%d,%.17g,%.6g,%.6g\n", side, setting, measured.seconds, error);
     else
       std::snprintf(line.data(), line.size(), "%d,%.17g,,\n", side, setting);
-    text += line.data();
+    out.write(line.data());  // at once: whoever ends this program has what was computed
   };
   for (const int side : {0, 1})
     for (const double tolerance : {1e-4, 1e-6, 1e-8, 1e-10, 1e-12})
@@ -279,8 +280,6 @@ void compare(const std::string& file, const std::string& name, double stated_end
       add(s, static_cast<double>(taken),
           by_steps(scene, shared, "type1/gl:" + std::to_string(s), end, taken));
     }
-  OutputFile out(file, OutputFile::Mode::fresh);
-  out.write(text);
   out.close();
 }
 

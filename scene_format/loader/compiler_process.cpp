@@ -16,7 +16,7 @@ namespace {
 // After fork() only what is safe in a signal handler is called: other threads may have held any lock.
 
 constexpr int cannot_start = 127;
-constexpr int look_milliseconds = 10;
+constexpr int look_milliseconds = 10, ask_milliseconds = 100;
 
 double now() {
   std::timespec time{};
@@ -90,7 +90,8 @@ Told watch(pid_t child, int parent, double deadline) {
 
 }  // namespace
 
-ProcessEnd run_process(const std::vector<std::string>& command, const std::string& messages, double seconds) {
+ProcessEnd run_process(const std::vector<std::string>& command, const std::string& messages, double seconds,
+                       const std::function<bool()>& go_on) {
   std::vector<char*> arguments;
   for (const auto& part : command) arguments.push_back(const_cast<char*>(part.c_str()));
   arguments.push_back(nullptr);
@@ -110,6 +111,13 @@ ProcessEnd run_process(const std::vector<std::string>& command, const std::strin
   close(answer[1]);
   Told told;
   if (watcher > 0) {
+    pollfd told_by{answer[0], POLLIN, 0};
+    while (go_on && poll(&told_by, 1, ask_milliseconds) <= 0)
+      if (!go_on()) break;
+    if (go_on && !go_on()) {  // the watcher ends the program then
+      close(parent[1]);
+      parent[1] = -1;
+    }
     ssize_t got = 0;
     while ((got = read(answer[0], &told, sizeof told)) < 0 && errno == EINTR) {
     }
@@ -117,7 +125,7 @@ ProcessEnd run_process(const std::vector<std::string>& command, const std::strin
     while (waitpid(watcher, nullptr, 0) < 0 && errno == EINTR) {
     }
   }
-  close(parent[1]);
+  if (parent[1] >= 0) close(parent[1]);
   close(answer[0]);
   return {static_cast<ProcessEnd::Kind>(told.kind), told.status};
 }

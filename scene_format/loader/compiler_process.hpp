@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -13,7 +14,8 @@ struct ProcessEnd {
 
 /// Runs a program without a shell, its messages in the file `messages`, and waits for it.  It has a process
 /// group of its own, which is ended with all that it started after `seconds`, and at once where this process
-/// ends, whichever way.
-ProcessEnd run_process(const std::vector<std::string>& command, const std::string& messages, double seconds);
+/// ends, whichever way, or where `go_on`, which is asked every 0.1 s, says no.
+ProcessEnd run_process(const std::vector<std::string>& command, const std::string& messages, double seconds,
+                       const std::function<bool()>& go_on = {});
 
 }  // namespace diracstep

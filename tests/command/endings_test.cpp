@@ -274,13 +274,14 @@ control = { parameters = ["u"], cost = "u^2" }
     std::string line;
     std::chrono::milliseconds before;  ///< the signal: to come to the phase that lasts
   };
-  const std::vector<Verb> verbs{
-      {"study steering_table --methods type1/gl:2 --out '" + path("study") + "'", 3s},
-      {"fit " + swing + " '" + path("measured.csv") + "' --parameters k", 500ms},
-      {"boundary " + swing + " --from x=1 --to x=0.3 --end 20 --step 1e-4", 500ms},
-      {"control " + controlled + " --to x=1 v_x=0", 500ms},
-      {"check --scenes", 500ms},
-      {"orders", 500ms}};
+  std::vector<Verb> verbs{{"study steering_table --methods type1/gl:2 --out '" + path("study") + "'", 3s},
+                          {"fit " + swing + " '" + path("measured.csv") + "' --parameters k", 500ms},
+                          {"boundary " + swing + " --from x=1 --to x=0.3 --end 20 --step 1e-4", 500ms},
+                          {"control " + controlled + " --to x=1 v_x=0", 500ms},
+                          {"check --scenes", 500ms},
+                          {"orders", 500ms}};
+  if (run("study kepler_e06 --sensitivities --end 0.01").status == 0)  // where SUNDIALS has IDAS
+    verbs.push_back({"study kepler_e06 --sensitivities --end 1e5", 500ms});
   const std::string messages = path("messages");
   for (const Verb& verb : verbs) {
     Started process(verb.line, messages);
