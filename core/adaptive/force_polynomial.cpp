@@ -60,10 +60,11 @@ double ForcePolynomial::closest(double t) const {
   return 8.0 * epsilon * std::max(std::abs(t), 0.01 * span_);
 }
 
-void ForcePolynomial::read(const PathCubic& path, double t, VectorRef f) {
+/// F at a time and the point of the path of another.
+void ForcePolynomial::read(const PathCubic& path, double place, double t, VectorRef f) {
   ++readings_;
-  path.at(t, q_, v_);
-  path.momentum_at(t, p_);
+  path.at(place, q_, v_);
+  path.momentum_at(place, p_);
   scene_.force_and_momentum(t, q_, v_, p_, f.head(n_), f.segment(n_, n_));
   if (scene_.force) {
     scene_.force->value(t, q_, v_, external_);
@@ -79,6 +80,8 @@ void ForcePolynomial::read(const PathCubic& path, double t, VectorRef f) {
 void ForcePolynomial::find_scales(const std::vector<PathPoint>& path) {
   span_ = std::abs(path.back().time - path.front().time);
   readings_ = 0;
+  rounding_.setZero(n_);
+  counted_to_.reset();
   double force = 0.0, momentum = 0.0;
   Vector row_terms = Vector::Zero(m_), terms(m_), noise = Vector::Zero(2 * n_ + m_);
   for (std::size_t k = 0; k + 1 < path.size(); ++k) {
@@ -88,7 +91,8 @@ void ForcePolynomial::find_scales(const std::vector<PathPoint>& path) {
     read(cubic, t + closest(t), other_);
     read(cubic, t, value_);
     noise = noise.cwiseMax((value_ - other_).cwiseAbs());
-    force = std::max(force, max_norm(value_.head(n_)));
+    force += max_norm(value_.head(n_)) * std::abs(cubic.end() - cubic.begin()) /
+             span_;  // the mean: pulses are high
     momentum = std::max(momentum, max_norm(value_.segment(n_, n_)));
     if (m_ == 0) continue;
     terms = value_.tail(m_).cwiseAbs();
@@ -121,7 +125,7 @@ double ForcePolynomial::fit(const PathCubic& path, double a, double b, long poin
     read(path, middle + half * chebyshev.x[static_cast<std::size_t>(k)], samples_.col(k));
   // What rounding of F and of t leaves of F here, whatever is asked for.
   const double rounding = 2.0 * std::numeric_limits<double>::epsilon() * std::abs(middle);
-  local_ = 1e-13 * samples_.cwiseAbs().rowwise().maxCoeff();
+  local_ = read_error * samples_.cwiseAbs().rowwise().maxCoeff();
   for (std::size_t k = 0; k + 1 < chebyshev.x.size(); ++k) {
     const double apart = std::abs(half) * (chebyshev.x[k] - chebyshev.x[k + 1]);
     const auto i = static_cast<Eigen::Index>(k);
@@ -159,6 +163,32 @@ double ForcePolynomial::fit(const PathCubic& path, double a, double b, long poin
     compare(0.5 * (t + next));
   }
   return worst;
+}
+
+void ForcePolynomial::count_rounding(const PathCubic& path) {
+  const double deviation = epsilon * std::abs(middle_) / std::sqrt(12.0);  // of a rounded time
+  const auto part = [&](const Vector& squares) {
+    return deviation * (squares.cwiseSqrt().array() * weights_.head(n_).array()).maxCoeff();
+  };
+  const auto time = [&](int k) { return middle_ + half_ * chebyshev.x[static_cast<std::size_t>(k)]; };
+  Vector squares = Vector::Zero(n_);
+  for (int k = 1; k < nodes; ++k) squares += (samples_.col(k) - samples_.col(k - 1)).head(n_).cwiseAbs2();
+  // Of that, what the motion brings does not count: it is read where the stages are, whatever the time.
+  const auto add_at_rest = [&](int k, double t) {
+    read(path, time(k), t, value_);
+    squares += (samples_.col(k) - value_).head(n_).cwiseAbs2();
+  };
+  if (part(squares) > counts * counts * error_) {
+    squares.setZero();
+    for (int k = 1; k < nodes; ++k) add_at_rest(k, time(k - 1));
+  }
+  if (counted_to_) add_at_rest(nodes - 1, *counted_to_);
+  counted_to_ = time(0);
+  rounding_ += deviation * deviation * squares;
+}
+
+double ForcePolynomial::rounding() const {
+  return (rounding_.cwiseSqrt().array() * weights_.head(n_).array()).maxCoeff();
 }
 
 double ForcePolynomial::miss(const PathCubic& path, double t) {

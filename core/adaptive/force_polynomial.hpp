@@ -3,6 +3,7 @@
 #include <diracstep/core/runs/path_cubic.hpp>
 #include <diracstep/core/system/constraint_distribution.hpp>
 #include <diracstep/core/system/scene.hpp>
+#include <optional>
 #include <vector>
 
 namespace diracstep {
@@ -30,6 +31,13 @@ class ForcePolynomial {
   /// Whether F is not the same on both sides of the point where one cubic ends and the next begins.
   bool jumps(const PathCubic& before, const PathCubic& after);
 
+  /// Counts what the rounding of the times of its nodes leaves of the impulse of F over the part that the
+  /// last polynomial is of.  Parts are counted in the order of the motion.
+  void count_rounding(const PathCubic& path);
+  /// The standard deviation of all that was counted, in parts of the largest momentum: steps read F at times
+  /// that are rounded, and all of the change of a narrow pulse lies within few units of round-off.
+  double rounding() const;
+
   /// So close to t two times count as one.
   double closest(double t) const;
   double span() const { return span_; }
@@ -38,7 +46,8 @@ class ForcePolynomial {
   bool smooth() const { return smooth_; }
 
  private:
-  void read(const PathCubic& path, double t, VectorRef f);
+  void read(const PathCubic& path, double t, VectorRef f) { read(path, t, t, f); }
+  void read(const PathCubic& path, double place, double t, VectorRef f);
 
   const Scene& scene_;
   double error_;
@@ -47,6 +56,8 @@ class ForcePolynomial {
   bool smooth_;
   Vector allowed_, weights_;  ///< of each component of F, and what turns it into parts of the momentum
   Vector q_, v_, p_, external_, local_, value_, other_;
+  Vector rounding_;                   ///< squares of impulses
+  std::optional<double> counted_to_;  ///< time of the last node counted
   Columns samples_;
   double span_ = 0.0, middle_ = 0.0, half_ = 1.0;  ///< of the motion, and of the last polynomial
   long readings_ = 0;

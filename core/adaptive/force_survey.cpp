@@ -16,13 +16,9 @@ constexpr double widest_gap = 32.0;                            // in closest tim
 ForceSurvey::ForceSurvey(const Scene& scene, double error)
     : kinks_(scene.kinks), size_(scene.dimension() + scene.rows()), force_(scene, error) {}
 
-/// Times in (a, b) where the scene's formulas show that F may change fast, in the order of the motion.
-std::vector<double> ForceSurvey::known_times(const PathCubic& path, double a, double b) {
-  std::vector<double> times;
-  for (const KinkCrossing& crossing :
-       crossings_->along(path, a, b, looks_for_kinks, 0.25 * force_.closest(b)))
-    times.push_back(crossing.time);
-  return times;
+/// Where in (a, b) the scene's formulas show that F may change fast, in the order of the motion.
+std::vector<KinkCrossing> ForceSurvey::known_in(const PathCubic& path, double a, double b) {
+  return crossings_->along(path, a, b, looks_for_kinks, 0.25 * force_.closest(b));
 }
 
 /// The smallest part of (a, b) that bisection leads to whose polynomial misses F while those of both its
@@ -37,13 +33,21 @@ std::pair<double, double> ForceSurvey::narrow(const PathCubic& path, double a, d
   return {a, b};
 }
 
+/// A stretch that the last polynomial is of.
+void ForceSurvey::add(const Stretch& stretch, const PathCubic& path, ForceSurveyReport& report) {
+  report.stretches.push_back(stretch);
+  force_.count_rounding(path);
+}
+
 /// Divides (a, b), whose polynomial misses F, into parts that do not.
-void ForceSurvey::divide(const PathCubic& path, double a, double b, const std::vector<double>& known,
+void ForceSurvey::divide(const PathCubic& path, double a, double b, const std::vector<KinkCrossing>& known,
                          ForceSurveyReport& report) {
   std::vector<std::pair<double, double>> cuts;  // ends of parts, and beginnings of those that follow
-  for (const double t : known) {
-    const double gap = std::copysign(force_.closest(t), b - a);
-    if ((t - a) / gap > 2.0 && (b - t) / gap > 2.0) cuts.emplace_back(t - gap, t + gap);
+  for (const KinkCrossing& crossing : known) {
+    const double t = crossing.time, beside = std::copysign(force_.closest(t), b - a);
+    // What is left out of a narrow pulse would be missed of its impulse.
+    const double gap = crossing.smooth ? 0.0 : beside;
+    if ((t - a) / beside > 2.0 && (b - t) / beside > 2.0) cuts.emplace_back(t - gap, t + gap);
   }
   if (cuts.empty()) {
     const auto [low, high] = narrow(path, a, b);
@@ -71,7 +75,7 @@ void ForceSurvey::divide(const PathCubic& path, double a, double b, const std::v
     if (part > 1.0 && std::abs(to - part_from) > widest_gap * force_.closest(to))
       divide(path, part_from, to, {}, report);
     else
-      report.stretches.push_back({part_from, to});
+      add({part_from, to}, path, report);
     if (!report.followed) return;
   }
 }
@@ -113,13 +117,17 @@ bool ForceSurvey::switches_at(const PathCubic& before, const PathCubic& after) {
 }
 
 void ForceSurvey::examine(const PathCubic& path, double a, double b, ForceSurveyReport& report) {
-  const std::vector<double> known = known_times(path, a, b);
+  const std::vector<KinkCrossing> known = known_in(path, a, b);
+  std::vector<double> times;
+  for (const KinkCrossing& crossing : known) times.push_back(crossing.time);
   const auto share = static_cast<double>(points_) * std::abs(b - a) / force_.span();
-  if (force_.fit(path, a, b, std::max(4L, static_cast<long>(share)), known) <= 1.0) {
-    if (whole_)
+  if (force_.fit(path, a, b, std::max(4L, static_cast<long>(share)), times) <= 1.0) {
+    if (whole_) {
       report.stretches.back().end = b;
-    else
-      report.stretches.push_back({a, b});
+      force_.count_rounding(path);
+    } else {
+      add({a, b}, path, report);
+    }
     whole_ = true;
     return;
   }
@@ -166,6 +174,7 @@ ForceSurveyReport ForceSurvey::along(const std::vector<PathPoint>& path, long pa
     report.missed = HUGE_VAL;
     report.time = b;
   }
+  report.rounding = force_.rounding();
   return report;
 }
 

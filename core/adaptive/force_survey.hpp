@@ -15,7 +15,9 @@ struct ForceSurveyReport {
   /// What a run with even steps over these parts of the motion would miss: the largest component of
   /// ∫|F − its polynomial| dt over all steps, in parts of the largest momentum.
   double missed = 0.0;
-  double time = 0.0;     ///< where most of it is missed
+  double time = 0.0;  ///< where most of it is missed
+  double rounding =
+      0.0;               ///< standard deviation of what the rounding of times leaves of it, in the same parts
   bool followed = true;  ///< false where F changes so fast on so much of the motion that the survey gave up
   std::vector<Stretch> stretches;  ///< that resolve what was found
 };
@@ -43,9 +45,10 @@ class ForceSurvey {
   ForceSurveyReport along(const std::vector<PathPoint>& path, long parts = 1);
 
  private:
-  std::vector<double> known_times(const PathCubic& path, double a, double b);
+  std::vector<KinkCrossing> known_in(const PathCubic& path, double a, double b);
+  void add(const Stretch& stretch, const PathCubic& path, ForceSurveyReport& report);
   void examine(const PathCubic& path, double a, double b, ForceSurveyReport& report);
-  void divide(const PathCubic& path, double a, double b, const std::vector<double>& known,
+  void divide(const PathCubic& path, double a, double b, const std::vector<KinkCrossing>& known,
               ForceSurveyReport& report);
   void count_missed(const PathCubic& path, double a, double b, std::size_t first, ForceSurveyReport& report);
   bool switches_at(const PathCubic& before, const PathCubic& after);

@@ -20,6 +20,7 @@ constexpr double missed_allowed = 0.1;          // by the forces surveyed, in pa
 constexpr double least_part_left = 0.01;        // of an end beside the motion, that the forces are held to
 constexpr double error_out_of_reach = 1e-15;    // differences of runs hold nothing but round-off below it
 constexpr double growth_of_no_power = 1e6;      // of two runs apart: powers of the time lead to less
+constexpr double deviations_of_times = 2.0;     // standard ones, of what their round-off leaves
 constexpr double smallest_local_error = 2e-14;  // below it steps have one of round-off
 
 std::string text(double value) { return to_text(value, 3); }
@@ -153,6 +154,7 @@ bool RefinementSearch::survey(bool accepted) {
   ForceSurvey forces(*motion_.scene, allowed);
   const long parts = std::max(1L, std::lround(static_cast<double>(refinement_) / static_cast<double>(way)));
   const ForceSurveyReport found = forces.along(path, parts);
+  rounding_of_times_ = found.rounding;
   if (found.missed <= missed_allowed * allowed) return true;
   fast_ = "the force changes fast near t = " + to_text(found.time);
   if (!accepted && (!found.followed || report_.adaptive)) return true;  // finer steps may do
@@ -243,13 +245,21 @@ std::string RefinementSearch::amplified(double left) const {
 
 /// Ends the search with the last run, where the motion does not amplify round-off above the error asked for.
 bool RefinementSearch::accept() {
-  const double left = amplified_round_off(true);
+  double left = amplified_round_off(true);
   if (left > motion_.options.error) return refuse(amplified(left));
+  const double of_times = deviations_of_times * rounding_of_times_ *
+                          std::max(1.0 / part_left_at_end(), growth_);  // that is in parts of the end, too
+  if (of_times > motion_.options.error)
+    return refuse("the forces change so fast that the round-off of the time alone leaves an error of " +
+                  text(of_times));
+  const bool by_times = of_times > std::max(left, report_.estimate);
+  left = std::max(left, of_times);
   report_.estimate = std::max(report_.estimate, left);
   accepted_ = true;
   report_.warning = doubt_;
-  report_.grounds = left > convergence_.estimate() ? "that of round-off, which the motion amplifies"
-                                                   : convergence_.grounds();
+  report_.grounds = by_times ? "that of the round-off of times, at which forces change fast"
+                    : left > convergence_.estimate() ? "that of round-off, which the motion amplifies"
+                                                     : convergence_.grounds();
   // Orders of differences that are round-off say nothing.
   if (convergence_.at_round_off()) report_.observed_order = std::nan("");
   return false;

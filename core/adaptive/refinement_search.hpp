@@ -99,7 +99,8 @@ class RefinementSearch {
   std::vector<Counted> last_ = {};    ///< the last three runs that count, the finest at the end
   double largest_position_ = 0.0, largest_momentum_ = 0.0, largest_velocity_ = 0.0;  ///< at the nodes read
   int failures_ = 0, stuck_ = 0, divisions_ = 0;
-  double growth_ = 0.0;  ///< of errors, where it has been asked for
+  double growth_ = 0.0;             ///< of errors, where it has been asked for
+  double rounding_of_times_ = 0.0;  ///< ForceSurveyReport::rounding of the last survey
   bool surveyed_ = false, ended_ = false, measuring_ = false, accepted_ = false;
   std::string fast_;   ///< empty, or where the forces change fast
   std::string doubt_;  ///< empty, or what the checks of a run say of the last one

@@ -10,6 +10,22 @@ namespace {
 
 constexpr std::size_t most_known_cuts = 200;
 
+/// Leads over a gap between two stretches, with the impulse of the forces on both its sides: in a pulse of a
+/// few thousand units of round-off in t it counts.
+void cross_gap(Integrator& integrator, double t) {
+  const double before = integrator.time();
+  const Vector q = integrator.position(), v = integrator.velocity_estimate();
+  Vector p = integrator.momentum();
+  const Scene& scene = integrator.scene();
+  if (t != before && scene.force) {
+    Vector from(p.size()), to(p.size());
+    scene.force->value(before, q, v, from);
+    scene.force->value(t, q, v, to);
+    p += 0.5 * (t - before) * (from + to);
+  }
+  integrator.restart(t, q, p, v);
+}
+
 }  // namespace
 
 std::vector<Stretch> known_stretches(const Scene& scene, double end) {
@@ -48,8 +64,7 @@ StepReport StepPlan::run(Integrator& integrator, long refinement, const std::fun
   StepReport report;
   for (const Stretch& stretch : stretches_) {
     if (&stretch != &stretches_.front()) {
-      const Vector q = integrator.position(), p = integrator.momentum(), v = integrator.velocity_estimate();
-      integrator.restart(stretch.begin, q, p, v);
+      cross_gap(integrator, stretch.begin);
     }
     const double h = step_in(stretch, refinement);
     for (long k = 0; k < stretch.steps * refinement; ++k) {

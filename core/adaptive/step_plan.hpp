@@ -22,7 +22,7 @@ std::vector<Stretch> known_stretches(const Scene& scene, double end);
 /// so that the runs have an order.
 ///
 /// Between two stretches a gap of a few units of round-off in t may lie, at an instant where a force jumps:
-/// no step then reads the force on both of its sides.
+/// no step then reads the force on both of its sides, and its impulse there is that of the mean of both.
 class StepPlan {
  public:
   StepPlan() = default;

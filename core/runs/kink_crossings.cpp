@@ -11,7 +11,8 @@ KinkCrossings::KinkCrossings(std::shared_ptr<const Kinks> kinks, double first, d
   values_.setZero(kinks_->count());
   for (const auto& [time, width] : kinks_->instants(std::min(first, last), std::max(first, last)))
     for (const double off : {0.0, -6.0, 6.0, -1.0, 1.0})
-      if (off == 0.0 || width > 0.0) instants_.push_back({time + off * width, off == 0.0 ? 0.0 : width});
+      if (off == 0.0 || width > 0.0)
+        instants_.push_back({time + off * width, off == 0.0 ? 0.0 : width, width > 0.0});
   std::ranges::sort(instants_, {}, &Cut::time);
 }
 
@@ -35,7 +36,7 @@ void KinkCrossings::add_switches(const PathCubic& path, double a, double b, int 
       evaluate(t, values_);
       (sign_of(values_[r]) == sign ? from : to) = t;
     }
-    found.push_back({to, static_cast<int>(r), false});
+    found.push_back({to, static_cast<int>(r), false, false});
   };
   SignChanges(kinks_->count(), evaluate, narrow).look(a, b, looks, true);
 }
@@ -48,7 +49,7 @@ std::vector<KinkCrossing> KinkCrossings::along(const PathCubic& path, double a, 
   const double low = std::min(a, b), high = std::max(a, b);
   for (auto cut = std::ranges::upper_bound(instants_, low, {}, &Cut::time);
        cut != instants_.end() && cut->time < high; ++cut)
-    if (cut->width == 0.0 || cut->width < high - low) found.push_back({cut->time, -1, true});
+    if (cut->width == 0.0 || cut->width < high - low) found.push_back({cut->time, -1, true, cut->smooth});
   std::erase_if(found, [&](const KinkCrossing& it) { return !(it.time > low && it.time < high); });
   const double sign = b < a ? -1.0 : 1.0;
   std::ranges::stable_sort(found, {}, [sign](const KinkCrossing& it) { return sign * it.time; });
@@ -60,6 +61,7 @@ std::vector<KinkCrossing> KinkCrossings::along(const PathCubic& path, double a, 
     }
     once.back().number = std::max(once.back().number, it.number);
     once.back().instant = once.back().instant || it.instant;
+    once.back().smooth = once.back().smooth && it.smooth;
   }
   return once;
 }

@@ -12,6 +12,7 @@ struct KinkCrossing {
   double time;
   int number;    ///< of the switching function, see Kinks::names; -1 where only the instant is known
   bool instant;  ///< that the time alone brings
+  bool smooth;   ///< a pulse or a ramp of the time, at which nothing jumps
 };
 
 /// Finds where a run crosses the kinks that its scene knows, between the points of the run as well: pairs of
@@ -37,6 +38,7 @@ class KinkCrossings {
   std::shared_ptr<const Kinks> kinks_;
   struct Cut {
     double time, width;  ///< it counts in steps longer than `width`
+    bool smooth;
   };
   std::vector<Cut> instants_;  ///< ascending by time
   Vector q_, v_, values_;

@@ -219,5 +219,30 @@ v_x = 1e12
   EXPECT_LT(Json::parse(outcome.out)["error_q"].get<double>(), 1e-12) << outcome.out;
 }
 
+/// A pulse of a hundred million units of round-off of the time and fewer, of impulse 1 at t = 4.321: what is
+/// left out of it beside its middle would be missed, and what the rounding of times leaves is told.
+TEST_F(StatedErrors, NarrowPulsesAreFollowedAsFarAsTheTimeTells) {
+  const auto pulsed = [this](const char* width) {
+    return "run " +
+           scene("pulse", std::string("lagrangian = \"v_x^2/2 - x^2/2\"\n[coordinates]\nx = {}\n[force]\nx = "
+                                      "\"exp(-((t - 4.321)/") +
+                              width + ")^2)/(" + width +
+                              "*sqrt(pi))\"\n[start]\nx = 0.3\n[span]\nend = 10\nstep = 0.1\n") +
+           " --error 1e-9 --json";
+  };
+  for (const char* width : {"1e-5", "1e-6"}) {
+    const Outcome outcome = run(pulsed(width));
+    ASSERT_EQ(outcome.status, 0) << width << outcome.err;
+    const Json at_end = Json::parse(outcome.out)["end"];
+    const double x = 0.3 * std::cos(10.0) + std::sin(10.0 - 4.321),
+                 v = -0.3 * std::sin(10.0) + std::cos(10.0 - 4.321);
+    EXPECT_NEAR(at_end["q"]["x"].get<double>(), x, 1e-9 * std::abs(x)) << width;
+    EXPECT_NEAR(at_end["v"]["x"].get<double>(), v, 1e-9 * std::abs(v)) << width;
+  }
+  const Outcome finest = run(pulsed("2e-8"));
+  EXPECT_EQ(finest.status, 1) << finest.out;
+  EXPECT_NE(finest.err.find("round-off"), std::string::npos) << finest.err;
+}
+
 }  // namespace
 }  // namespace diracstep::testing
