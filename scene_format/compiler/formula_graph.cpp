@@ -272,7 +272,8 @@ Node FormulaGraph::partial(Node node, bool second) {
     case Op::cosh:
       return apply(Op::sinh, a);
     case Op::tanh:
-      return power(inverse(apply(Op::cosh, a)), 2);
+      // Where it is below 1e-303 zero: the product of an overflow and an underflow is in its derivative.
+      return where(subtract(number(350.0), apply(Op::abs, a)), power(inverse(apply(Op::cosh, a)), 2));
     case Op::asinh:
       return inverse(apply(Op::hypot, one, a));
     case Op::acosh:
