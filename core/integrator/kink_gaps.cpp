@@ -9,6 +9,7 @@ namespace diracstep {
 namespace {
 
 constexpr std::size_t most_parts_of_a_gap = 128;
+constexpr double shortest_part = 1e-12;  // of what is left of a step: kinks closer than that are met at once
 constexpr double same_end = 2e-12;  // relative: the places of kinks are round-off below it
 
 /// The lengths from kink to kink of a step, behind a 0 for the way to the first one.
@@ -32,7 +33,8 @@ double states_apart(const State& a, const State& b, const State& start) {
 double StepDivision::within_gap(double left) const {
   if (passed_.size() >= gaps_.size()) return left;
   const double longest = gaps_[passed_.size()] / static_cast<double>(parts_of_gap_);
-  return longest > 0.0 && longest < std::abs(left) ? std::copysign(longest, left) : left;
+  const bool divides = longest > shortest_part * std::abs(left) && longest < std::abs(left);
+  return divides ? std::copysign(longest, left) : left;
 }
 
 bool StepDivision::follow_in(std::size_t parts, const State& start, Work& work) {

@@ -7,6 +7,7 @@ namespace diracstep {
 
 namespace {
 
+constexpr double little_ahead = 1e-6;               // of a step
 constexpr double nearly_all = 0.98, shorter = 0.9;  // of a step
 constexpr double reach_of_estimates = 2.0;          // in changes within a step
 constexpr double reach_of_motion = 2.0;             // in changes within the part before
@@ -19,6 +20,20 @@ void StepDivision::read(double t, const State& at, bool exactly, Vector& switche
   if (exactly && !reader_->velocity(t, at.q, at.p, velocity_).ok()) velocity_ = at.v;
   switches.resize(kinks_->count());
   kinks_->evaluate(t, at.q, velocity_, switches);
+}
+
+/// before_ and the velocity at the start of a step; where a function is zero there, as of a motion that
+/// begins at a contact, its value a little ahead, whose sign is that of the side that the motion goes to.
+void StepDivision::read_start(const Interval& step, const State& from, bool exactly) {
+  read(step.start, from, exactly, before_);
+  start_velocity_ = velocity_;
+  if ((before_.array() != 0.0).all() || scene_->space) return;
+  between_.resize(kinks_->count());
+  const double time = little_ahead * step.size;
+  position_ = from.q + time * velocity_;
+  kinks_->evaluate(step.start + time, position_, velocity_, between_);
+  for (Eigen::Index k = 0; k < before_.size(); ++k)
+    if (before_[k] == 0.0) before_[k] = between_[k];
 }
 
 /// The number of a kink that lies between before_ and after_; -1 where none.
@@ -129,8 +144,7 @@ double StepDivision::hidden_place(Interval step, const State& start, const State
 
 bool StepDivision::crosses(Interval step, const State& start, const State& end) {
   const double end_time = step.start + step.size;
-  read(step.start, start, false, before_);
-  start_velocity_ = velocity_;
+  read_start(step, start, false);
   read(end_time, end, false, after_);
   changes_ = (after_ - before_).cwiseAbs();
   if (hidden_place(step, start, end) > 0.0) return true;
@@ -138,7 +152,7 @@ bool StepDivision::crosses(Interval step, const State& start, const State& end) 
   const auto change = (after_ - before_).cwiseAbs().array();
   if (!(before_.array() * after_.array() <= 0.0 || nearest <= reach_of_estimates * change).any())
     return false;
-  read(step.start, start, true, before_);
+  read_start(step, start, true);
   read(end_time, end, true, after_);
   return first_change() >= 0;
 }

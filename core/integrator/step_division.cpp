@@ -95,8 +95,7 @@ bool StepDivision::follow(const State& start, Work& work) {
       Interval part{given.start + (given.size - left), longest};
       if (parts_.size() >= most_parts_of_a_step + gaps_.size() * parts_of_gap_)
         return give_up(crossed, part.start);
-      read(part.start, from, true, before_);
-      start_velocity_ = velocity_;
+      read_start(part, from, true);
       for (bool first = true; !solve_part(part, from, Guess::plain, work); first = false) {
         if (++halvings > most_halvings) {
           const int number = crossed >= 0 ? crossed : ahead(before_);
@@ -126,6 +125,8 @@ bool StepDivision::follow(const State& start, Work& work) {
           number = -1;
         }
       }
+      // The part before ended at the zero, to round-off.
+      if (number >= 0 && number != crossed && std::abs(part.size) <= finest_part * whole) last = number;
       // Each function once: several vanish together, as those of v > 0 and v < 0, and round-off lets each
       // seem to come first.
       for (int k = 0; k < kinks_->count() && number >= 0 && std::abs(part.size) > finest_part * whole; ++k) {
@@ -152,7 +153,8 @@ bool StepDivision::follow(const State& start, Work& work) {
         ends = std::abs(left) <= finest_part * whole || left * given.size <= 0.0;
       }
       if (ends) break;
-      if (last >= 0) passed_.push_back({given.start + (given.size - left), from});
+      // A kink come to twice within a round-off is crossed once: no gap lies between.
+      if (last >= 0 && !returned) passed_.push_back({given.start + (given.size - left), from});
       if (last >= 0 && end_at_kinks_) return true;
     }
   return true;

@@ -74,6 +74,7 @@ class StepDivision {
   };
 
   void read(double t, const State& at, bool exactly, Vector& switches);
+  void read_start(const Interval& step, const State& from, bool exactly);
   bool crosses(Interval step, const State& start, const State& end);
   double place_ahead(Interval step, const State& start);
   void find_acceleration(Interval step, const State& start);

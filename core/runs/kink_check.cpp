@@ -15,7 +15,8 @@ constexpr double too_much = 0.005, too_much_at_instants = 0.0005;  // of the lar
 constexpr double too_much_of_undivided = 0.1;                      // for one step that no division leads over
 constexpr double too_unresolved = 1e-3;                            // of q or p
 constexpr int looks_in_a_step = 2;
-constexpr double finest_cut = 1e-12;  // in parts of a step
+constexpr double finest_cut = 1e-12;      // in parts of a step
+constexpr double at_the_beginning = 4.0;  // of these
 
 }  // namespace
 
@@ -104,10 +105,15 @@ void KinkCheck::look(const Integrator& integrator) {
     }
   }
   std::vector<KinkCrossing> cuts;
-  if (may_cross())
-    cuts = crossings_.along(
-        path, path.begin(), path.end(), looks_in_a_step,
-        std::max(finest_cut * std::abs(h), std::numeric_limits<double>::epsilon() * std::abs(path.end())));
+  if (may_cross()) {
+    const double finest =
+        std::max(finest_cut * std::abs(h), std::numeric_limits<double>::epsilon() * std::abs(path.end()));
+    cuts = crossings_.along(path, path.begin(), path.end(), looks_in_a_step, finest);
+    // A motion that begins at a kink leaves it and does not cross it.
+    std::erase_if(cuts, [&](const KinkCrossing& cut) {
+      return std::abs(cut.time - path.begin()) <= at_the_beginning * finest;
+    });
+  }
   if (cuts.empty()) {
     change_ = (force_ - force_before_).cwiseAbs();
     return;
