@@ -72,14 +72,14 @@ RateMeter make_meter(const Scene& scene, const SolverFactory& solvers, const Ada
                      double step, long& accelerations) {
   require_even(adaptive.monitor, scene.start);
   MonitorScales scales = adaptive.scales;
+  const double end = adaptive.end.value_or(scene.start.time + 100.0 * step);
   if (!adaptive.monitor.rate && (scales.typical <= 0.0 || scales.lowest <= 0.0)) {
-    const RateSurvey survey = survey_rate(
-        scene, solvers, adaptive.end.value_or(scene.start.time + 100.0 * step), scale_survey_steps);
+    const RateSurvey survey = survey_rate(scene, solvers, end, scale_survey_steps);
     if (scales.typical <= 0.0) scales.typical = survey.scales.typical;
     if (scales.lowest <= 0.0) scales.lowest = survey.scales.lowest;
     accelerations = survey.accelerations;
   }
-  return {scene, solvers, adaptive.monitor, scales};
+  return {scene, solvers, adaptive.monitor, scales, end};
 }
 
 }  // namespace
@@ -126,7 +126,6 @@ void AdaptiveIntegrator::reset() {
   main_.reset();
   side_.reset();
   v_ = main_.scene().start.v;
-  started_ = false;
   report_ = {};
   report_.accelerations = survey;
   report_.smallest_step = HUGE_VAL;
@@ -213,13 +212,17 @@ StepReport AdaptiveIntegrator::sample_at(double t, Momentum momentum, Sample& sa
 StepReport AdaptiveIntegrator::sample_from(double node, ConstVectorRef q, ConstVectorRef p, ConstVectorRef v,
                                            double t, Momentum momentum, Sample& sample) {
   side_.restart(node, q, p, v);
+  kinks_beside_ = false;
   if (!local_) ++report_.side_steps;
   StepReport report;
   if (local_)
     report = side_steps_to(t);
   else if (t != node)
     report = side_.step(t - node);
-  if (!local_ && report.ok() && !side_.kinks_passed().empty()) report = side_steps_behind_kinks(t);
+  if (!local_ && report.ok() && !side_.kinks_passed().empty()) {
+    kinks_beside_ = true;
+    report = side_steps_behind_kinks(t);
+  }
   if (!report.ok()) return report;
   report.solve = side_.sample(momentum, sample);
   sample.time = t;

@@ -106,7 +106,10 @@ class AdaptiveIntegrator {
   const AdaptiveOptions& adaptive() const { return adaptive_; }
 
   /// Reads the current node.
-  SolveReport sample(Momentum momentum, Sample& sample) { return main_.sample(momentum, sample); }
+  SolveReport sample(Momentum momentum, Sample& sample) {
+    kinks_beside_ = false;
+    return main_.sample(momentum, sample);
+  }
 
   /// Reads the motion at another time by a side step from the current node, or by as many as their local
   /// error asks for.  Full order for times within about a step from there; throws Misuse beyond two steps.
@@ -114,6 +117,9 @@ class AdaptiveIntegrator {
   /// The same from another node, such as the one before.
   StepReport sample_from(double node, ConstVectorRef q, ConstVectorRef p, ConstVectorRef v, double t,
                          Momentum momentum, Sample& sample);
+
+  /// Whether the way of the side steps from the node to the point read last crossed kinks in q and v.
+  bool kinks_beside() const { return kinks_beside_; }
 
   std::vector<PlanLine> plan() const;
 
@@ -134,7 +140,8 @@ class AdaptiveIntegrator {
   double resolved_size(double size, double eps);
   StepReport side_steps_behind_kinks(double t);
   Rate rate_of(const Integrator& at, double size, double ahead, bool growth, Vector& v);
-  bool measure(bool growth);
+  bool at_kink(double ahead);
+  bool measure(bool growth, bool behind_kink);
   double span() const;
   double largest_rate() const;
   bool start_control();
@@ -156,7 +163,7 @@ class AdaptiveIntegrator {
   double sign_;
   Rate rate_;  ///< at the current node
   Vector v_;   ///< there
-  bool started_ = false;
+  bool kinks_beside_ = false;
   double z_ = 0.0;
   double eps_ = 0.0;  ///< of this part of the motion: adaptive_.eps, or less behind a kink
   double next_size_ = 0.0;

@@ -75,6 +75,7 @@ StepReport AdaptiveIntegrator::side_steps_to(double t) {
     double size = std::abs(next) < std::abs(left) ? next : left;
     report = beside.advance(side_, *whole_, size, next);
     ++report_.side_steps;
+    kinks_beside_ = kinks_beside_ || !side_.kinks_passed().empty() || !whole_->kinks_passed().empty();
   }
   return report;
 }

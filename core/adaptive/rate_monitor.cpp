@@ -2,6 +2,7 @@
 #include <array>
 #include <cmath>
 #include <diracstep/core/adaptive/pointwise_motion.hpp>
+#include <diracstep/core/adaptive/ramp_rates.hpp>
 #include <diracstep/core/adaptive/rate_monitor.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/system/first_order_motions.hpp>
@@ -57,11 +58,14 @@ void require_even(const Monitor& monitor, const Start& start) {
   }
 }
 
-RateMeter::RateMeter(const Scene& scene, const SolverFactory& solvers, Monitor monitor, MonitorScales scales)
+RateMeter::RateMeter(const Scene& scene, const SolverFactory& solvers, Monitor monitor, MonitorScales scales,
+                     double end)
     : monitor_(std::move(monitor)),
       scales_(scales),
       typical_(scales.typical),
-      a_(Columns::Zero(scene.dimension(), 5)) {
+      a_(Columns::Zero(scene.dimension(), 5)),
+      ramps_(std::make_unique<RampRates>(scene, scene.start.time, end)),
+      g_(Columns::Zero(ramps_->count(), 5)) {
   q_.setZero(scene.storage_size());
   v_.setZero(scene.dimension());
   origin_ = v_;
@@ -82,6 +86,7 @@ void RateMeter::place_on_space(ConstVectorRef q) {
 
 bool RateMeter::accelerations(double t, ConstVectorRef q, ConstVectorRef v, double delta, int reach) {
   last_ = motion_->acceleration(t, q, v, a_.col(2));
+  read_ramps(2, t, q, v);
   for (const int place : {1, 3, 0, 4}) {
     if (std::abs(place - 2) > reach || !last_.ok()) continue;
     const double tau = (place - 2) * delta;
@@ -95,15 +100,23 @@ bool RateMeter::accelerations(double t, ConstVectorRef q, ConstVectorRef v, doub
     }
     place_on_space(q);
     last_ = motion_->acceleration(t + tau, q_, v_, a_.col(place));
+    read_ramps(place, t + tau, q_, v_);
   }
   return last_.ok();
 }
 
-double RateMeter::generic_rate(int place, ConstVectorRef v, double delta) const {
+void RateMeter::read_ramps(int place, double t, ConstVectorRef q, ConstVectorRef v) {
+  if (ramps_->count() > 0) ramps_->evaluate(t, q, v, g_.col(place));
+}
+
+double RateMeter::generic_rate(int place, double t, ConstVectorRef v, double delta) const {
   const double tau = (place - 2) * delta, typical = typical_ * typical_;
   const double v2 = (v + tau * a_.col(2)).squaredNorm(), a2 = a_.col(place).squaredNorm();
   const double jerk2 = (a_.col(place + 1) - a_.col(place - 1)).squaredNorm() / (4.0 * delta * delta);
-  const double floor = scales_.lowest * scales_.lowest, below = typical * v2 + a2;
+  double floor = scales_.lowest * scales_.lowest;
+  const double below = typical * v2 + a2;
+  if (!ramps_->none())
+    floor += ramps_->squared(t + tau, g_.col(place - 1), g_.col(place), g_.col(place + 1), delta);
   return std::sqrt((below > 0.0 ? (typical * a2 + jerk2) / below : 0.0) + floor);
 }
 
@@ -136,7 +149,7 @@ Rate RateMeter::rate(double t, ConstVectorRef q, ConstVectorRef v, double step) 
   const double delta = difference_width * std::abs(step);
   if (generic() && !accelerations(t, q, v, delta, 1)) return failed();
   Rate rate;
-  rate.rate = generic() ? generic_rate(2, v, delta) : monitor_.rate(t, q, v);
+  rate.rate = generic() ? generic_rate(2, t, v, delta) : monitor_.rate(t, q, v);
   if (!(rate.rate > 0.0) || !std::isfinite(rate.rate))
     rate.failure = "the monitor is " + std::to_string(rate.rate) + "; it must be positive and finite";
   return rate;
@@ -148,9 +161,9 @@ Rate RateMeter::rate_and_growth(double t, ConstVectorRef q, ConstVectorRef v, do
   Rate rate;
   if (generic()) {
     if (!accelerations(t, q, v, delta, 2)) return failed();
-    before = generic_rate(1, v, delta);
-    rate.rate = generic_rate(2, v, delta);
-    after = generic_rate(3, v, delta);
+    before = generic_rate(1, t, v, delta);
+    rate.rate = generic_rate(2, t, v, delta);
+    after = generic_rate(3, t, v, delta);
   } else {
     if (monitor_.depends_on_velocity && !accelerations(t, q, v, delta, 0)) return failed();
     before = own_rate(t, q, v, delta, 1);

@@ -3,6 +3,7 @@
 #include <diracstep/core/numerics/nonlinear_solver.hpp>
 #include <diracstep/core/system/scene.hpp>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <string>
 
@@ -26,6 +27,7 @@ std::string why_no_accelerations(const Scene& scene);
 void require_even(const Monitor& monitor, const Start& start);
 
 class PointwiseMotion;
+class RampRates;
 
 /// ω and its change along the motion.
 struct Rate {
@@ -44,17 +46,20 @@ struct MonitorScales {
 
 /// ω at points of a motion: a user's monitor, or the generic one
 ///
-///   ω² = (ω0² |a|² + |ȧ|²) / (ω0² |v|² + |a|²) + ω_min²,
+///   ω² = (ω0² |a|² + |ȧ|²) / (ω0² |v|² + |a|²) + ω_min² + Ω²,
 ///
-/// the relative rate of change of the field (v, a).  ȧ and d(ln ω)/dt are central differences over points of
-/// the Taylor polynomial q + τv + τ²a/2 + τ³ȧ/6, v + τa + τ²ȧ/2; an odd function of τ stays odd under v → −v
-/// whatever its truncation error, and that is all that reversibility needs.
+/// the relative rate of change of the field (v, a), and Ω that at which the motion comes to ramps and pulses
+/// of the formulas (RampRates): from before one nothing else tells of it.  ȧ and d(ln ω)/dt are central
+/// differences over points of the Taylor polynomial q + τv + τ²a/2 + τ³ȧ/6, v + τa + τ²ȧ/2; an odd function
+/// of τ stays odd under v → −v whatever its truncation error, and that is all that reversibility needs.
 class RateMeter {
  public:
   /// Of a step: so far ahead of a kink that was just crossed no difference reaches back across it.
   static constexpr double beside_kink = 4e-3;
 
-  RateMeter(const Scene& scene, const SolverFactory& solvers, Monitor monitor, MonitorScales scales);
+  /// Pulses of the time are those between the start and `end`; without, there are none.
+  RateMeter(const Scene& scene, const SolverFactory& solvers, Monitor monitor, MonitorScales scales,
+            double end = std::numeric_limits<double>::quiet_NaN());
   RateMeter(RateMeter&&) noexcept;
   ~RateMeter();
 
@@ -74,7 +79,8 @@ class RateMeter {
  private:
   /// Accelerations at τ = −2δ … 2δ, all or the inner three.
   bool accelerations(double t, ConstVectorRef q, ConstVectorRef v, double delta, int reach);
-  double generic_rate(int place, ConstVectorRef v, double delta) const;
+  double generic_rate(int place, double t, ConstVectorRef v, double delta) const;
+  void read_ramps(int place, double t, ConstVectorRef q, ConstVectorRef v);
   double own_rate(double t, ConstVectorRef q, ConstVectorRef v, double delta, int place);
   Rate failed() const;
   const double* base(ConstVectorRef q) const;
@@ -86,6 +92,8 @@ class RateMeter {
   std::unique_ptr<PointwiseMotion> motion_;
   SolveReport last_;
   Columns a_;  ///< accelerations, one column a place
+  std::unique_ptr<RampRates> ramps_;
+  Columns g_;  ///< their switching functions, likewise
   Vector q_, v_;
   Vector origin_;  ///< zero
 };

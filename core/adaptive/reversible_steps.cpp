@@ -12,8 +12,9 @@ namespace diracstep {
 namespace {
 
 constexpr double lowest_ratio = 0.8, highest_ratio = 1.25;  // of z to ω before the guard acts
-constexpr double size_tolerance = 1e-10;  // relative, of an equation in the step: below it is round-off
-constexpr int max_sizes = 30;             // tried for one step
+constexpr double size_tolerance = 1e-10;    // relative, of an equation in the step: below it is round-off
+constexpr double just_behind_start = 1e-6;  // of a step
+constexpr int max_sizes = 30;               // tried for one step
 
 }  // namespace
 
@@ -32,9 +33,25 @@ Rate AdaptiveIntegrator::rate_of(const Integrator& at, double size, double ahead
   return rate;
 }
 
-bool AdaptiveIntegrator::measure(bool growth) {
+/// Whether the motion has just crossed a kink or, where it begins at one, does within a time so far ahead.
+bool AdaptiveIntegrator::at_kink(double ahead) {
+  if (!main_.kinks_passed().empty()) return true;
+  const Scene& scene = main_.scene();
+  if (!scene.kinks || scene.space ||
+      !meter_->motion().velocity(time(), main_.position(), main_.momentum(), v_).ok())
+    return false;
+  Vector here(scene.kinks->count()), there(here);
+  scene.kinks->evaluate(time(), main_.position(), v_, here);
+  scene.kinks->evaluate(time() + ahead, main_.position() + ahead * v_, v_, there);
+  for (Eigen::Index k = 0; k < here.size(); ++k)
+    if (scene.kinks->kinds()[static_cast<std::size_t>(k)] == Kinks::Kind::kink && here[k] * there[k] <= 0.0)
+      return true;
+  return false;
+}
+
+bool AdaptiveIntegrator::measure(bool growth, bool behind_kink) {
   // At a kink just crossed it is measured where no difference reaches across.
-  const double ahead = main_.kinks_passed().empty() ? 0.0 : RateMeter::beside_kink * next_size_;
+  const double ahead = behind_kink ? RateMeter::beside_kink * next_size_ : 0.0;
   rate_ = rate_of(main_, next_size_, ahead, growth, v_);
   if (!rate_.ok()) return false;
   report_.slowest = std::min(report_.slowest, rate_.rate);
@@ -45,12 +62,13 @@ bool AdaptiveIntegrator::measure(bool growth) {
 bool AdaptiveIntegrator::start_control() {
   const bool growth = adaptive_.control == StepControl::integrating;
   // The width of the differences follows the step, which is not known yet: measure twice.
-  const PartOfMotion part = begin_part(main_, next_size_, !main_.kinks_passed().empty(), v_);
+  const bool behind_kink = at_kink(just_behind_start * next_size_);
+  const PartOfMotion part = begin_part(main_, next_size_, behind_kink, v_);
   rate_ = part.rate;
   if (!rate_.ok()) return false;
   next_size_ = part.size;
   eps_ = part.eps;
-  if (!measure(growth)) return false;
+  if (!measure(growth, behind_kink)) return false;
   z_ = rate_.rate + 0.5 * sign_ * eps_ * rate_.growth;
   next_size_ = sign_ * eps_ / (growth && z_ > 0.0 ? z_ : rate_.rate);
   last_sizes_.clear();
@@ -69,7 +87,7 @@ StepReport AdaptiveIntegrator::control_step(double size) {
   }
   note(size);
   const bool integrating = adaptive_.control == StepControl::integrating;
-  if (!measure(integrating)) return failed(rate_.failure);
+  if (!measure(integrating, false)) return failed(rate_.failure);
   if (!integrating) {
     next_size_ = sign_ * eps_ / rate_.rate;
     return report;
@@ -96,7 +114,7 @@ StepReport AdaptiveIntegrator::solve_size(double eps, double guess, double& size
   for (int tried = 0; tried < max_sizes; ++tried) {
     report = tried == 0 ? main_.step(h) : main_.retry(h);
     if (!report.ok()) return report;
-    if (!measure(false)) return failed(rate_.failure);
+    if (!measure(false, !main_.kinks_passed().empty())) return failed(rate_.failure);
     const double f = 0.5 * h * (rate0 + rate_.rate) - eps;
     size = h;
     if (std::abs(f) <= size_tolerance * std::abs(eps)) return report;

@@ -33,7 +33,7 @@ class VariableRunChecks {
   void after_step();
   void see(const Sample& point) {
     energy_.see(point);
-    work_.see(point);
+    if (!integrator_.kinks_beside()) work_.see(point);  // no cubic follows the forces across them
   }
 
   /// Empty, or the doubts, one after the other.

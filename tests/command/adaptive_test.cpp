@@ -100,5 +100,95 @@ TEST_F(AdaptiveCommand, MisuseNamesTheValueAndWhatIsAllowed) {
   expect_misuse("run lotka_volterra_2d --adaptive", {"lotka_volterra_2d", "linear in v"});
 }
 
+/// x of a unit mass, with these terms beside v²/2 in L and this force.
+std::string unit_mass(const std::string& potential, const std::string& force, const std::string& start,
+                      double end) {
+  return "lagrangian = \"v_x^2/2" + potential + "\"\n[coordinates]\nx = {}\n" +
+         (force.empty() ? std::string() : "[force]\nx = \"" + force + "\"\n") + "[start]\n" + start +
+         "\n[span]\nend = " + std::to_string(end) + "\nstep = 0.1\n";
+}
+
+/// Oscillators x'' = −x + F(t): x(T) = x0 cos T + ∫ F(s) sin(T − s) ds, for a pulse a exp(−((t − c)/w)²) that
+/// is a w √π exp(−w²/4) sin(T − c), for a tanh((t − c)/w) at a narrow w a (1 − cos T) − 2 a cos(c) + ….
+TEST_F(AdaptiveCommand, StepsComeToPulsesAndRampsOfTheTime) {
+  const double end = 10.0, c = 4.321;
+  for (const double w : {0.1, 1e-3, 1e-6}) {
+    const double impulse = 0.5;  // a w √π
+    const std::string pulse = std::to_string(impulse) + "/(" + std::to_string(w) + "*sqrt(pi))*exp(-((t - " +
+                              std::to_string(c) + ")/" + std::to_string(w) + ")^2)";
+    const Outcome outcome =
+        run("run " + scene("pulse", unit_mass(" - x^2/2", pulse, "x = 0.3", end)) + " --adaptive --json");
+    ASSERT_EQ(outcome.status, 0) << w << outcome.err;
+    const Json at_end = Json::parse(outcome.out)["end"];
+    const double left = impulse * std::exp(-w * w / 4.0);
+    EXPECT_NEAR(at_end["q"]["x"].get<double>(), 0.3 * std::cos(end) + left * std::sin(end - c), 1e-5) << w;
+    EXPECT_NEAR(at_end["v"]["x"].get<double>(), -0.3 * std::sin(end) + left * std::cos(end - c), 1e-5) << w;
+  }
+  // A jump of −1 to 1 but for terms of w² = 1e-8.
+  const Outcome ramp =
+      run("run " + scene("ramp", unit_mass(" - x^2/2", "tanh((t - 4.321)/1e-4)", "x = 0.3", end)) +
+          " --adaptive --json");
+  ASSERT_EQ(ramp.status, 0) << ramp.err;
+  EXPECT_NEAR(Json::parse(ramp.out)["end"]["q"]["x"].get<double>(),
+              1.3 * std::cos(end) - 1.0 + 2.0 * (1.0 - std::cos(end - c)), 1e-5);
+}
+
+/// Friction that is steep in v, and a step of the potential: the ends are those of Fehlberg's pair of orders
+/// 7 and 8 in long double at a tolerance of 1e-15, and of the energy v²/2 + tanh(x/1e-3)/4.
+TEST_F(AdaptiveCommand, StepsComeToSteepPlacesInPositionAndVelocity) {
+  const Outcome belt = run(
+      "run " + scene("belt", unit_mass(" - x^2/2", "-0.2*tanh((v_x - 0.3)/0.01)", "x = 1\nv_x = 0.3", 10.0)) +
+      " --adaptive --json");
+  ASSERT_EQ(belt.status, 0) << belt.err;
+  EXPECT_NEAR(Json::parse(belt.out)["end"]["q"]["x"].get<double>(), -0.0635469923558453, 1e-5);
+  EXPECT_NEAR(Json::parse(belt.out)["end"]["v"]["x"].get<double>(), -0.1163863615594474, 1e-5);
+  const Outcome edge =
+      run("run " + scene("edge", unit_mass(" - tanh(x/1e-3)/4", "", "x = -1\nv_x = 1.5", 2.0)) +
+          " --adaptive --json");
+  ASSERT_EQ(edge.status, 0) << edge.err;
+  EXPECT_NEAR(Json::parse(edge.out)["end"]["v"]["x"].get<double>(), std::sqrt(1.5 * 1.5 - 1.0), 1e-6);
+}
+
+/// From x = 0 into a wall of stiffness k: half a wave of π/√k, and back.
+TEST_F(AdaptiveCommand, AMotionMayBeginAtAKink) {
+  for (const bool potential : {false, true}) {
+    const double k = potential ? 1e7 : 1e10, back = 0.7 - M_PI / std::sqrt(k);
+    const std::string file = scene("wall", unit_mass(potential ? " - 1e7*max(0, -x)^2/2" : "",
+                                                     potential ? "" : "1e10*max(0, -x)", "v_x = -1", 0.7));
+    for (const char* how : {" --adaptive", " --step 0.05", " --error 1e-6"}) {
+      const Outcome outcome = run("run " + file + how + " --json");
+      EXPECT_EQ(outcome.status, 0) << k << how << outcome.err;
+      if (outcome.status != 0) continue;
+      EXPECT_NEAR(Json::parse(outcome.out)["end"]["q"]["x"].get<double>(), back, 1e-3) << k << how;
+    }
+  }
+  const Outcome ridge =
+      run("run " + scene("ridge", unit_mass(" - 2*abs(x)", "", "v_x = 1", 0.5)) + " --adaptive --json");
+  EXPECT_EQ(ridge.status, 0) << ridge.err;
+  EXPECT_NEAR(Json::parse(ridge.out)["end"]["q"]["x"].get<double>(), 0.25, 1e-12);
+}
+
+/// A ball on a damper that only pushes.  The ends are parabolas and damped half-waves, joined where the push
+/// and the height vanish.
+TEST_F(AdaptiveCommand, ContactsThatPushAloneAreNotTakenForFriction) {
+  struct Case {
+    const char *k, *c, *how;
+    double allowed;
+  };
+  for (const Case& it : {Case{"1e6", "100", "--error 1e-6", 1e-8}, Case{"1e8", "100", "--error 1e-6", 1e-8},
+                         Case{"1e6", "100", "--step 0.01", 1e-8}, Case{"1e6", "100", "--adaptive", 1e-4}}) {
+    const double x = std::string(it.k) == "1e6" ? 0.18796692597724304 : 0.18227615599637303;
+    const Outcome outcome =
+        run("run " +
+            scene("ball", unit_mass(" - 9.81*x",
+                                    std::string("if(x < 0, max(0, -") + it.k + "*x - " + it.c + "*v_x), 0)",
+                                    "x = 0.5", 1.5)) +
+            " --json " + it.how);
+    EXPECT_EQ(outcome.status, 0) << it.k << it.how << outcome.err;
+    if (outcome.status != 0) continue;
+    EXPECT_NEAR(Json::parse(outcome.out)["end"]["q"]["x"].get<double>(), x, it.allowed) << it.k << it.how;
+  }
+}
+
 }  // namespace
 }  // namespace diracstep::testing
