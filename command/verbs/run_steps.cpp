@@ -136,6 +136,7 @@ void run_variable(const RunArguments& options, const CatalogueScene& entry, Adap
   if (result.failure.empty() && interrupted())
     result.failure = fmt::format("{} at t = {:.10g}", interruption(), integrator.time());
   result.work = integrator.work();
+  if (result.failure.empty()) checks.finish();
   result.doubt = checks.text();
 }
 

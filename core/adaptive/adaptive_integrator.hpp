@@ -118,6 +118,10 @@ class AdaptiveIntegrator {
   StepReport sample_from(double node, ConstVectorRef q, ConstVectorRef p, ConstVectorRef v, double t,
                          Momentum momentum, Sample& sample);
 
+  /// The motion from an earlier point to the current node with `part` of the radians, of reversible steps:
+  /// what both ends differ by tells what the steps miss.  The main sequence goes on as without.
+  StepReport with_finer_steps(double part, const Sample& from, Sample& end);
+
   /// Whether the way of the side steps from the node to the point read last crossed kinks in q and v.
   bool kinks_beside() const { return kinks_beside_; }
 

@@ -50,9 +50,12 @@ class CheckedMotion {
   /// Points of the motion, the start first.
   void see(const Sample& point) { checks_->see(point); }
 
-  /// Where a run of fixed steps has come to its end.
+  /// Where a run has come to its end.
   void finish() {
-    if constexpr (by_integrator) checks_->finish(motion_.stepper());
+    if constexpr (by_integrator)
+      checks_->finish(motion_.stepper());
+    else
+      checks_->finish();
   }
 
   /// Empty, or what was found first.

@@ -105,6 +105,37 @@ StepReport AdaptiveIntegrator::control_step(double size) {
   return report;
 }
 
+StepReport AdaptiveIntegrator::with_finer_steps(double part, const Sample& from, Sample& end) {
+  constexpr long most_more = 10;  // times the steps taken
+  const double until = time(), eps = adaptive_.eps, eps_here = eps_, z = z_, next = next_size_,
+               typical = meter_->typical();
+  const long most = (most_more + 1) * std::max(1L, work().steps);
+  const Snapshot state = main_.save();
+  const ControlReport control = report_;
+  const Rate rate = rate_;
+  const Vector v = v_;
+  const std::vector<Sizes> sizes = last_sizes_;
+  adaptive_.eps *= part;
+  v_ = from.v;
+  main_.restart(from.time, from.q, from.p, from.v);
+  StepReport report;
+  if (!start_control()) report = failed(rate_.failure);
+  while (report.ok() && std::abs(until - time()) > std::abs(next_size_))
+    report = work().steps < most ? step() : failed("more steps than expected");
+  if (report.ok()) report = sample_at(until, Momentum::projected, end);
+  main_.restore(state);
+  adaptive_.eps = eps;
+  eps_ = eps_here;
+  z_ = z;
+  next_size_ = next;
+  meter_->set_typical(typical);
+  report_ = control;
+  rate_ = rate;
+  v_ = v;
+  last_sizes_ = sizes;
+  return report;
+}
+
 /// Solves F(h) = h (ω(y_0) + ω(y_1(h)))/2 − eps = 0, by secants after a first correction with the slope
 /// ω(y_1).
 StepReport AdaptiveIntegrator::solve_size(double eps, double guess, double& size) {

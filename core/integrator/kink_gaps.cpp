@@ -10,7 +10,7 @@ namespace {
 
 constexpr std::size_t most_parts_of_a_gap = 128;
 constexpr double shortest_part = 1e-12;  // of what is left of a step: kinks closer than that are met at once
-constexpr double same_end = 2e-12;  // relative: the places of kinks are round-off below it
+constexpr double same_end = 2e-12;       // relative: the places of kinks are round-off below it
 
 /// The lengths from kink to kink of a step, behind a 0 for the way to the first one.
 void find_gaps(const std::vector<KinkPassed>& kinks, std::vector<double>& gaps) {

@@ -26,6 +26,12 @@ namespace diracstep {
 class StepComparison {
  public:
   static constexpr double first_part = 0.382;
+  /// Runs of at most so many steps and coordinates and rows are repeated with finer steps where something
+  /// speaks against them.
+  static constexpr long most_repeated = 2000;
+  static constexpr int most_unknowns_repeated = 12;
+  /// By which the ends of both may differ, in parts of the motion, to first order.
+  static constexpr double largest_error(int order) { return order > 2 ? 1e-3 : order == 2 ? 1e-2 : 0.1; }
 
   /// Of a step: where it is looked at for no reason, at a kink, or where the motion turned fast.
   enum class Place { usual, at_kink, fast };

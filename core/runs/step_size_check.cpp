@@ -12,8 +12,6 @@ namespace {
 constexpr long steps_for_a_look = 600, fewest_looks = 3;
 constexpr double shortest_part = 1e-6;     // of a step, behind a kink
 constexpr double doubted_at_kinks = 2e-4;  // of the motion
-constexpr long most_repeated = 2000;
-constexpr int most_unknowns_repeated = 12;
 
 /// So many steps of one size over the time of `taken` that no node but the ends is one of theirs: a contact
 /// about a node that both share would be cut into the same parts.
@@ -32,8 +30,9 @@ StepSizeCheck::StepSizeCheck(const Integrator& integrator, long steps, bool repe
       fast_(max_norm(integrator.velocity_estimate()) > 0.0),
       velocity_(integrator.velocity_estimate()),
       order_(std::max(integrator.method().order, integrator.options().order)),
-      repeats_(repeats && integrator.scene().kinks && steps <= most_repeated &&
-               integrator.scene().dimension() + integrator.scene().rows() <= most_unknowns_repeated),
+      repeats_(repeats && integrator.scene().kinks && steps <= StepComparison::most_repeated &&
+               integrator.scene().dimension() + integrator.scene().rows() <=
+                   StepComparison::most_unknowns_repeated),
       wanted_(steps),
       taken_before_(integrator.work().steps) {}
 
@@ -118,11 +117,9 @@ void StepSizeCheck::repeat(Integrator& integrator) {
   integrator.restore(end);
 }
 
-double StepSizeCheck::largest_error() const { return order_ > 2 ? 1e-3 : order_ == 2 ? 1e-2 : 0.1; }
-
 std::string StepSizeCheck::text() const {
   if (std::string text = comparison_.text(); !text.empty()) return text;
-  if (error_ > largest_error()) {
+  if (error_ > StepComparison::largest_error(order_)) {
     std::ostringstream text;
     text.precision(2);
     text

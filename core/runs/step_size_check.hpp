@@ -63,7 +63,7 @@ class StepSizeCheck {
   /// Empty, or a line that names the worst step so far.
   std::string text() const;
   /// Whether the run was repeated and the other one ends where it does.
-  bool confirmed() const { return error_ <= largest_error(); }
+  bool confirmed() const { return error_ <= StepComparison::largest_error(order_); }
   /// The largest difference of positions so far; NaN before the first.
   double worst() const { return comparison_.worst(); }
   double part_of_motion() const { return comparison_.part_of_motion(); }
@@ -75,7 +75,6 @@ class StepSizeCheck {
   void keep_kinks(Integrator& integrator);
   void look_behind_kinks(Integrator& integrator);
   void repeat(Integrator& integrator);
-  double largest_error() const;
 
   StepComparison comparison_;
   long between_looks_, next_look_;

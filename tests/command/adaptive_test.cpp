@@ -168,6 +168,17 @@ TEST_F(AdaptiveCommand, AMotionMayBeginAtAKink) {
   EXPECT_NEAR(Json::parse(ridge.out)["end"]["q"]["x"].get<double>(), 0.25, 1e-12);
 }
 
+/// Over a hill of width 0.03 that no formula shows as a ramp the controller begins anew many times, and ends
+/// 4 % off.
+TEST_F(AdaptiveCommand, StepsThatLostTheRateAreDoubted) {
+  const std::string file =
+      scene("hill", unit_mass(" - x^2 - exp(-((x + 0.03)/0.03)^2)/10", "", "x = -1\nv_x = 0.7", 10.0));
+  const Outcome coarse = run("run " + file + " --adaptive");
+  EXPECT_EQ(coarse.status, 3) << coarse.err;
+  EXPECT_NE(coarse.err.find("lost the rate of the motion"), std::string::npos) << coarse.err;
+  EXPECT_EQ(run("run " + file + " --adaptive --eps 0.02").status, 0);
+}
+
 /// A ball on a damper that only pushes.  The ends are parabolas and damped half-waves, joined where the push
 /// and the height vanish.
 TEST_F(AdaptiveCommand, ContactsThatPushAloneAreNotTakenForFriction) {
