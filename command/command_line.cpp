@@ -44,7 +44,7 @@ std::string complaint(const CLI::App& app, const CLI::ParseError& error) {
   constexpr std::string_view value_of_flag = " was given a disallowed flag override";
   const std::string text = error.what();
   if (text.ends_with(value_of_flag))
-    return fmt::format("{} takes no value", text.substr(0, text.size() - value_of_flag.size()));
+    return fmt::format("--{} takes no value", text.substr(0, text.size() - value_of_flag.size()));
   const auto verbs = app.get_subcommands();
   if (verbs.empty() && app.remaining_size() > 0) {
     const std::string word = app.remaining().front();

@@ -136,20 +136,19 @@ TEST_F(HardContacts, ALandingOnASlopeIsMetToTheRoundOffOfItsTime) {
   }
 }
 
-/// Floor and ball move at 1e4, and meet at 1e-3: what the impact leaves is the round-off of the former.
+/// Floor and ball move at 5e4, and meet at 1e-3: what the impact leaves is the round-off of the former.
 TEST_F(HardContacts, ARestitutionOfZeroBesideAFastRowIsMetToItsRoundOff) {
-  for (const char* step : {"0.1", "0.07", "0.033"}) {
-    const Outcome outcome = run("run " + scene("meets", R"toml(
+  const Outcome outcome = run("run " + scene("meets", R"toml(
 lagrangian = "v_x^2/2"
 coordinates = { x = {} }
-start = { x = 1e-3, v_x = 12345.6779 }
-span = { end = 2 }
-rows = [{ name = "floor", equation = "x - 12345.6789*t = 0", on = false }]
-events = [{ name = "meets", when = "x - 12345.6789*t", on = "floor", restitution = 0 }]
-)toml") + " --json --step " + step);
-    ASSERT_EQ(outcome.status, 0) << step << outcome.err;
-    EXPECT_NEAR(end_of(outcome), 2 * 12345.6789, 1e-10) << step;
-  }
+parameters = { u = 54321.1234567 }
+start = { x = 1e-3, v_x = 54321.1224567 }
+span = { end = 2, step = 0.1 }
+rows = [{ name = "floor", equation = "x - u*t = 0", on = false }]
+events = [{ name = "meets", when = "x/3 - u/3*t", on = "floor", restitution = 0 }]
+)toml") + " --json");
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_NEAR(end_of(outcome), 2 * 54321.1234567, 1e-9);
 }
 
 }  // namespace
