@@ -167,9 +167,6 @@ double ForcePolynomial::fit(const PathCubic& path, double a, double b, long poin
 
 void ForcePolynomial::count_rounding(const PathCubic& path) {
   const double deviation = epsilon * std::abs(middle_) / std::sqrt(12.0);  // of a rounded time
-  const auto part = [&](const Vector& squares) {
-    return deviation * (squares.cwiseSqrt().array() * weights_.head(n_).array()).maxCoeff();
-  };
   const auto time = [&](int k) { return middle_ + half_ * chebyshev.x[static_cast<std::size_t>(k)]; };
   Vector squares = Vector::Zero(n_);
   for (int k = 1; k < nodes; ++k) squares += (samples_.col(k) - samples_.col(k - 1)).head(n_).cwiseAbs2();
@@ -178,7 +175,8 @@ void ForcePolynomial::count_rounding(const PathCubic& path) {
     read(path, time(k), t, value_);
     squares += (samples_.col(k) - value_).head(n_).cwiseAbs2();
   };
-  if (part(squares) > counts * counts * error_) {
+  const Vector with_these = rounding_ + deviation * deviation * squares;
+  if ((with_these.cwiseSqrt().array() * weights_.head(n_).array()).maxCoeff() > counts * error_) {
     squares.setZero();
     for (int k = 1; k < nodes; ++k) add_at_rest(k, time(k - 1));
   }

@@ -13,7 +13,7 @@ using Libdl
 
 export load, parse_scene, integrator, step!, state, reset!, save, restore!, Scene, Integrator, Run
 
-const interface_version = Cuint(7)  # DIRACSTEP_VERSION_OF_C_INTERFACE
+const interface_version = Cuint(8)  # DIRACSTEP_VERSION_OF_C_INTERFACE
 const momenta = (projected = 0, plus = 1, minus = 2)
 const library = Ref{String}("libdiracstep.so.0.1")
 

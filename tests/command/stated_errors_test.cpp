@@ -140,7 +140,8 @@ step = 0.1
 )toml");
   for (const double error : {1e-5, 1e-6}) {
     const Outcome outcome = run("run " + file + " --json --error " + std::to_string(error));
-    const Json json = Json::parse(outcome.out), found = json["error_control"];
+    const Json json = Json::parse(outcome.out);
+    const Json& found = json["error_control"];
     const double off = std::abs(json["end"]["q"]["y"].get<double>() / std::sin(1.5) - 1.0);
     EXPECT_LT(off, found["estimate"].get<double>()) << outcome.out;
     if (outcome.status == 0) {

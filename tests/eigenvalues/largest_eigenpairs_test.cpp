@@ -28,7 +28,8 @@ TEST(LargestEigenpairs, AreThoseOfAKnownMatrix) {
   EXPECT_EQ(found.failure, "");
   ASSERT_EQ(found.values.size(), count);
   for (Eigen::Index k = 0; k < count; ++k) {  // each size twice, as ±
-    const double size = 2.0 * std::cos(static_cast<double>(k / 2 + 1) * std::numbers::pi / (n + 1));
+    const Eigen::Index pair = k / 2 + 1;
+    const double size = 2.0 * std::cos(static_cast<double>(pair) * std::numbers::pi / (n + 1));
     EXPECT_NEAR(found.values[k].real(), 0.0, 1e-12);
     EXPECT_NEAR(std::abs(found.values[k].imag()), size, 1e-12);
     Vector real(n), imaginary(n);
