@@ -12,6 +12,7 @@ constexpr long steps_for_a_look = 20;  // of the first; each next one comes afte
 constexpr long most_steps_for_a_look = 600;
 
 constexpr long steps_for_a_reset = 1000;  // more is a warning of ControlReport::resets
+constexpr long most_steps_repeated = 20000;
 
 int order_of(const AdaptiveIntegrator& integrator) {
   return std::max(integrator.integrator().method().order, integrator.options().order);
@@ -57,7 +58,7 @@ void VariableRunChecks::finish() {
   const Integrator& main = integrator_.integrator();
   const Scene& scene = main.scene();
   const long resets = integrator_.control().resets - resets_before_;
-  if (main.method().damped || first_.q.size() == 0 || taken_ > StepComparison::most_repeated ||
+  if (main.method().damped || first_.q.size() == 0 || taken_ > most_steps_repeated ||
       scene.dimension() + scene.rows() > StepComparison::most_unknowns_repeated ||
       resets * steps_for_a_reset <= taken_ || !(way_ > 0.0) || !(largest_momentum_ > 0.0))
     return;

@@ -14,7 +14,7 @@ namespace diracstep {
 
 /// What RunChecks does, for variable steps: the energy at the points shown, and at the nodes that are asked
 /// for steps beside two parts of them, alternating values and frozen momenta.  Steps are divided by the side
-/// integrator of one's own, so that the main sequence keeps its bits.  A run of at most 2000 steps and 12
+/// integrator of one's own, so that the main sequence keeps its bits.  A run of at most 20000 steps and 12
 /// coordinates and rows in which the controller lost the rate is repeated.
 class VariableRunChecks {
  public:
