@@ -89,6 +89,10 @@ SolveReport PointReader::velocity(double t, ConstVectorRef q, ConstVectorRef p, 
   return report;
 }
 
+bool PointReader::velocity_by_forces() const {
+  return dynamic_cast<const ByForceVelocityProblem*>(first_order_velocity_.get()) != nullptr;
+}
+
 SolveReport PointReader::velocity_of_first_order(double t, ConstVectorRef q, ConstVectorRef p, Vector& v) {
   const Eigen::Index n = scene_->dimension();
   velocity_solver_->reset();

@@ -26,6 +26,8 @@ class PointReader {
   /// v ∈ Δ_Q(q) of the class of p, from a guess in v.  For a phase-space Lagrangian, whose p is a function of
   /// q, the one velocity at q.
   SolveReport velocity(double t, ConstVectorRef q, ConstVectorRef p, Vector& v);
+  /// Whether forces determine what momenta leave open of it: FirstOrderMotions::by_force.
+  bool velocity_by_forces() const;
 
   /// a = dv/dt and the forces Λ of the rows at (q, v), by the Lagrangian.  For a phase-space Lagrangian,
   /// which has neither, both are left empty.

@@ -68,6 +68,7 @@ class StepSolver {
   void begin(const Task& task);
   SolveReport attempt(VectorRef x, SolveReport& total, Work& work);
   SolveReport find(const Task& task, Vector& x, Work& work);
+  void prefer_rest(const Task& task, Vector& x);
   bool doubtful(const Task& task, const Vector& x, const SolveReport& report, Work& work);
   SolveReport rescue(const Task& task, Guess guess, Vector& x, SolveReport total, Work& work);
   SolveReport follow(const Task& task, Vector& x, SolveReport found, Work& work);
@@ -85,7 +86,7 @@ class StepSolver {
   bool leaves_hard_ = false;
   int left_ = 0;  ///< in a row
   double reached_ = 1.0;
-  Vector guess_, start_velocity_;
+  Vector guess_, start_velocity_, residual_;
 };
 
 }  // namespace diracstep
