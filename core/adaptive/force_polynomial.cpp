@@ -11,6 +11,7 @@ namespace diracstep {
 namespace {
 
 constexpr int nodes = 12;             // of a polynomial
+constexpr double negligible = 1e-5;   // part of the error asked for, also where the motion amplifies it
 constexpr double counts = 0.02;       // part of the error asked for that the forces missed may make up
 constexpr double read_error = 1e-11;  // relative, of F and of its polynomial
 constexpr double next_point = 0.125;  // ratio of the distances of points that approach an end
@@ -176,7 +177,7 @@ void ForcePolynomial::count_rounding(const PathCubic& path) {
     squares += (samples_.col(k) - value_).head(n_).cwiseAbs2();
   };
   const Vector with_these = rounding_ + deviation * deviation * squares;
-  if ((with_these.cwiseSqrt().array() * weights_.head(n_).array()).maxCoeff() > counts * error_) {
+  if ((with_these.cwiseSqrt().array() * weights_.head(n_).array()).maxCoeff() > negligible * error_) {
     squares.setZero();
     for (int k = 1; k < nodes; ++k) add_at_rest(k, time(k - 1));
   }
