@@ -176,8 +176,7 @@ void ForcePolynomial::count_rounding(const PathCubic& path) {
     read(path, time(k), t, value_);
     squares += (samples_.col(k) - value_).head(n_).cwiseAbs2();
   };
-  const Vector with_these = rounding_ + deviation * deviation * squares;
-  if ((with_these.cwiseSqrt().array() * weights_.head(n_).array()).maxCoeff() > negligible * error_) {
+  if (part_of_momentum(rounding_ + deviation * deviation * squares) > negligible * error_) {
     squares.setZero();
     for (int k = 1; k < nodes; ++k) add_at_rest(k, time(k - 1));
   }
@@ -186,8 +185,10 @@ void ForcePolynomial::count_rounding(const PathCubic& path) {
   rounding_ += deviation * deviation * squares;
 }
 
-double ForcePolynomial::rounding() const {
-  return (rounding_.cwiseSqrt().array() * weights_.head(n_).array()).maxCoeff();
+double ForcePolynomial::rounding() const { return part_of_momentum(rounding_); }
+
+double ForcePolynomial::part_of_momentum(const Vector& squares) const {
+  return (squares.cwiseSqrt().array() * weights_.head(n_).array()).maxCoeff();
 }
 
 double ForcePolynomial::miss(const PathCubic& path, double t) {

@@ -56,6 +56,7 @@ class ForcePolynomial {
   bool smooth_;
   Vector allowed_, weights_;  ///< of each component of F, and what turns it into parts of the momentum
   Vector q_, v_, p_, external_, local_, value_, other_;
+  double part_of_momentum(const Vector& squares) const;
   Vector rounding_;                   ///< squares of impulses
   std::optional<double> counted_to_;  ///< time of the last node counted
   Columns samples_;

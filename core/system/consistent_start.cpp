@@ -100,11 +100,7 @@ Vector nearest_on_space(const Scene& scene, const Start& start, const std::vecto
   ConstraintsAtPoint rows(holonomic, scene.dimension());
   Vector q = scene.space->normalised(start.q), phi(rows.rows());
   for (int iteration = 0; rows.rows() > 0 && iteration < most; ++iteration) {
-    int row = 0;
-    for (const auto& block : holonomic) {
-      block->position(start.time, q, phi.segment(row, block->rows()));
-      row += block->rows();
-    }
+    positions_of(holonomic, start.time, q, phi);
     rows.evaluate(start.time, q);
     Columns a = rows.pattern().full(rows.coefficients());
     for (const int i : kept) a.col(i).setZero();

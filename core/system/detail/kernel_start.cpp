@@ -4,22 +4,11 @@
 #include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/core/system/detail/constraint_levels.hpp>
 #include <diracstep/core/system/detail/kernel_start.hpp>
+#include <diracstep/core/system/detail/poses.hpp>
 #include <diracstep/core/system/kernel_motions.hpp>
 #include <utility>
 
 namespace diracstep {
-
-namespace {
-
-void positions_of(const ConstraintBlocks& holonomic, double t, ConstVectorRef q, VectorRef phi) {
-  Eigen::Index row = 0;
-  for (const auto& block : holonomic) {
-    block->position(t, q, phi.segment(row, block->rows()));
-    row += block->rows();
-  }
-}
-
-}  // namespace
 
 Start moved_onto_hidden(const Scene& scene, const FirstOrderMotions& motions, Start start,
                         const std::vector<bool>& may_move) {

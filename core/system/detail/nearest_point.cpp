@@ -2,6 +2,7 @@
 #include <cmath>
 #include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/core/system/detail/nearest_point.hpp>
+#include <diracstep/core/system/detail/poses.hpp>
 #include <utility>
 
 namespace diracstep {
@@ -26,11 +27,7 @@ void NearestPointProblem::residual(ConstVectorRef x, VectorRef f) {
   rows_.add_annihilator(x.tail(m_), f.head(n_));
   for (const int i : held_) f[i] = x[i] - given_[i];
   raise_scales(x);
-  int row = n_;
-  for (const auto& block : blocks_) {
-    block->position(t_, x.head(n_), f.segment(row, block->rows()));
-    row += block->rows();
-  }
+  positions_of(blocks_, t_, x.head(n_), f.tail(m_));
 }
 
 const double* NearestPointProblem::scales_of_unsolved_rows(ConstVectorRef f, double level) {

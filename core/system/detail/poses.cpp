@@ -32,6 +32,14 @@ Start near_start(const Start& start, double phase) {
   return {start.time + 0.37 * phase, varied(start.q, 1e-2, phase), varied(start.v, 0.3, 2.0 * phase)};
 }
 
+void positions_of(const ConstraintBlocks& holonomic, double t, ConstVectorRef q, VectorRef phi) {
+  Eigen::Index row = 0;
+  for (const auto& block : holonomic) {
+    block->position(t, q, phi.segment(row, block->rows()));
+    row += block->rows();
+  }
+}
+
 std::optional<Vector> pose_near(const Space* space, const ConstraintBlocks& holonomic, double t, Vector q,
                                 const std::vector<int>& held) {
   constexpr int most = 50;
@@ -40,11 +48,7 @@ std::optional<Vector> pose_near(const Space* space, const ConstraintBlocks& holo
   ConstraintsAtPoint rows(holonomic, space != nullptr ? space->dimension() : static_cast<int>(q.size()));
   for (int iteration = 0; rows.rows() > 0 && iteration < most; ++iteration) {
     Vector phi(rows.rows());
-    int row = 0;
-    for (const auto& block : holonomic) {
-      block->position(t, q, phi.segment(row, block->rows()));
-      row += block->rows();
-    }
+    positions_of(holonomic, t, q, phi);
     rows.evaluate(t, q);
     Columns a = rows.pattern().full(rows.coefficients());
     for (const int i : held) a.col(i).setZero();
