@@ -87,11 +87,14 @@ void ForcePolynomial::find_scales(const std::vector<PathPoint>& path) {
   Vector row_terms = Vector::Zero(m_), terms(m_), noise = Vector::Zero(2 * n_ + m_);
   for (std::size_t k = 0; k + 1 < path.size(); ++k) {
     const PathCubic cubic{path[k], path[k + 1]};
-    if (std::abs(cubic.end() - cubic.begin()) <= closest(cubic.end())) continue;
+    if (std::abs(cubic.end() - cubic.begin()) <= 4.0 * closest(cubic.end())) continue;
     const double t = 0.5 * (cubic.begin() + cubic.end());
+    // From one side alone it would be the jump of a force that switches here.
     read(cubic, t + closest(t), other_);
+    read(cubic, t - closest(t), value_);
+    const Vector ahead = other_, behind = value_;
     read(cubic, t, value_);
-    noise = noise.cwiseMax((value_ - other_).cwiseAbs());
+    noise = noise.cwiseMax((value_ - ahead).cwiseAbs().cwiseMin((value_ - behind).cwiseAbs()));
     force += max_norm(value_.head(n_)) * std::abs(cubic.end() - cubic.begin()) /
              span_;  // the mean: pulses are high
     momentum = std::max(momentum, max_norm(value_.segment(n_, n_)));

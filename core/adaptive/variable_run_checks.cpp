@@ -29,7 +29,8 @@ bool VariableRunChecks::at_kink() const {
 void VariableRunChecks::before_step() {
   const long step = integrator_.work().steps;
   if (nodes_.wants(step) && integrator_.sample(Momentum::projected, node_).ok()) nodes_.see(step, node_);
-  looking_ = step >= next_look_ && !at_kink() && integrator_.sample(Momentum::projected, start_).ok();
+  looking_ = (step >= next_look_ || velocity_.fast()) && !at_kink() &&
+             integrator_.sample(Momentum::projected, start_).ok();
 }
 
 bool VariableRunChecks::divide(double size) {
@@ -46,12 +47,17 @@ void VariableRunChecks::after_step() {
   // Steps by their local error resolve kinks.
   if (!integrator_.integrator().method().damped) kinks_.after(integrator_.integrator());
   work_.after(integrator_.integrator());
+  impulse_.after(integrator_.integrator());
+  velocity_.see(integrator_.integrator().velocity_estimate());
   jumps_.after(integrator_.kinks_passed(), integrator_.integrator(), side_);
   if (!looking_ || at_kink()) return;
-  next_look_ += std::min(most_steps_for_a_look, std::max(steps_for_a_look, next_look_));
+  const bool due = integrator_.work().steps > next_look_;
+  if (due) next_look_ += std::min(most_steps_for_a_look, std::max(steps_for_a_look, next_look_));
   if (!integrator_.sample(Momentum::projected, whole_).ok()) return;
   const double size = whole_.time - start_.time;
-  if (divide(size)) comparison_.add(start_, size, whole_, parts_);
+  if (divide(size))
+    comparison_.add(start_, size, whole_, parts_,
+                    due ? StepComparison::Place::usual : StepComparison::Place::fast);
 }
 
 void VariableRunChecks::finish() {
@@ -79,8 +85,9 @@ std::string VariableRunChecks::text() const {
         to_text(std::min(100.0, 100.0 * error_), 2) +
         " % of the motion; take a smaller --eps, or ask for an error, --error";
   const Scene& scene = integrator_.integrator().scene();
-  return joined_doubts({finer, energy_.text(), work_.text(), comparison_.text(), nodes_.text(), jumps_.text(),
-                        kinks_.text(), scene.doubt ? scene.doubt() : std::string()});
+  return joined_doubts({finer, energy_.text(), work_.text(), comparison_.text(), nodes_.text(),
+                        impulse_.text(), jumps_.text(), kinks_.text(),
+                        scene.doubt ? scene.doubt() : std::string()});
 }
 
 }  // namespace diracstep

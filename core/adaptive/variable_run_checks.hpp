@@ -2,10 +2,12 @@
 
 #include <diracstep/core/adaptive/adaptive_integrator.hpp>
 #include <diracstep/core/runs/energy_check.hpp>
+#include <diracstep/core/runs/impulse_check.hpp>
 #include <diracstep/core/runs/kink_check.hpp>
 #include <diracstep/core/runs/node_check.hpp>
 #include <diracstep/core/runs/run_checks.hpp>
 #include <diracstep/core/runs/step_comparison.hpp>
+#include <diracstep/core/runs/velocity_changes.hpp>
 #include <diracstep/core/runs/work_check.hpp>
 #include <limits>
 #include <string>
@@ -13,7 +15,8 @@
 namespace diracstep {
 
 /// What RunChecks does, for variable steps: the energy at the points shown, and at the nodes that are asked
-/// for steps beside two parts of them, alternating values and frozen momenta.  Steps are divided by the side
+/// for, or where the velocity changed fast, steps beside two parts of them, alternating values and frozen
+/// momenta.  Steps are divided by the side
 /// integrator of one's own, so that the main sequence keeps its bits.  A run of at most 20000 steps and 12
 /// coordinates and rows in which the controller lost the rate is repeated.
 class VariableRunChecks {
@@ -30,6 +33,8 @@ class VariableRunChecks {
                integrator.adaptive().end.value_or(integrator.time() +
                                                   100.0 * integrator.integrator().options().step)),
         work_(integrator.integrator()),
+        impulse_(integrator.integrator()),
+        velocity_(integrator.integrator().velocity_estimate()),
         jumps_(integrator.integrator()),
         resets_before_(integrator.control().resets) {}
 
@@ -59,6 +64,8 @@ class VariableRunChecks {
   StepComparison comparison_;
   KinkCheck kinks_;
   WorkCheck work_;
+  ImpulseCheck impulse_;
+  VelocityChanges velocity_;
   JumpCheck jumps_;
   long next_look_ = 1;
   bool looking_ = false;

@@ -3,6 +3,7 @@
 #include <diracstep/core/runs/branch_check.hpp>
 #include <diracstep/core/runs/energy_check.hpp>
 #include <diracstep/core/runs/growth_check.hpp>
+#include <diracstep/core/runs/impulse_check.hpp>
 #include <diracstep/core/runs/jump_check.hpp>
 #include <diracstep/core/runs/kink_check.hpp>
 #include <diracstep/core/runs/node_check.hpp>
@@ -35,6 +36,7 @@ class RunChecks {
         branch_(integrator),
         growth_(integrator, steps),
         work_(integrator),
+        impulse_(integrator),
         jumps_(integrator),
         kinks_(integrator, integrator.time() + static_cast<double>(steps) * integrator.options().step) {}
 
@@ -49,6 +51,7 @@ class RunChecks {
     kinks_.after(integrator);
     jumps_.after(integrator.kinks_passed(), integrator, integrator);
     work_.after(integrator);
+    impulse_.after(integrator);
     step_.after(integrator);
     growth_.at_node(integrator);
   }
@@ -68,8 +71,8 @@ class RunChecks {
   /// known well: it tells nothing of a run that was confirmed.
   std::string text() const {
     return joined_doubts({energy_.text(), step_.confirmed() ? std::string() : work_.text(), step_.text(),
-                          nodes_.text(), branch_.text(), growth_.text(), jumps_.text(), kinks_.text(),
-                          scene_.doubt ? scene_.doubt() : std::string()});
+                          nodes_.text(), branch_.text(), growth_.text(), impulse_.text(), jumps_.text(),
+                          kinks_.text(), scene_.doubt ? scene_.doubt() : std::string()});
   }
 
  private:
@@ -84,6 +87,7 @@ class RunChecks {
   BranchCheck branch_;
   GrowthCheck growth_;
   WorkCheck work_;
+  ImpulseCheck impulse_;
   JumpCheck jumps_;
   KinkCheck kinks_;
   long step_number_ = 0;

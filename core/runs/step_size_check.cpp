@@ -27,7 +27,6 @@ StepSizeCheck::StepSizeCheck(const Integrator& integrator, long steps, bool repe
     : comparison_(integrator.scene(), integrator.method().order),
       between_looks_(std::clamp(steps / fewest_looks, 1L, steps_for_a_look)),
       next_look_(integrator.work().steps + std::min(1L, steps - 1)),
-      fast_(max_norm(integrator.velocity_estimate()) > 0.0),
       velocity_(integrator.velocity_estimate()),
       order_(std::max(integrator.method().order, integrator.options().order)),
       repeats_(repeats && integrator.scene().kinks && steps <= StepComparison::most_repeated &&
@@ -37,20 +36,11 @@ StepSizeCheck::StepSizeCheck(const Integrator& integrator, long steps, bool repe
       taken_before_(integrator.work().steps) {}
 
 void StepSizeCheck::divide(Integrator& integrator) {
-  fast_ = false;
   const Snapshot state = integrator.save();
   const double h = integrator.options().step, first = StepComparison::first_part * h;
   divided_ = integrator.sample(Momentum::projected, start_).ok() && integrator.step(first).ok() &&
              integrator.step(h - first).ok() && integrator.sample(Momentum::projected, parts_).ok();
   integrator.restore(state);
-}
-
-void StepSizeCheck::follow(const Integrator& integrator) {
-  const double change = max_norm(integrator.velocity_estimate() - velocity_);
-  velocity_ = integrator.velocity_estimate();
-  if (!(change > 2.0 * largest_change_)) return;
-  fast_ = largest_change_ > 0.0;
-  largest_change_ = change;
 }
 
 void StepSizeCheck::compare(Integrator& integrator) {

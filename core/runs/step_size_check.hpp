@@ -2,6 +2,7 @@
 
 #include <diracstep/core/integrator/integrator.hpp>
 #include <diracstep/core/runs/step_comparison.hpp>
+#include <diracstep/core/runs/velocity_changes.hpp>
 #include <limits>
 #include <string>
 #include <vector>
@@ -42,14 +43,14 @@ class StepSizeCheck {
     place_ = behind_kinks ? StepComparison::Place::at_kink
              : due        ? StepComparison::Place::usual
                           : StepComparison::Place::fast;
-    if (due || fast_ || behind_kinks) divide(integrator);
+    if (due || velocity_.fast() || behind_kinks) divide(integrator);
     if (repeats_ && taken_ == 0) start_of_run_ = integrator.save();
   }
   void after(Integrator& integrator) {
     ++taken_;
     unresolved_ += integrator.unresolved_between_kinks();
     if (divided_) compare(integrator);
-    follow(integrator);
+    velocity_.see(integrator.velocity_estimate());
     if (!integrator.kinks_passed().empty()) keep_kinks(integrator);
   }
   /// Points of the run, the start first.
@@ -71,21 +72,19 @@ class StepSizeCheck {
  private:
   void divide(Integrator& integrator);
   void compare(Integrator& integrator);
-  void follow(const Integrator& integrator);
   void keep_kinks(Integrator& integrator);
   void look_behind_kinks(Integrator& integrator);
   void repeat(Integrator& integrator);
 
   StepComparison comparison_;
   long between_looks_, next_look_;
-  bool divided_ = false, fast_;
+  bool divided_ = false;
+  VelocityChanges velocity_;
   long over_kinks_ = 0, next_over_kinks_ = 1;  ///< steps that crossed some
   long looks_at_kinks_ = 0;
   StepComparison::Place place_ = StepComparison::Place::usual;  ///< of the step looked at
   std::vector<KinkPassed> kinks_;  ///< of the last step, where they are looked at
   Sample end_;                     ///< of that step
-  double largest_change_ = 0.0;    ///< of the velocity in a step
-  Vector velocity_;
   Sample start_, whole_, parts_;
   int order_;
   bool repeats_;

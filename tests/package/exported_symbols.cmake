@@ -6,7 +6,7 @@ list(LENGTH declarations count)
 list(SORT declarations)
 
 execute_process(COMMAND ${NM} -D --defined-only ${LIBRARY} OUTPUT_VARIABLE symbols COMMAND_ERROR_IS_FATAL ANY)
-string(REGEX REPLACE "[0-9a-f]+ A DIRACSTEP_[0-9.]+\n" "" symbols "${symbols}")  # the version itself
+string(REGEX REPLACE "[0-9a-f]+ A DIRACSTEP_[^\n]*\n" "" symbols "${symbols}")  # the version itself
 string(REGEX MATCHALL "[^\n]+" symbols "${symbols}")
 list(TRANSFORM symbols REPLACE "^[0-9a-f]+ [A-Za-z] " "")
 list(SORT symbols)

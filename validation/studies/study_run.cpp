@@ -132,31 +132,28 @@ ReferenceEnd reference_end(const CatalogueScene& scene, double t_end, const std:
 
 namespace {
 
-/// Sizes of q and p that zero is told by: the largest of both ends, and what the speeds and masses ∂²L/∂v_i²
-/// make of each other in the time between.
+/// Sizes of q and p that zero is told by: the largest of the start and the reference, and what the speed and
+/// the masses ∂²L/∂v_i² of the start make of each other in the time between.  Not those of the run, which may
+/// be as wrong as can be.
 struct NaturalSizes {
   double q, p;
 };
 
-NaturalSizes natural_sizes(const Scene& scene, const Sample& end) {
-  const double time = std::abs(end.time - scene.start.time);
-  const auto larger = [](const Vector& a, const Vector& b) {
-    double size = 0.0;
-    for (const Vector* column : {&a, &b})
-      if (column->size() > 0 && column->allFinite()) size = std::max(size, column->lpNorm<Eigen::Infinity>());
-    return size;
-  };
-  const double speed = larger(scene.start.v, end.v), q = std::max(larger(scene.start.q, end.q), speed * time);
+NaturalSizes natural_sizes(const Scene& scene, const ReferenceEnd& reference, double t_end) {
+  const Start& start = scene.start;
+  const double time = std::abs(t_end - start.time), speed = max_norm(start.v);
+  const double q = std::max({max_norm(start.q), max_norm(reference.q), speed * time});
   double mass = 0.0;
   if (scene.lagrangian) {
     const SparsityPattern& pattern = scene.lagrangian->pattern();
     Vector qq(pattern.nonzeros()), qv(pattern.nonzeros()), vv(pattern.nonzeros());
-    scene.lagrangian->hessian(end.time, end.q, end.v, qq, qv, vv);
+    scene.lagrangian->hessian(start.time, start.q, start.v, qq, qv, vv);
     pattern.for_each([&](Eigen::Index k, int i, int j) {
       if (i == j && std::isfinite(vv[k])) mass = std::max(mass, std::abs(vv[k]));
     });
   }
-  return {q, std::max(larger(scene.start.p, end.p), mass * (time > 0.0 ? std::max(speed, q / time) : speed))};
+  const double fastest = time > 0.0 ? std::max(speed, q / time) : speed;
+  return {q, std::max({max_norm(start.p), max_norm(reference.p), mass * fastest})};
 }
 
 }  // namespace
@@ -169,7 +166,7 @@ void judge(StudyRow& row, const Scene& scene, const Sample& given, const Referen
   const double size = std::max({std::abs(energy), std::abs(end.energy), 0.5 * std::abs(end.p.dot(end.v))});
   row.energy_error = change == 0.0 ? 0.0 : change / size;
   if (reference.missing.empty()) {
-    const NaturalSizes natural = natural_sizes(scene, end);
+    const NaturalSizes natural = natural_sizes(scene, reference, end.time);
     row.error_q = relative_error(end.q, reference.q, natural.q);
     if (reference.p.size() > 0) row.error_p = relative_error(end.p, reference.p, natural.p);
   }

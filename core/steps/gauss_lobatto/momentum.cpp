@@ -1,5 +1,7 @@
+#include <algorithm>
 #include <cmath>
 #include <diracstep/core/numerics/combination.hpp>
+#include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/core/steps/gauss_lobatto/momentum.hpp>
 #include <utility>
 
@@ -118,7 +120,13 @@ void StageMomentum::evaluate_start(double t, ConstVectorRef q0, ConstVectorRef v
   lagrangian_->hessian(t, q0, v0, lqq_.col(0), lqv_.col(0), lvv_.col(0));
   if (!force_) return;
   force_->value(t, q0, v0, f_);
+  force_->derivatives(t, q0, v0, fq_.col(0), fv_.col(0));
   lq_.col(0) += f_;
+}
+
+double StageMomentum::curvature_size(int stages) const {
+  return std::max(largest_entry(lqq_.data(), lqq_.rows() * stages),
+                  largest_entry(fq_.data(), fq_.rows() * stages));
 }
 
 void StageMomentum::prepare_sizes(const NodePoints& at, ConstVectorRef x) {

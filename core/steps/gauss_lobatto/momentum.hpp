@@ -39,6 +39,9 @@ class StageMomentum {
   const Columns& curvatures() const { return lqq_; }                         ///< ∂²L/∂q², values
   const Columns& mixed() const { return lqv_; }                              ///< ∂²L/∂q∂v, values
   const Columns& force_gradients() const { return fq_; }                     ///< ∂f/∂q, values
+  /// The largest entry of both in the first so many stages: what forces lose to the round-off of positions.
+  double curvature_size(int stages) const;
+  double curvature_size() const { return curvature_size(s_); }
   const SparsityPattern& pattern() const { return lagrangian_->pattern(); }  ///< of second derivatives
   auto mass(int stage) const { return lvv_.col(stage); }                     ///< ∂²L/∂v², values
 

@@ -135,7 +135,7 @@ class GaussLobattoStep final : public StepProblem {
 
   void jacobian(ConstVectorRef x, VectorRef values) override {
     evaluate(x);
-    if (momentum_.second_derivatives(points_, x)) sizes_.curvature = curvature_size();
+    if (momentum_.second_derivatives(points_, x)) sizes_.curvature = momentum_.curvature_size();
     if (fixed_) {
       for (StageRows& rows : rows_) rows.second_derivatives(points_, x);
       fixed_->jacobian(momentum_.jacobian_known(points_), values.data());
@@ -232,14 +232,10 @@ class GaussLobattoStep final : public StepProblem {
     sizes.force = largest_entry(momentum_.forces().data(), momentum_.forces().size());
     if (!sizes.known && sizes.curvature == 0.0) {  // solved without a Jacobian
       (void)momentum_.second_derivatives(points_, last_x_);
-      sizes.curvature = curvature_size();
+      sizes.curvature = momentum_.curvature_size();
     }
     sizes.store(memory);
     memory.multipliers = x.tail(m_ * s_);
-  }
-
-  double curvature_size() const {
-    return largest_entry(momentum_.curvatures().data(), momentum_.curvatures().size());
   }
 
   /// Size of the impulses of such multipliers, and of what they lose to the round-off of positions.
@@ -252,7 +248,7 @@ class GaussLobattoStep final : public StepProblem {
     momentum_.evaluate_start(points_.step.start, points_.lobatto.col(0), v0);
     const double before = blocks_[0].scale;  // of impulses nothing is known yet
     sizes_.force = largest_entry(momentum_.forces().data(), n_);
-    sizes_.curvature = largest_entry(momentum_.curvatures().data(), momentum_.curvatures().rows());
+    sizes_.curvature = momentum_.curvature_size(1);
     evaluated_ = false;
     update_scales();
     blocks_[0].scale = std::max(blocks_[0].scale, before);

@@ -103,7 +103,7 @@ class RadauStep final : public StepProblem {
 
   void jacobian(ConstVectorRef x, VectorRef values) override {
     evaluate(x);
-    if (momentum_.second_derivatives(points_, x)) sizes_of_terms_.curvature = curvature_size();
+    if (momentum_.second_derivatives(points_, x)) sizes_of_terms_.curvature = momentum_.curvature_size();
     momentum_.set_jacobian(points_, weights_, layout_, values);
     rows_.add_to_jacobian(points_, x.data(), momentum_, layout_, values);
     sizes_of_terms_.row_curvature = rows_.curvature_size();
@@ -121,7 +121,7 @@ class RadauStep final : public StepProblem {
     sizes.force = largest_entry(momentum_.forces().data(), momentum_.forces().size());
     if (!sizes.known && sizes.curvature == 0.0) {  // solved without a Jacobian
       (void)momentum_.second_derivatives(points_, last_x_);
-      sizes.curvature = curvature_size();
+      sizes.curvature = momentum_.curvature_size();
     }
     sizes.store(end.memory);
     end.memory.multipliers = x.segment(n_ * s_, m_ * s_);
@@ -141,10 +141,6 @@ class RadauStep final : public StepProblem {
     momentum_.evaluate(points_, x);
     if (m_ > 0) rows_.evaluate(points_, x.data(), impulses_);
     raise_scales(x);
-  }
-
-  double curvature_size() const {
-    return largest_entry(momentum_.curvatures().data(), momentum_.curvatures().size());
   }
 
   /// By what is known before the step.
@@ -181,7 +177,7 @@ class RadauStep final : public StepProblem {
   void sample_start(ConstVectorRef v0) {
     momentum_.evaluate_start(points_.step.start, q0_, v0);
     sizes_of_terms_.force = largest_entry(momentum_.forces().data(), n_);
-    sizes_of_terms_.curvature = largest_entry(momentum_.curvatures().data(), momentum_.curvatures().rows());
+    sizes_of_terms_.curvature = momentum_.curvature_size(1);
     evaluated_ = false;
     set_scales();
   }

@@ -81,9 +81,9 @@ TEST_F(Events, StopEndsTheRunWhereTheBallLands) {
 TEST_F(Events, AreFoundAtTheOrderOfTheMethodAndTheMotionKeepsItsBits) {
   for (const auto& [method, order] :
        {std::pair{"type1/gl:1", 2.0}, {"type1/gl:2", 4.0}, {"type1/gl:3", 6.0}}) {
-    const auto error = [&](const char* step) {
+    const auto error = [&, name = std::string(method)](const char* step) {
       const Json json =
-          Json::parse(run("run " + oscillator() + " --method " + method + " --step " + step + " --json").out);
+          Json::parse(run("run " + oscillator() + " --method " + name + " --step " + step + " --json").out);
       EXPECT_EQ(json["events"].size(), 6U);
       double largest = 0.0;
       for (const Json& event : json["events"]) {

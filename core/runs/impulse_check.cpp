@@ -1,0 +1,131 @@
+#include <algorithm>
+#include <cmath>
+#include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/numerics/scales.hpp>
+#include <diracstep/core/runs/impulse_check.hpp>
+#include <diracstep/core/runs/step_comparison.hpp>
+#include <numbers>
+
+namespace diracstep {
+
+namespace {
+
+constexpr long most_parts = 1000;
+constexpr int halvings = 30;  // of the panels towards an end
+constexpr int most_points = 8;
+
+/// The Gauss rule with so many points on (0, 1): zeros of the Legendre polynomial by Newton's method.
+std::vector<GaussPoint> gauss_rule(int points) {
+  std::vector<GaussPoint> rule;
+  for (int i = 0; i < points; ++i) {
+    double x = std::cos(std::numbers::pi * (i + 0.75) / (points + 0.5)), slope = 1.0;
+    for (int iteration = 0; iteration < 10; ++iteration) {
+      double before = 1.0, here = x;
+      for (int k = 2; k <= points; ++k) {
+        const double next = ((2.0 * k - 1.0) * x * here - (k - 1.0) * before) / k;
+        before = here;
+        here = next;
+      }
+      slope = points * (x * here - before) / (x * x - 1.0);
+      x -= here / slope;
+    }
+    rule.push_back({0.5 * (1.0 + x), 1.0 / ((1.0 - x * x) * slope * slope)});
+  }
+  return rule;
+}
+
+}  // namespace
+
+ImpulseCheck::ImpulseCheck(const Integrator& integrator)
+    : scene_(integrator.scene()),
+      order_(std::max(integrator.method().order, integrator.options().order)),
+      kinks_(scene_.kinks, scene_.start.time, integrator.options().step),
+      watched_(scene_.kinks != nullptr && (scene_.lagrangian || scene_.by_hamiltonian())),
+      rule_(gauss_rule(std::clamp((order_ + 1) / 2, 1, most_points))),
+      time_(integrator.time()),
+      largest_(integrator.momentum().cwiseAbs()),
+      missed_(Vector::Zero(largest_.size())),
+      most_missed_(missed_),
+      force_(missed_),
+      other_(missed_) {}
+
+void ImpulseCheck::add(double weight, double t, Vector& sum) {
+  scene_.force_and_momentum(t, q_, v_, p_, force_, other_);
+  sum += weight * force_;
+  if (!scene_.force) return;
+  scene_.force->value(t, q_, v_, force_);
+  sum += weight * force_;
+}
+
+void ImpulseCheck::look_at_part(double a, double b, const std::vector<double>& pulses) {
+  fine_.setZero(missed_.size());
+  coarse_.setZero(missed_.size());
+  for (const GaussPoint& point : rule_) add(point.weight * (b - a), a + point.place * (b - a), coarse_);
+  const auto add_panel = [&](double from, double to) {
+    for (const GaussPoint& point : gauss_points)
+      add(point.weight * (to - from), from + point.place * (to - from), fine_);
+  };
+  const auto add_segment = [&](double from, double to) {
+    double size = 0.5 * (to - from);
+    const double middle = from + size;
+    for (int k = 0; k < halvings; ++k, size *= 0.5) {
+      add_panel(from + 0.5 * size, k == 0 ? middle : from + size);
+      add_panel(k == 0 ? middle : to - size, to - 0.5 * size);
+    }
+    add_panel(from, from + size);
+    add_panel(to - size, to);
+  };
+  double from = a;
+  for (const double t : pulses)
+    if ((t - from) * (b - t) > 0.0) {
+      add_segment(from, t);
+      from = t;
+    }
+  add_segment(from, b);
+  fine_ -= coarse_;
+  if (!fine_.allFinite()) return;
+  missed_ += fine_;
+  most_missed_ = most_missed_.cwiseMax(missed_.cwiseAbs());
+  if (const double here = max_norm(fine_); here > largest_part_) {
+    largest_part_ = here;
+    at_ = pulses.empty() ? a : pulses.front();
+  }
+}
+
+void ImpulseCheck::look(const Integrator& integrator) {
+  const Interval step{time_, integrator.time() - time_};
+  time_ = integrator.time();
+  largest_ = largest_.cwiseMax(integrator.momentum().cwiseAbs());
+  if (looked_at_ >= most_parts || step.size == 0.0) return;
+  kinks_.divide(step, parts_);
+  pulses_.clear();
+  kinks_.add_pulses(step, pulses_);
+  if (pulses_.empty() && parts_.size() == 1 && parts_[0].start == step.start && parts_[0].size == step.size)
+    return;
+  if (step.size < 0.0) std::ranges::reverse(pulses_);
+  q_ = integrator.position();
+  v_ = integrator.velocity_estimate();
+  p_ = integrator.momentum();
+  std::vector<double> within;
+  for (const Interval& part : parts_) {
+    const double end = part.start + part.size;
+    within.clear();
+    for (const double t : pulses_)
+      if ((t - part.start) * (end - t) > 0.0) within.push_back(t);
+    look_at_part(part.start, end, within);
+    ++looked_at_;
+  }
+}
+
+std::string ImpulseCheck::text() const {
+  const double largest = max_norm(largest_);
+  double missed = 0.0;
+  for (Eigen::Index i = 0; i < largest_.size(); ++i)
+    if (largest_[i] > 0.0) missed = std::max(missed, most_missed_[i] / largest);
+  if (!(missed > StepComparison::largest_error(order_))) return {};
+  return "the forces change fast near t = " + to_text(at_) +
+         ", where the steps do not follow them: their impulse is off by " + to_text(100.0 * missed, 2) +
+         " % of the largest momentum; take a smaller step there, or ask for an error, --error";
+}
+
+}  // namespace diracstep
