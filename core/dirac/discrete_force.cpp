@@ -1,4 +1,6 @@
+#include <cmath>
 #include <diracstep/core/dirac/discrete_force.hpp>
+#include <diracstep/core/numerics/errors.hpp>
 
 namespace diracstep {
 
@@ -6,6 +8,13 @@ DiscreteForce::DiscreteForce(std::shared_ptr<const Force> force, StepRule rule)
     : force_(std::move(force)), rule_(rule) {
   for (Vector* column : {&q_, &v_, &f_, &minus_, &plus_}) column->setZero(force_->dimension());
   for (Vector* values : {&fq_, &fv_}) values->setZero(force_->pattern().nonzeros());
+}
+
+std::optional<DiscreteForce> DiscreteForce::of(const std::shared_ptr<const Force>& force, StepRule rule,
+                                               GeneratingType type) {
+  if (!force) return std::nullopt;
+  if (type == GeneratingType::four) throw Misuse("generating functions of type 4 take no forces");
+  return DiscreteForce(force, rule);
 }
 
 void DiscreteForce::move_to(const StepNode& node, Interval step, ConstVectorRef q0, ConstVectorRef q1,
@@ -34,6 +43,21 @@ void DiscreteForce::minus_by_end(Interval step, ConstVectorRef q0, ConstVectorRe
     move_to(node, step, q0, q1, increment);
     force_->derivatives(t_, q_, v_, fq_, fv_);
     d += node.weight * (1.0 - node.c) * (step.size * node.c * fq_ + fv_);
+  }
+}
+
+void DiscreteForce::add_sizes(Interval step, ConstVectorRef q0, ConstVectorRef q1, ConstVectorRef increment,
+                              VectorRef sizes) {
+  for (const StepNode& node : step_nodes(rule_)) {
+    const double factor = std::abs(step.size * node.weight * (1.0 - node.c));
+    if (factor == 0.0) continue;
+    move_to(node, step, q0, q1, increment);
+    force_->value(t_, q_, v_, f_);
+    force_->derivatives(t_, q_, v_, fq_, fv_);
+    sizes += factor * f_.cwiseAbs();
+    force_->pattern().for_each([&](Eigen::Index e, int r, int c) {
+      sizes[r] += factor * (std::abs(fq_[e] * q_[c]) + std::abs(fv_[e] * v_[c]));
+    });
   }
 }
 

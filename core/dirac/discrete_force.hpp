@@ -4,6 +4,7 @@
 #include <diracstep/core/dirac/step_rule.hpp>
 #include <diracstep/core/system/force.hpp>
 #include <memory>
+#include <optional>
 
 namespace diracstep {
 
@@ -17,6 +18,9 @@ namespace diracstep {
 class DiscreteForce {
  public:
   DiscreteForce(std::shared_ptr<const Force> force, StepRule rule);
+  /// Empty without a force; throws Misuse for generating functions of type 4, which take none.
+  static std::optional<DiscreteForce> of(const std::shared_ptr<const Force>& force, StepRule rule,
+                                         GeneratingType type);
 
   const SparsityPattern& pattern() const { return force_->pattern(); }
 
@@ -28,6 +32,11 @@ class DiscreteForce {
   /// d = ∂F⁻/∂q1 on pattern().
   void minus_by_end(Interval step, ConstVectorRef q0, ConstVectorRef q1, ConstVectorRef increment,
                     VectorRef d);
+
+  /// sizes += those of the terms of F⁻: it, and its derivatives times positions and velocities, which may
+  /// cancel in it.
+  void add_sizes(Interval step, ConstVectorRef q0, ConstVectorRef q1, ConstVectorRef increment,
+                 VectorRef sizes);
 
  private:
   void move_to(const StepNode& node, Interval step, ConstVectorRef q0, ConstVectorRef q1,

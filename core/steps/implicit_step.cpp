@@ -2,7 +2,6 @@
 #include <array>
 #include <cmath>
 #include <diracstep/core/dirac/discrete_force.hpp>
-#include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/numerics/row_scales.hpp>
 #include <diracstep/core/steps/implicit_jacobian.hpp>
 #include <diracstep/core/steps/implicit_step.hpp>
@@ -12,12 +11,6 @@
 namespace diracstep {
 
 namespace {
-
-std::optional<DiscreteForce> force_in(const Scene& scene, const ConstraintRule& rule, GeneratingType type) {
-  if (!scene.force) return std::nullopt;
-  if (type == GeneratingType::four) throw Misuse("generating functions of type 4 take no forces");
-  return DiscreteForce(scene.force, rule.nodes);
-}
 
 /// The graph and the constraint solved together.
 class ImplicitStep final : public StepProblem {
@@ -30,7 +23,7 @@ class ImplicitStep final : public StepProblem {
         n_(data_.n),
         m_(data_.rows()),
         inner_(n_ * s_->inner_columns()),
-        force_(force_in(scene, rule, s_->type())),
+        force_(DiscreteForce::of(scene.force, rule.nodes, s_->type())),
         jacobian_(*s_,
                   {data_.start_rows.pattern(), data_.discrete_constraint.pattern(),
                    force_ ? &force_->pattern() : nullptr},
@@ -196,12 +189,18 @@ class ImplicitStep final : public StepProblem {
     if (inner_ > 0)
       s_->guess_inner(data_.step, data_.q0, data_.p0, Vector::Zero(n_), y_.rightCols(s_->inner_columns()));
     s_->hessian(data_.step, y_, hessian_);
+    q1_ = data_.q0;
+    increment_ = data_.step.size * data_.v0;
     measure_terms(terms_);
   }
 
-  void measure_terms(Vector& terms) const {
+  void measure_terms(Vector& terms) {
     for (int i = 0; i < s_->columns(); ++i)
       if (i != 1) terms[i] = cancelling_terms(i);  // the end is no row
+    if (!force_ || !graph_.starts_from_position) return;
+    sizes_.setZero();
+    force_->add_sizes(data_.step, data_.q0, q1_, increment_, sizes_);
+    terms[0] = std::max(terms[0], max_norm(sizes_));
   }
 
   void update_scales() {
@@ -248,7 +247,7 @@ class ImplicitStep final : public StepProblem {
         continue;
       }
       sizes_ += (graph_.starts_from_position ? data_.p0 : data_.q0).cwiseAbs();
-      if (force_) sizes_ += force_->minus().cwiseAbs();
+      if (force_) force_->add_sizes(data_.step, data_.q0, q1_, increment_, sizes_);
       sizes_ *= factor;
       if (m_ > 0 && graph_.starts_from_position) data_.add_impulse_sizes(last_x_.segment(n_, m_), sizes_);
       largest_ *= factor;

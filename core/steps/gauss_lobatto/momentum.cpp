@@ -49,7 +49,7 @@ bool StageMomentum::second_derivatives(const NodePoints& at, ConstVectorRef x) {
   for (int i = 0; force_ && i < s_; ++i)
     force_->derivatives(at.gauss_time(i), at.gauss.col(i), x.segment(n_ * i, n_), fq_.col(i), fv_.col(i));
   if (taken) hessians_known_ = lagrangian_->structure().quadratic && all_finite();
-  return taken;
+  return taken || force_;
 }
 
 /// Those of a quadratic L are kept for good, where they are numbers.

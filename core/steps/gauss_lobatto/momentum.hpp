@@ -32,13 +32,14 @@ class StageMomentum {
   /// values = their part of the Jacobian; after second_derivatives() at the same x.
   void set_jacobian(const NodePoints& at, const NodeWeights& weights, const BlockPattern& layout,
                     VectorRef& values);
-  /// Those of L and of the force at the nodes; false where those of L, a quadratic one, are known.
+  /// Those of L and of the force at the nodes; false where those of L, a quadratic one, are known and no
+  /// force acts.
   bool second_derivatives(const NodePoints& at, ConstVectorRef x);
   /// Those of L at one node alone.
   void second_derivatives(const NodePoints& at, ConstVectorRef x, int stage);
-  const Columns& curvatures() const { return lqq_; }                         ///< ∂²L/∂q², values
-  const Columns& mixed() const { return lqv_; }                              ///< ∂²L/∂q∂v, values
-  const Columns& force_gradients() const { return fq_; }                     ///< ∂f/∂q, values
+  const Columns& curvatures() const { return lqq_; }      ///< ∂²L/∂q², values
+  const Columns& mixed() const { return lqv_; }           ///< ∂²L/∂q∂v, values
+  const Columns& force_gradients() const { return fq_; }  ///< ∂f/∂q, values
   /// The largest entry of both in the first so many stages: what forces lose to the round-off of positions.
   double curvature_size(int stages) const;
   double curvature_size() const { return curvature_size(s_); }

@@ -23,7 +23,7 @@ class GroupJacobian {
 
   /// At x, where the stages were evaluated last.
   void take(ConstVectorRef x, ColumnsRef matrix);
-  double curvature() const { return curvature_; }  ///< largest entry of ∂²L/∂g²
+  double curvature() const { return curvature_; }  ///< largest entry of ∂²L/∂g² and ∂f/∂g
 
  private:
   struct Parts {

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/core/steps/groups/point.hpp>
 
@@ -66,6 +67,7 @@ void GroupPoint<D>::derivatives(Derivatives& out) const {
     const SparsityPattern& own = scene_.force->pattern();
     Vector by_q(own.nonzeros()), by_v(by_q);
     scene_.force->derivatives(t_, q_, v_, by_q, by_v);
+    out.curvature = std::max(out.curvature, max_norm(by_q));
     Square added(d, d);
     embed_values(space_, own, by_q, added);
     out.force_g += added;

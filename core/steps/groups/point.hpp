@@ -28,7 +28,7 @@ class GroupPoint {
   /// Their derivatives there, d×d: along the group, and by ξ.
   struct Derivatives {
     Square momentum_g, momentum_xi, force_g, force_xi;
-    double curvature;  ///< largest entry of ∂²L/∂g²
+    double curvature;  ///< largest entry of ∂²L/∂g² and ∂f/∂g
   };
   void derivatives(Derivatives& out) const;
 
