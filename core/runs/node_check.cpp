@@ -2,6 +2,7 @@
 #include <cmath>
 #include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/core/runs/node_check.hpp>
+#include <diracstep/core/runs/rest_sizes.hpp>
 #include <sstream>
 
 namespace diracstep {
@@ -37,15 +38,18 @@ void NodeCheck::see(long step, const Sample& node) {
 void NodeCheck::judge() {
   // First: a force that alternates has large impulses, which cancel in the momentum.
   if (alternation_) {
-    look_for_alternation("velocity", &Sample::v, scene_.coordinates);
-    look_for_alternation("momentum", &Sample::p, scene_.coordinates);
-    look_for_alternation("multiplier", &Sample::lambda, scene_.row_names());
+    RestSizes rest(scene_);
+    rest.see(nodes_.back());
+    const double h = nodes_.back().time - nodes_[window - 2].time;
+    look_for_alternation("velocity", &Sample::v, scene_.coordinates, at_rest * rest.speed(h));
+    look_for_alternation("momentum", &Sample::p, scene_.coordinates, at_rest * rest.momentum(h));
+    look_for_alternation("multiplier", &Sample::lambda, scene_.row_names(), 0.0);
   }
   look_for_rest();
 }
 
 void NodeCheck::look_for_alternation(const char* what, Vector Sample::*column,
-                                     const std::vector<std::string>& names) {
+                                     const std::vector<std::string>& names, double rounding) {
   double largest = 0.0;
   for (const Sample& node : nodes_) largest = std::max(largest, max_norm(node.*column));
   for (std::size_t i = 0; i < names.size() && text_.empty(); ++i) {
@@ -58,7 +62,9 @@ void NodeCheck::look_for_alternation(const char* what, Vector Sample::*column,
       last = change;
       size = std::max(size, std::abs(component(k)));
     }
-    if (!alternates || !(std::abs(last) > smallest * size) || !(size > negligible * largest)) continue;
+    if (!alternates || !(std::abs(last) > std::max(smallest * size, rounding)) ||
+        !(size > negligible * largest))
+      continue;
     std::ostringstream text;
     text << "the " << what << " of " << names[i]
          << " alternates from step to step near t = " << nodes_.back().time
@@ -67,9 +73,7 @@ void NodeCheck::look_for_alternation(const char* what, Vector Sample::*column,
   }
 }
 
-/// F = ∂L/∂q + f + AᵀΛ and the sum of the sizes of its terms.  What cancels within ∂L/∂q, as of springs in
-/// balance, shows in the products of its derivatives with q and v, of which `cancelling` is the sum: F may be
-/// round-off of these.
+/// F = ∂L/∂q + f + AᵀΛ, the sum of the sizes of its terms, and what may cancel within them.
 void NodeCheck::add_force(const Sample& node, Vector& force, Vector& terms, Vector& cancelling) {
   const Eigen::Index n = scene_.dimension();
   Vector momentum(n);
@@ -77,16 +81,7 @@ void NodeCheck::add_force(const Sample& node, Vector& force, Vector& terms, Vect
   scene_.force_and_momentum(node.time, node.q, node.v, node.p, force, momentum);
   scene_.add_turning(node.v, momentum, force);
   terms = force.cwiseAbs();
-  const SparsityPattern& pattern = scene_.stepped_function().pattern();
-  const Vector& y = scene_.by_hamiltonian() ? node.p : node.v;
-  Vector qq(pattern.nonzeros()), qy(pattern.nonzeros()), yy(pattern.nonzeros());
-  scene_.stepped_function().hessian(node.time, node.q, y, qq, qy, yy);
-  qy = qy.cwiseAbs();
-  qq = qq.cwiseAbs();
-  cancelling.setZero(n);
-  pattern.multiply_add(qy.data(), y.cwiseAbs().eval().data(), cancelling.data());
-  const Vector positions = scene_.space ? Vector(Vector::Constant(n, max_norm(node.q))) : node.q.cwiseAbs();
-  pattern.multiply_add(qq.data(), positions.data(), cancelling.data());
+  cancelling = cancelling_forces(scene_, node);
   if (scene_.force) {
     scene_.force->value(node.time, node.q, node.v, momentum);
     force += momentum;

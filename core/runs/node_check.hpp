@@ -36,7 +36,9 @@ class NodeCheck {
  private:
   static constexpr std::size_t window = 8;
   void judge();
-  void look_for_alternation(const char* what, Vector Sample::*column, const std::vector<std::string>& names);
+  /// Changes by `rounding` are none.
+  void look_for_alternation(const char* what, Vector Sample::*column, const std::vector<std::string>& names,
+                            double rounding);
   void look_for_rest();
   void add_force(const Sample& node, Vector& force, Vector& terms, Vector& cancelling);
 

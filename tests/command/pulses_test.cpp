@@ -56,7 +56,7 @@ TEST_F(PulsesOfARun, AreFollowedToTheErrorAskedFor) {
 }
 
 TEST_F(PulsesOfARun, ThatStepsFollowAreNotDoubted) {
-  for (const char* force : {"if(t > 4.3, cos(t), 0)", "exp(-((t-4.3)/0.5)^2)", "tanh((t-4.3)/0.3)",
+  for (const char* force : {"if(t > 4.3, cos(t/2), 0.5)", "exp(-((t-4.3)/0.5)^2)", "tanh((t-4.3)/0.3)",
                             "sign(sin(7*t))", "abs(sin(3*t))", "min(1, max(0, 20*(t-4.3)))"})
     for (const char* options : {"", " --method type1/midpoint --step 0.02", " --adaptive"}) {
       const Outcome outcome = run(pushed(force) + options);
