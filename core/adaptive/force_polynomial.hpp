@@ -1,6 +1,6 @@
 #pragma once
 
-#include <diracstep/core/runs/path_cubic.hpp>
+#include <diracstep/core/numerics/path_cubic.hpp>
 #include <diracstep/core/system/constraint_distribution.hpp>
 #include <diracstep/core/system/scene.hpp>
 #include <optional>

@@ -7,7 +7,6 @@
 #include <diracstep/core/runs/node_check.hpp>
 #include <diracstep/core/runs/run_checks.hpp>
 #include <diracstep/core/runs/step_comparison.hpp>
-#include <diracstep/core/runs/velocity_changes.hpp>
 #include <diracstep/core/runs/work_check.hpp>
 #include <limits>
 #include <string>

@@ -1,8 +1,8 @@
 #include <algorithm>
 #include <cmath>
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/numerics/path_cubic.hpp>
 #include <diracstep/core/runs/event_search.hpp>
-#include <diracstep/core/runs/path_cubic.hpp>
 #include <limits>
 
 /// When the events of an EventSearch happen between two points.

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <diracstep/core/integrator/time_kinks.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/core/runs/impulse_check.hpp>
@@ -36,11 +37,19 @@ std::vector<GaussPoint> gauss_rule(int points) {
 
 }  // namespace
 
+struct ImpulseCheck::Instants {
+  TimeKinks known;
+  std::vector<Interval> parts = {};    ///< between switches
+  std::vector<double> pulses = {};     ///< middles
+  std::vector<double> in_a_part = {};  ///< of these
+};
+
 ImpulseCheck::ImpulseCheck(const Integrator& integrator)
     : scene_(integrator.scene()),
       order_(std::max(integrator.method().order, integrator.options().order)),
-      kinks_(scene_.kinks, scene_.start.time, integrator.options().step),
       watched_(scene_.kinks != nullptr && (scene_.lagrangian || scene_.by_hamiltonian())),
+      instants_(std::make_shared<Instants>(
+          Instants{TimeKinks(scene_.kinks, scene_.start.time, integrator.options().step)})),
       rule_(gauss_rule(std::clamp((order_ + 1) / 2, 1, most_points))),
       time_(integrator.time()),
       largest_(integrator.momentum().cwiseAbs()),
@@ -97,22 +106,22 @@ void ImpulseCheck::look(const Integrator& integrator) {
   time_ = integrator.time();
   largest_ = largest_.cwiseMax(integrator.momentum().cwiseAbs());
   if (looked_at_ >= most_parts || step.size == 0.0) return;
-  kinks_.divide(step, parts_);
-  pulses_.clear();
-  kinks_.add_pulses(step, pulses_);
-  if (pulses_.empty() && parts_.size() == 1 && parts_[0].start == step.start && parts_[0].size == step.size)
+  auto& [known, parts, pulses, in_a_part] = *instants_;
+  known.divide(step, parts);
+  pulses.clear();
+  known.add_pulses(step, pulses);
+  if (pulses.empty() && parts.size() == 1 && parts[0].start == step.start && parts[0].size == step.size)
     return;
-  if (step.size < 0.0) std::ranges::reverse(pulses_);
+  if (step.size < 0.0) std::ranges::reverse(pulses);
   q_ = integrator.position();
   v_ = integrator.velocity_estimate();
   p_ = integrator.momentum();
-  std::vector<double> within;
-  for (const Interval& part : parts_) {
+  for (const Interval& part : parts) {
     const double end = part.start + part.size;
-    within.clear();
-    for (const double t : pulses_)
-      if ((t - part.start) * (end - t) > 0.0) within.push_back(t);
-    look_at_part(part.start, end, within);
+    in_a_part.clear();
+    for (const double t : pulses)
+      if ((t - part.start) * (end - t) > 0.0) in_a_part.push_back(t);
+    look_at_part(part.start, end, in_a_part);
     ++looked_at_;
   }
 }

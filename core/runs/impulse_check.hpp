@@ -1,8 +1,8 @@
 #pragma once
 
 #include <diracstep/core/integrator/integrator.hpp>
-#include <diracstep/core/integrator/time_kinks.hpp>
-#include <diracstep/core/runs/path_cubic.hpp>
+#include <diracstep/core/numerics/path_cubic.hpp>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -30,14 +30,15 @@ class ImpulseCheck {
   std::string text() const;
 
  private:
+  struct Instants;  ///< of a step
   void look(const Integrator& integrator);
   void look_at_part(double a, double b, const std::vector<double>& pulses);
   void add(double weight, double t, Vector& sum);
 
   const Scene& scene_;
   int order_;
-  TimeKinks kinks_;
   bool watched_;
+  std::shared_ptr<Instants> instants_;
   std::vector<GaussPoint> rule_;
   double time_;
   Vector q_, v_, p_;
@@ -46,8 +47,6 @@ class ImpulseCheck {
   double largest_part_ = 0.0, at_ = 0.0;  ///< of one part, and where
   long looked_at_ = 0;
   Vector force_, other_, fine_, coarse_;
-  std::vector<Interval> parts_;
-  std::vector<double> pulses_;
 };
 
 }  // namespace diracstep

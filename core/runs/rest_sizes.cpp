@@ -39,18 +39,19 @@ void RestSizes::see(const Sample& point) {
     scene_.force->value(t, point.q, point.v, own_);
     force_ = force_.cwiseAbs() + own_.cwiseAbs();
   }
+  // Energies are squares: what cancels in the forces, which grows with the origin, is no part of them.
   own_ = cancelling_forces(scene_, point);
-  force_ = own_.array().isFinite().select(force_.cwiseAbs() + own_, force_.cwiseAbs());
   const bool by_momentum = scene_.by_hamiltonian();
   const PhaseFunction& function = scene_.stepped_function();
   function.hessian(t, point.q, by_momentum ? point.p : point.v, qq_, qy_, yy_);
   speed_ = energy_ = largest_force_ = 0.0;
   function.pattern().for_each([&](Eigen::Index k, int i, int j) {
     const double entry = std::abs(yy_[k]), force = std::abs(force_[i]);
+    const double terms = force + (std::isfinite(own_[i]) ? own_[i] : 0.0);
     const double per_mass = by_momentum ? entry : 1.0 / entry;
     if (i != j || !(entry > 0.0) || !std::isfinite(force * per_mass)) return;
-    speed_ = std::max(speed_, force * per_mass);
-    largest_force_ = std::max(largest_force_, force);
+    speed_ = std::max(speed_, terms * per_mass);
+    largest_force_ = std::max(largest_force_, terms);
     energy_ += force * force * per_mass;
   });
 }

@@ -3,6 +3,7 @@
 #include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/core/runs/step_comparison.hpp>
 #include <sstream>
+#include <utility>
 
 namespace diracstep {
 
@@ -110,6 +111,18 @@ std::string StepComparison::text() const {
   if (velocities_ && velocity_.doubted())
     return line(velocity_.time, velocity_.largest / velocity_.way, "the change of the velocity");
   return {};
+}
+
+VelocityChanges::VelocityChanges(Vector start)
+    : velocity_(std::move(start)), fast_(max_norm(velocity_) > 0.0) {}
+
+void VelocityChanges::see(ConstVectorRef velocity) {
+  const double change = max_norm(velocity - velocity_);
+  velocity_ = velocity;
+  fast_ = false;
+  if (!(change > 2.0 * largest_)) return;
+  fast_ = largest_ > 0.0;
+  largest_ = change;
 }
 
 }  // namespace diracstep

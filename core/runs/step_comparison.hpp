@@ -79,4 +79,21 @@ class StepComparison {
   long steps_ = 0;
 };
 
+/// Tells the steps behind those in which the velocity changed by more than twice as much as ever before: the
+/// motion came to something new, or runs away.
+class VelocityChanges {
+ public:
+  /// A first step that does not start from rest is told too.
+  explicit VelocityChanges(Vector start);
+
+  /// After each step.
+  void see(ConstVectorRef velocity);
+  bool fast() const { return fast_; }
+
+ private:
+  Vector velocity_;
+  double largest_ = 0.0;
+  bool fast_;
+};
+
 }  // namespace diracstep

@@ -2,7 +2,6 @@
 
 #include <diracstep/core/integrator/integrator.hpp>
 #include <diracstep/core/runs/step_comparison.hpp>
-#include <diracstep/core/runs/velocity_changes.hpp>
 #include <limits>
 #include <string>
 #include <vector>

@@ -1,7 +1,7 @@
 #pragma once
 
 #include <diracstep/core/integrator/integrator.hpp>
-#include <diracstep/core/runs/path_cubic.hpp>
+#include <diracstep/core/numerics/path_cubic.hpp>
 #include <string>
 
 namespace diracstep {

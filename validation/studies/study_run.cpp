@@ -132,9 +132,9 @@ ReferenceEnd reference_end(const CatalogueScene& scene, double t_end, const std:
 
 namespace {
 
-/// Sizes of q and p that zero is told by: the largest of the start and the reference, and what the speed and
-/// the masses ∂²L/∂v_i² of the start make of each other in the time between.  Not those of the run, which may
-/// be as wrong as can be.
+/// Sizes of q and p that zero is told by: the largest of the start and the reference, and what the speed, the
+/// force F = ∂L/∂q + f and the masses m = ∂²L/∂v_i² of the start make of each other in the time between:
+/// m |q|/t and √(m F |q|).  Not those of the run, which may be as wrong as can be.
 struct NaturalSizes {
   double q, p;
 };
@@ -152,8 +152,13 @@ NaturalSizes natural_sizes(const Scene& scene, const ReferenceEnd& reference, do
       if (i == j && std::isfinite(vv[k])) mass = std::max(mass, std::abs(vv[k]));
     });
   }
-  const double fastest = time > 0.0 ? std::max(speed, q / time) : speed;
-  return {q, std::max({max_norm(start.p), max_norm(reference.p), mass * fastest})};
+  Vector force(scene.dimension()), momentum(force.size()), own = Vector::Zero(force.size());
+  scene.force_and_momentum(start.time, start.q, start.v, start.p, force, momentum);
+  if (scene.force) scene.force->value(start.time, start.q, start.v, own);
+  const double by_force = std::sqrt(mass * max_norm(force + own) * q),
+               fastest = time > 0.0 ? std::max(speed, q / time) : speed;
+  return {q, std::max({max_norm(start.p), max_norm(reference.p), mass * fastest,
+                       std::isfinite(by_force) ? by_force : 0.0})};
 }
 
 }  // namespace

@@ -2,7 +2,7 @@
 /// terms.
 #include <nlohmann/json.hpp>
 
-#include "run_command.hpp"
+#include "../run_command.hpp"
 
 namespace diracstep::testing {
 namespace {

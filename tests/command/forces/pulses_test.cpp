@@ -2,7 +2,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "run_command.hpp"
+#include "../run_command.hpp"
 
 namespace diracstep::testing {
 namespace {
