@@ -219,6 +219,7 @@ StepReport AdaptiveIntegrator::sample_from(double node, ConstVectorRef q, ConstV
     report = side_steps_to(t);
   else if (t != node)
     report = side_.step(t - node);
+  kinks_beside_ = kinks_beside_ || (report.ok() && side_.met_kinks());
   if (!local_ && report.ok() && !side_.kinks_passed().empty()) {
     kinks_beside_ = true;
     report = side_steps_behind_kinks(t);

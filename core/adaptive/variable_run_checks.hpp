@@ -42,6 +42,7 @@ class VariableRunChecks {
   void see(const Sample& point) {
     if (first_.q.size() == 0) first_ = point;
     energy_.see(point);
+    impulse_.see(point);
     if (!integrator_.kinks_beside()) work_.see(point);  // no cubic follows the forces across them
   }
 

@@ -36,7 +36,7 @@ StepDivision::StepDivision(std::shared_ptr<const Scene> scene, double usual_step
 }
 
 StepSequence::Outcome StepDivision::solve(Interval step, const State& start, Guess guess, Work& work) {
-  times_.divide(step, parts_);
+  (void)times_.divide(step, parts_);
   divided_ = parts_.size() > 1 || parts_.front().size != step.size;
   passed_.clear();
   stuck_.clear();

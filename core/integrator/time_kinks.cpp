@@ -50,14 +50,14 @@ void TimeKinks::add_times(double first, double last) {
   }
 }
 
-void TimeKinks::divide(Interval step, std::vector<Interval>& parts) {
+bool TimeKinks::divide(Interval step, std::vector<Interval>& parts) {
   parts.assign(1, step);
-  if (!kinks_) return;
+  if (!kinks_) return false;
   const double end = step.start + step.size,
                reach = apart * gap * std::max(std::abs(step.start), std::abs(end));
-  if (std::abs(step.size) > width_ || !(std::abs(step.size) > 4.0 * reach)) return;
+  if (std::abs(step.size) > width_ || !(std::abs(step.size) > 4.0 * reach)) return false;
   add_times(std::min(step.start, end) - reach, std::max(step.start, end) + reach);
-  if (times_.empty()) return;
+  if (times_.empty()) return false;
   if (step.size < 0.0) std::ranges::reverse(times_);
   parts.clear();
   double from = step.start;
@@ -71,6 +71,7 @@ void TimeKinks::divide(Interval step, std::vector<Interval>& parts) {
   }
   if ((end - from) * step.size > 0.0) add_part(end);
   if (parts.empty()) parts.assign(1, step);
+  return true;
 }
 
 }  // namespace diracstep

@@ -18,8 +18,8 @@ class TimeKinks {
 
   /// The parts of a step between such times, in its direction; the step itself where it holds none.  Next to
   /// a kink parts end and begin a few units of round-off in t beside it, so that none reads both of its
-  /// sides.
-  void divide(Interval step, std::vector<Interval>& parts);
+  /// sides.  Whether the step holds such a time, or comes as close to one as its round-off.
+  bool divide(Interval step, std::vector<Interval>& parts);
 
   /// The centres of the pulses and ramps of the time in a step.
   void add_pulses(Interval step, std::vector<double>& times);

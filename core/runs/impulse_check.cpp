@@ -12,7 +12,8 @@ namespace diracstep {
 namespace {
 
 constexpr long most_parts = 1000;
-constexpr int halvings = 30;  // of the panels towards an end
+constexpr double followed = 1e-4;  // of the largest momentum
+constexpr int halvings = 30;       // of the panels towards an end
 constexpr int most_points = 8;
 
 /// The Gauss rule with so many points on (0, 1): zeros of the Legendre polynomial by Newton's method.
@@ -101,21 +102,20 @@ void ImpulseCheck::look_at_part(double a, double b, const std::vector<double>& p
   }
 }
 
-void ImpulseCheck::look(const Integrator& integrator) {
-  const Interval step{time_, integrator.time() - time_};
-  time_ = integrator.time();
-  largest_ = largest_.cwiseMax(integrator.momentum().cwiseAbs());
+void ImpulseCheck::look(double time, ConstVectorRef q, ConstVectorRef v, ConstVectorRef p) {
+  const Interval step{time_, time - time_};
+  time_ = time;
+  largest_ = largest_.cwiseMax(p.cwiseAbs());
   if (looked_at_ >= most_parts || step.size == 0.0) return;
   auto& [known, parts, pulses, in_a_part] = *instants_;
-  known.divide(step, parts);
   pulses.clear();
   known.add_pulses(step, pulses);
-  if (pulses.empty() && parts.size() == 1 && parts[0].start == step.start && parts[0].size == step.size)
-    return;
+  if (!known.divide(step, parts) && pulses.empty() && !follows_) return;
   if (step.size < 0.0) std::ranges::reverse(pulses);
-  q_ = integrator.position();
-  v_ = integrator.velocity_estimate();
-  p_ = integrator.momentum();
+  q_ = q;
+  v_ = v;
+  p_ = p;
+  const Vector before = missed_;
   for (const Interval& part : parts) {
     const double end = part.start + part.size;
     in_a_part.clear();
@@ -124,6 +124,17 @@ void ImpulseCheck::look(const Integrator& integrator) {
     look_at_part(part.start, end, in_a_part);
     ++looked_at_;
   }
+  follows_ = max_norm(missed_ - before) > followed * max_norm(largest_);
+}
+
+void ImpulseCheck::look_beside(const Sample& point) {
+  const Vector missed = missed_;
+  const double time = time_;
+  const bool follows = follows_;
+  look(point.time, point.q, point.v, point.p);
+  missed_ = missed;
+  time_ = time;
+  follows_ = follows;
 }
 
 std::string ImpulseCheck::text() const {
