@@ -42,7 +42,7 @@ std::vector<std::string> verb_names(const CLI::App& app) {
 /// The first word of the command line that nothing takes, with what may have been meant; or CLI11's message.
 std::string complaint(const CLI::App& app, const CLI::ParseError& error) {
   constexpr std::string_view value_of_flag = " was given a disallowed flag override";
-  const std::string text = error.what();
+  std::string text = error.what();
   if (text.ends_with(value_of_flag))
     return fmt::format("--{} takes no value", text.substr(0, text.size() - value_of_flag.size()));
   const auto verbs = app.get_subcommands();

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <diracstep/core/integrator/step_division.hpp>
+#include <diracstep/core/spaces/space.hpp>
 
 /// Which kinks a part of a step crosses, by the signs of the switching functions.
 namespace diracstep {
