@@ -92,7 +92,7 @@ void find(const diracstep_model& model, const diracstep_rest& rest, diracstep_eq
   };
   Equilibrium at = find_equilibrium(*scene, scene->start, rest.along != 0, go_on);
   require_wanted();
-  if (all && !at.ok()) {  // rows that depend on their surface alone bar the way there
+  if (all && !at.ok()) {  // rows that are redundant on their surface alone stop it
     Equilibrium by_independent = find_equilibrium(*entry.scene, entry.scene->start, rest.along != 0, go_on);
     require_wanted();
     if (by_independent.ok()) {

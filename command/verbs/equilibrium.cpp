@@ -227,7 +227,7 @@ void equilibrium(const EquilibriumArguments& options, Session& session) {
   if (all) entry.scene = entry.all_rows;
   tell_events_left_out(entry);
   Found found = find(options, entry);
-  if (all && !found.at.ok()) {  // rows that depend on their surface alone bar the way there
+  if (all && !found.at.ok()) {  // rows that are redundant on their surface alone stop it
     CatalogueScene without = entry;
     without.scene = independent;
     Found by_independent = find(options, without);

@@ -10,7 +10,8 @@ namespace diracstep {
 
 /// How a scene is stepped; everything but the step size has a default.
 struct IntegratorOptions {
-  std::string method = automatic_method;  ///< a name of the registry, or "auto": see default_method()
+  std::string method = automatic_method;  ///< a name of the registry, or "auto": see default_method();
+                                          ///< default_method_of_motion() looks at the damping of a motion too
   int order = 0;  ///< composed to this order, methods that are not self-adjoint with their adjoint; 0 keeps
                   ///< the method's own
   double step = 0.0;  ///< step size, may be negative; must be given

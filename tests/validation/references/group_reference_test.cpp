@@ -53,18 +53,18 @@ TEST_P(GroupReference, JacobianAgreesWithDifferences) {
 TEST_P(GroupReference, MeetsEquationsWrittenByHand) {
   constexpr double T = 2.0, rtol = 1e-10;
   const GroupScene& of = GetParam();
-  const Vector truth = group_scenes::reference(of, T);
+  const Vector reference = group_scenes::reference(of, T);
   for (const DaeFormulation formulation : formulations_of(*of.scene)) {
     const ReferenceRun ida = integrate_with_ida(*of.scene, T, {.rtol = rtol, .formulation = formulation});
     ASSERT_TRUE(ida.ok()) << name(formulation) << ": " << ida.failure;
-    EXPECT_LT((of.observe(ida.end.q, ida.end.v) - truth).lpNorm<Eigen::Infinity>(), 1e-6)
+    EXPECT_LT((of.observe(ida.end.q, ida.end.v) - reference).lpNorm<Eigen::Infinity>(), 1e-6)
         << name(formulation);
     EXPECT_LT(ida.off_space, 1e-7);
     EXPECT_LT(ida.newton_iterations, 4 * ida.steps) << "the Jacobian is not that of the residual";
   }
   const ReferenceRun erk = integrate_explicitly(*of.scene, T, {.rtol = rtol});
   ASSERT_TRUE(erk.ok()) << erk.failure;
-  EXPECT_LT((of.observe(erk.end.q, erk.end.v) - truth).lpNorm<Eigen::Infinity>(), 1e-8);
+  EXPECT_LT((of.observe(erk.end.q, erk.end.v) - reference).lpNorm<Eigen::Infinity>(), 1e-8);
   EXPECT_LT(erk.off_space, 1e-8);
 }
 

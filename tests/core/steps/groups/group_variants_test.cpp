@@ -108,10 +108,10 @@ Laws laws_of(Variant variant, int s) {
     for (int k = 0; k < steps; ++k) at = stepper.step(at, 1.0 / steps, scene.start.v);
     return group_scenes::entries(at.q, at.p).head(9).eval();
   };
-  const Vector truth = group_scenes::reference(top, 1.0).head(9);
+  const Vector reference = group_scenes::reference(top, 1.0).head(9);
   const int steps = s == 1 ? 20 : 10;
   Laws laws{};
-  laws.order = std::log2((end_of(steps) - truth).norm() / (end_of(2 * steps) - truth).norm());
+  laws.order = std::log2((end_of(steps) - reference).norm() / (end_of(2 * steps) - reference).norm());
 
   const auto vertical = [](const VariantStep::Point& at) {
     const auto R = spaces::rotation_matrix(at.q[0], at.q[1], at.q[2], at.q[3]);
