@@ -113,6 +113,16 @@ SolveReport PointReader::velocity_of_first_order(double t, ConstVectorRef q, Con
   return report;
 }
 
+/// Whether the velocity of the point is that of a solved stage.  Then unknowns_ holds the forces of rows.
+bool PointReader::keep_velocity(double t, const State& at) {
+  auto* by_force = dynamic_cast<ByForceVelocityProblem*>(first_order_velocity_.get());
+  if (by_force == nullptr) return false;
+  by_force->begin(t, at.q, at.p);
+  if (!by_force->holds(at.v)) return false;
+  unknowns_.tail(scene_->rows()) = by_force->forces(at.v);
+  return true;
+}
+
 void PointReader::determine(Start& start) {
   if (!first_order_velocity_) return;
   Vector p(start.v.size());
@@ -226,7 +236,8 @@ SolveReport PointReader::acceleration_by_elimination(double t, ConstVectorRef q,
 
 SolveReport PointReader::read(double t, const State& at, Momentum momentum, Sample& sample) {
   sample.v = at.v;
-  SolveReport report = velocity(t, at.q, at.p, sample.v);
+  SolveReport report;
+  if (!keep_velocity(t, at)) report = velocity(t, at.q, at.p, sample.v);
   if (scene_->rows() == 0)
     sample.lambda.resize(0);
   else if (first_order_velocity_)

@@ -51,6 +51,7 @@ class PointReader {
  private:
   struct Elimination;
   bool constant_diagonal_mass(double t, ConstVectorRef q);
+  bool keep_velocity(double t, const State& at);
   SolveReport velocity_of_first_order(double t, ConstVectorRef q, ConstVectorRef p, Vector& v);
   SolveReport velocity_by_hamiltonian(double t, ConstVectorRef q, ConstVectorRef p, Vector& v);
   SolveReport solve_acceleration(NonlinearProblem& problem, std::unique_ptr<NonlinearSolver>& solver,

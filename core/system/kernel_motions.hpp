@@ -99,6 +99,10 @@ class ByForceVelocityProblem final : public MomentumVelocityProblem {
   void residual(ConstVectorRef x, VectorRef f) override;
   void jacobian(ConstVectorRef x, VectorRef values) override;
 
+  /// Whether v is the velocity of p itself, to round-off, and meets the equations of forces as the last stage
+  /// of a step was solved for.  To solve for v again would then lose digits: where windings are coupled
+  /// tightly, currents far smaller than those that magnetise follow from p by differences of large terms.
+  bool holds(ConstVectorRef v);
   /// By solve_monotonically(), from a guess far away; empty, or why there is no solution.
   std::string solve_from_afar(Vector& x);
   /// Λ at (t, q) and v, with some acceleration a; what a is along W counts nowhere:

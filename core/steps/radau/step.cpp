@@ -20,7 +20,7 @@ namespace {
 
 class RadauStep final : public StepProblem {
  public:
-  RadauStep(int s, const Scene& scene, bool dense)
+  RadauStep(int s, const Scene& scene, bool dense, bool velocities_by_force)
       : s_(s),
         n_(scene.dimension()),
         table_(radau_tableau(s)),
@@ -34,6 +34,7 @@ class RadauStep final : public StepProblem {
         length_(length_of_rows(scene)),
         affine_(affine(scene)),
         quadratic_(scene.lagrangian->structure().quadratic && !scene.force),
+        velocities_by_force_(velocities_by_force),
         row_scales_(size()) {
     impulses_.setZero(n_, s_);
     for (Vector* column : {&q0_, &p0_, &q_, &v_, &largest_q_, &largest_v_, &sizes_, &largest_})
@@ -115,7 +116,10 @@ class RadauStep final : public StepProblem {
     evaluate(x);
     end.at.q = points_.gauss.col(s_ - 1);
     end.at.p = momentum_.momenta().col(s_ - 1);
-    end.at.v = (end.at.q - q0_) / points_.step.size;
+    if (velocities_by_force_)
+      end.at.v = x.segment(n_ * (s_ - 1), n_);
+    else
+      end.at.v = (end.at.q - q0_) / points_.step.size;
     end.impulse.setZero(m_);
     StageSizes sizes = sizes_of_terms_;
     sizes.force = largest_entry(momentum_.forces().data(), momentum_.forces().size());
@@ -196,6 +200,7 @@ class RadauStep final : public StepProblem {
   double length_;   ///< of the rows
   bool affine_;     ///< the residual is affine in the unknowns
   bool quadratic_;  ///< L, without a force
+  bool velocities_by_force_;
   RowScales row_scales_;
   Columns impulses_;  ///< A(Q_j)ᵀ λ_j
   Vector q0_, p0_, last_x_;
@@ -245,7 +250,8 @@ const double* RadauStep::scales_of_unsolved_rows(ConstVectorRef f, double level)
 
 std::unique_ptr<StepProblem> radau_step(int s, const Scene& scene, bool dense) {
   if (!scene.lagrangian) (void)lagrangian_of(scene);  // throws
-  if (const FirstOrderMotions motions = first_order_motions(scene); motions.exist()) {
+  const FirstOrderMotions motions = first_order_motions(scene);
+  if (motions.exist()) {
     if (motions.hide_equations())
       throw Misuse("scene '" + scene.name +
                    "': the kernel of ∂²L/∂v² moves or hides equations, which Radau IIA does not keep; use "
@@ -255,7 +261,7 @@ std::unique_ptr<StepProblem> radau_step(int s, const Scene& scene, bool dense) {
     else
       require_determined(scene, motions);
   }
-  return std::make_unique<RadauStep>(s, scene, dense);
+  return std::make_unique<RadauStep>(s, scene, dense, motions.by_force);
 }
 
 }  // namespace diracstep

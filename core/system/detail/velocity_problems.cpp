@@ -9,6 +9,7 @@
 #include <diracstep/core/system/first_order_motions.hpp>
 #include <diracstep/core/system/kernel_motions.hpp>
 #include <diracstep/core/system/rows_along_motions.hpp>
+#include <limits>
 
 namespace diracstep {
 
@@ -103,6 +104,22 @@ void ByForceVelocityProblem::jacobian(ConstVectorRef x, VectorRef values) {
   j.topRightCorner(inert, m_) = -unit() * u.transpose() * point_.rows().transpose();
   j.block(inert, 0, w.cols(), n_) = -w.transpose() * point_.force_by_v();
   j.bottomLeftCorner(m_, n_) = point_.rows();
+}
+
+bool ByForceVelocityProblem::holds(ConstVectorRef v) {
+  constexpr double round_off = 4.0 * std::numeric_limits<double>::epsilon(), solved = 1e-9;
+  Vector x = Vector::Zero(size()), f(size());
+  x.head(n_) = v;
+  residual(x, f);
+  if (!f.allFinite()) return false;
+  const std::size_t forces = point_.motions().u.cols() > 0 ? 1 : 0;
+  Eigen::Index first = 0;
+  for (std::size_t b = 0; b < blocks_.size(); ++b) {
+    const double part = b < forces ? round_off : solved;
+    if (max_norm(f.segment(first, blocks_[b].rows)) > part * blocks_[b].scale) return false;
+    first += blocks_[b].rows;
+  }
+  return true;
 }
 
 std::string ByForceVelocityProblem::solve_from_afar(Vector& x) {

@@ -211,6 +211,22 @@ TEST_F(Circuits, AFlybackConverterOfTightInductors) {
               1e-5);
 }
 
+/// While the diode blocks, V(b) = K √(L2/L1) (V(in) − R1 I(L1)) beside a current of 1e-11 A, which follows
+/// from the fluxes only to 1e-12 A for K = 0.9999: 1 V at the diode.
+TEST_F(Circuits, ADiodeThatBlocksBehindATightTransformer) {
+  for (const double coupling : {0.9999, 0.999999})
+    for (const char* steps : {"", "--step 1e-6"}) {
+      const Json out = json(netlist("transformer\nV1 in 0 SIN(0 10 1k)\nR1 in a 1\nL1 a 0 10m\nL2 b 0 2.5m\n"
+                                    "K1 L1 L2 " +
+                                    std::to_string(coupling) +
+                                    "\nD1 b k DM\nC1 k 0 10u\nRL k 0 100\n.model DM D(IS=1e-12 CJO=0)\n"
+                                    ".tran 1u 1.431m uic\n.print V(b) I(L1)\n"),
+                            steps)["outputs"];
+      const double primary = 10.0 * std::sin(2e3 * M_PI * 1.431e-3) - value(out, "I(L1)");
+      EXPECT_NEAR(value(out, "V(b)"), 0.5 * coupling * primary, 1e-8) << coupling << ' ' << steps;
+    }
+}
+
 /// The leakage of the inductors rings with 1 pF, in few steps of high order: from predicted charges beyond
 /// the threshold of the diode Newton's method took twice the iterations, and what turns in four steps was
 /// doubted.
