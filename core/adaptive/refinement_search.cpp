@@ -7,6 +7,7 @@
 #include <diracstep/core/runs/frames.hpp>
 #include <diracstep/core/runs/growth_check.hpp>
 #include <diracstep/core/runs/run_checks.hpp>
+#include <optional>
 #include <utility>
 
 /// The runs of a RefinementSearch; what follows from them is in refinement_conclusions.cpp.
@@ -96,7 +97,7 @@ RefinementSearch::Passed RefinementSearch::pass(long refinement, ErrorControlRun
   now.step = report_.adaptive ? steps.variable.eps : std::abs(plan_.mean_step(refinement));
   long nodes = 0;
   SolveReport read_end;
-  NodeCheck windows(*motion_.scene, 0);
+  std::optional<NodeCheck> windows;
   EnergyCheck energy(*motion_.scene);
   const long between_energies = std::max(1L, plan_.steps() * refinement / energies_read);
   const bool may_give_up =
@@ -105,10 +106,11 @@ RefinementSearch::Passed RefinementSearch::pass(long refinement, ErrorControlRun
   bool given_up = false;
   Sample node;
   const auto at_node = [&](const ReadNode& read, bool last) {
-    const bool wanted = windows.wants(nodes), looked_at = nodes % between_energies == 0;
+    if (!windows) windows.emplace(read.scene, 0);
+    const bool wanted = windows->wants(nodes), looked_at = nodes % between_energies == 0;
     if ((path || (!last && (wanted || looked_at))) && read(Momentum::projected, node).ok()) {
       if (path) add_to_path(node, *path);
-      if (!last && wanted) windows.see(nodes, node);
+      if (!last && wanted) windows->see(nodes, node);
       if (!last && (wanted || looked_at)) {
         energy.see(node);
         largest_position_ = std::max(largest_position_, max_norm(node.q));
@@ -146,7 +148,7 @@ RefinementSearch::Passed RefinementSearch::pass(long refinement, ErrorControlRun
   passed.doubt =
       joined_doubts({energy.denied(end, motion_.options.error, size_at_end(end.q, largest_position_),
                                    size_at_end(end.p, largest_momentum_)),
-                     energy.text(), windows.text()});
+                     energy.text(), windows ? windows->text() : std::string()});
   return passed;
 }
 

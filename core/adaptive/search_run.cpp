@@ -24,11 +24,11 @@ bool may_stick(const Scene& scene) {
 StepsTaken run_fixed(Integrator& integrator, const ErrorControlReport::Steps& steps, double end,
                      const AtNode& at_node) {
   const double span = std::abs(end - integrator.time());
-  const ReadNode read = [&](Momentum momentum, Sample& sample) {
-    const SolveReport report = integrator.sample(momentum, sample);
-    if (std::abs(sample.time - end) <= rounding_of_time * span) sample.time = end;
-    return report;
-  };
+  const ReadNode read{integrator.scene(), [&](Momentum momentum, Sample& sample) {
+                        const SolveReport report = integrator.sample(momentum, sample);
+                        if (std::abs(sample.time - end) <= rounding_of_time * span) sample.time = end;
+                        return report;
+                      }};
   if (!at_node(read, false)) return {};
   StepsTaken taken;
   long left = steps.plan.steps() * steps.refinement;
@@ -36,7 +36,8 @@ StepsTaken run_fixed(Integrator& integrator, const ErrorControlReport::Steps& st
       integrator, steps.refinement, [&] { return at_node(read, --left == 0); },
       [&](const KinkPassed& kink) {
         return at_node(
-            [&](Momentum momentum, Sample& sample) { return integrator.sample(kink, momentum, sample); },
+            {integrator.scene(),
+             [&](Momentum momentum, Sample& sample) { return integrator.sample(kink, momentum, sample); }},
             false);
       });
   taken.sticks = !taken.last.ok() && !integrator.stuck_at_kink().empty() && may_stick(integrator.scene());
@@ -56,9 +57,8 @@ StepReport collapsed(double t, double size) {
 }
 
 StepReport run_variable(AdaptiveIntegrator& integrator, double end, const AtNode& at_node) {
-  const ReadNode read = [&](Momentum momentum, Sample& sample) {
-    return integrator.sample(momentum, sample);
-  };
+  const ReadNode read{integrator.integrator().scene(),
+                      [&](Momentum momentum, Sample& sample) { return integrator.sample(momentum, sample); }};
   for (long slow = 0;;) {
     const double left = end - integrator.time(), size = integrator.next_size();
     if (!at_node(read, false)) return {};
@@ -69,10 +69,10 @@ StepReport run_variable(AdaptiveIntegrator& integrator, double end, const AtNode
     if (!report.ok()) return report;
   }
   StepReport report;
-  const ReadNode read_end = [&](Momentum momentum, Sample& sample) {
-    report = integrator.sample_at(end, momentum, sample);
-    return report.solve;
-  };
+  const ReadNode read_end{integrator.integrator().scene(), [&](Momentum momentum, Sample& sample) {
+                            report = integrator.sample_at(end, momentum, sample);
+                            return report.solve;
+                          }};
   at_node(read_end, true);
   return report;
 }

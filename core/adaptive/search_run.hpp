@@ -7,7 +7,12 @@
 namespace diracstep::detail {
 
 /// Reads the state at a node of a run.
-using ReadNode = std::function<SolveReport(Momentum, Sample&)>;
+struct ReadNode {
+  const Scene& scene;  ///< the one that is stepped, with its hidden rows and without those left out
+  std::function<SolveReport(Momentum, Sample&)> sample;
+
+  SolveReport operator()(Momentum momentum, Sample& to) const { return sample(momentum, to); }
+};
 /// Called at the start, at each node and at the end; false ends the run.
 using AtNode = std::function<bool(const ReadNode& read, bool last)>;
 

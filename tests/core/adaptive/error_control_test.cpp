@@ -108,6 +108,24 @@ TEST(ErrorControl, AFastPhaseIsResolved) {
   EXPECT_NEAR(report.end.p[1], -rate * std::sin(10.0 * rate), 1e-2 * rate);
 }
 
+/// A weight held up by a row that is written twice: the second one is left out, and has no force to look at.
+TEST(ErrorControl, LooksAtTheRowsThatAreStepped) {
+  auto scene = std::make_shared<Scene>();
+  scene->name = "held weight";
+  scene->coordinates = {"x", "y"};
+  scene->lagrangian = lagrangian<2>([](const auto& q, const auto& v) {
+    return 0.5 * (v[0] * v[0] + v[1] * v[1] - q[0] * q[0]) - 9.81 * q[1];
+  });
+  scene->constraints = {pfaffian<2, 2>([]<class T>(const std::array<T, 2>&) {
+    return std::array<std::array<T, 2>, 2>{{{T(0.0), T(1.0)}, {T(0.0), T(2.0)}}};
+  })};
+  scene->start = {0.0, Vector::Unit(2, 0), Vector::Zero(2)};
+  const ErrorControlReport report = solve(scene, 3.0, {.error = 1e-6});
+  ASSERT_TRUE(report.ok()) << report.refusal;
+  EXPECT_EQ(report.end.lambda.size(), 1);
+  EXPECT_NEAR(report.end.q[0], std::cos(3.0), 1e-6);
+}
+
 /// An ion in a trap, in SI units: momenta of 1e-28 count as those of 1 do.
 TEST(ErrorControl, EstimatesHaveNoUnit) {
   const auto ion = [](double mass, double rate, double size) {
