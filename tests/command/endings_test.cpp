@@ -212,7 +212,7 @@ TEST_F(Endings, ALimitOfTimeEndsARunAsAnInterruptDoes) {
   expect_misuse("run kepler_e06 --end 1000 --step 0.001 --max-steps 1000", {"1000000 steps", "--max-steps"});
 }
 
-#if !defined(__SANITIZE_ADDRESS__)  // whose library must be the first one loaded
+#if !defined(DIRACSTEP_ADDRESS_SANITIZER)  // whose library must be the first one loaded
 /// A disk may lose what was not synchronised, and may take names before bytes: every call of a run that
 /// changes files is the last one before a power cut, with the old names and with the new ones.
 TEST_F(Endings, APowerCutBeforeAnyWriteLeavesWhatCanBeResumed_slow) {

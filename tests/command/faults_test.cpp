@@ -96,7 +96,7 @@ class Faults : public Command {
   }
 };
 
-#if !defined(__SANITIZE_ADDRESS__)  // whose library must be the first one loaded
+#if !defined(DIRACSTEP_ADDRESS_SANITIZER)  // whose library must be the first one loaded
 TEST_F(Faults, OfTheSystemAreToldAndLeaveWholeFiles) { fail_everywhere(run_task, "io", 4); }
 TEST_F(Faults, OfTheAllocatorAreToldAndLeaveWholeFiles) { fail_everywhere(run_task, "memory", 97); }
 TEST_F(Faults, OfTheSystemAtEveryPlaceOfARun_slow) { fail_everywhere(run_task, "io", 1); }

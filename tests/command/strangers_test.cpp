@@ -12,7 +12,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-#if defined(__SANITIZE_ADDRESS__)  // takes terabytes of addresses
+#if defined(DIRACSTEP_ADDRESS_SANITIZER)  // takes terabytes of addresses
 constexpr bool sanitized = true;
 const std::string limited_memory = "DIRACSTEP_CC=none";
 #else

@@ -85,7 +85,8 @@ TEST_F(StudyCommand, VelocitiesThatAreNoDataOfAMotionAreFoundForBaselinesToo) {
                               "/examples/scenes/first_order_nonholonomic.toml --json "
                               "--methods type1/gl:3 --orders 6 --steps 0.1 --rtols 1e-9 --repeat 1");
   ASSERT_EQ(outcome.status, 0) << outcome.err;
-  for (const Json& row : Json::parse(outcome.out)["studies"][0]["rows"]) {
+  const Json result = Json::parse(outcome.out);
+  for (const Json& row : result["studies"][0]["rows"]) {
     if (row["method"] == "erk") {
       EXPECT_NE(row["status"].get<std::string>().find("not explicit: "), std::string::npos) << row;
       continue;

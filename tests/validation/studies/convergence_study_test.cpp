@@ -120,7 +120,9 @@ TEST(ConvergenceStudy, ATimeLimitEndsTheLadders) {
   options.rtols = {1e-4, 1e-6, 1e-8, 1e-10};
   const Study study = study_of("kepler_e06", options);
   for (const MeasuredOrder& m : study.measured_orders)
-    EXPECT_NE(m.ladder_end.find("share of the time"), std::string::npos) << m.ladder_end;
+    EXPECT_TRUE(m.ladder_end.find("share of the time") != std::string::npos ||
+                m.ladder_end.find("next run would take") != std::string::npos)
+        << m.ladder_end;
   EXPECT_LT(std::ranges::count_if(study.rows, &StudyRow::is_baseline), 8) << "both baselines end early";
 }
 
