@@ -2,10 +2,10 @@
 #include <cmath>
 #include <diracstep/core/integrator/time_kinks.hpp>
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/numerics/gauss_rule.hpp>
 #include <diracstep/core/numerics/scales.hpp>
 #include <diracstep/core/runs/impulse_check.hpp>
 #include <diracstep/core/runs/step_comparison.hpp>
-#include <numbers>
 
 namespace diracstep {
 
@@ -15,26 +15,6 @@ constexpr long most_parts = 1000;
 constexpr double followed = 1e-4;  // of the largest momentum
 constexpr int halvings = 30;       // of the panels towards an end
 constexpr int most_points = 8;
-
-/// The Gauss rule with so many points on (0, 1): zeros of the Legendre polynomial by Newton's method.
-std::vector<GaussPoint> gauss_rule(int points) {
-  std::vector<GaussPoint> rule;
-  for (int i = 0; i < points; ++i) {
-    double x = std::cos(std::numbers::pi * (i + 0.75) / (points + 0.5)), slope = 1.0;
-    for (int iteration = 0; iteration < 10; ++iteration) {
-      double before = 1.0, here = x;
-      for (int k = 2; k <= points; ++k) {
-        const double next = ((2.0 * k - 1.0) * x * here - (k - 1.0) * before) / k;
-        before = here;
-        here = next;
-      }
-      slope = points * (x * here - before) / (x * x - 1.0);
-      x -= here / slope;
-    }
-    rule.push_back({0.5 * (1.0 + x), 1.0 / ((1.0 - x * x) * slope * slope)});
-  }
-  return rule;
-}
 
 }  // namespace
 
@@ -51,13 +31,17 @@ ImpulseCheck::ImpulseCheck(const Integrator& integrator)
       watched_(scene_.kinks != nullptr && (scene_.lagrangian || scene_.by_hamiltonian())),
       instants_(std::make_shared<Instants>(
           Instants{TimeKinks(scene_.kinks, scene_.start.time, integrator.options().step)})),
-      rule_(gauss_rule(std::clamp((order_ + 1) / 2, 1, most_points))),
       time_(integrator.time()),
       largest_(integrator.momentum().cwiseAbs()),
       missed_(Vector::Zero(largest_.size())),
       most_missed_(missed_),
       force_(missed_),
-      other_(missed_) {}
+      other_(missed_) {
+  if (!watched_) return;
+  const GaussRule rule = gauss_rule(std::clamp((order_ + 1) / 2, 1, most_points));
+  for (Eigen::Index i = 0; i < rule.places.size(); ++i)
+    rule_.push_back({static_cast<double>(rule.places[i]), static_cast<double>(rule.weights[i])});
+}
 
 void ImpulseCheck::add(double weight, double t, Vector& sum) {
   scene_.force_and_momentum(t, q_, v_, p_, force_, other_);

@@ -5,32 +5,46 @@
 
 namespace diracstep {
 
-Vector cancelling_forces(const Scene& scene, const Sample& point) {
+namespace {
+
+/// Values of the second derivatives of L or H on their pattern.
+struct SecondDerivatives {
+  Vector qq, qy, yy;
+
+  SecondDerivatives(const Scene& scene, const Sample& point) {
+    const PhaseFunction& function = scene.stepped_function();
+    for (Vector* block : {&qq, &qy, &yy}) block->setZero(function.pattern().nonzeros());
+    function.hessian(point.time, point.q, scene.by_hamiltonian() ? point.p : point.v, qq, qy, yy);
+  }
+};
+
+Vector cancelling_forces(const Scene& scene, const Sample& point, const SecondDerivatives& second) {
   const Eigen::Index n = scene.dimension();
-  const SparsityPattern& pattern = scene.stepped_function().pattern();
   const Vector positions = scene.space ? Vector(Vector::Constant(n, max_norm(point.q))) : point.q.cwiseAbs(),
                velocities = point.v.cwiseAbs();
-  const Vector& y = scene.by_hamiltonian() ? point.p : point.v;
-  Vector sum = Vector::Zero(n), by_q(pattern.nonzeros()), by_y(by_q), mass(by_q);
-  scene.stepped_function().hessian(point.time, point.q, y, by_q, by_y, mass);
+  Vector sum = Vector::Zero(n);
   const auto add = [&](const SparsityPattern& entries, const Vector& values, const Vector& sizes) {
     entries.multiply_add(values.cwiseAbs().eval().data(), sizes.data(), sum.data());
   };
-  add(pattern, by_q, positions);
-  add(pattern, by_y, y.cwiseAbs());
+  add(scene.stepped_function().pattern(), second.qq, positions);
+  add(scene.stepped_function().pattern(), second.qy,
+      scene.by_hamiltonian() ? Vector(point.p.cwiseAbs()) : velocities);
   if (!scene.force) return sum;
-  by_q.resize(scene.force->pattern().nonzeros());
-  by_y.resize(by_q.size());
-  scene.force->derivatives(point.time, point.q, point.v, by_q, by_y);
+  Vector by_q(scene.force->pattern().nonzeros()), by_v(by_q.size());
+  scene.force->derivatives(point.time, point.q, point.v, by_q, by_v);
   add(scene.force->pattern(), by_q, positions);
-  add(scene.force->pattern(), by_y, velocities);
+  add(scene.force->pattern(), by_v, velocities);
   return sum;
 }
 
-RestSizes::RestSizes(const Scene& scene)
-    : scene_(scene), force_(Vector::Zero(scene.dimension())), momentum_(force_), own_(force_) {
-  for (Vector* block : {&qq_, &qy_, &yy_}) block->setZero(scene.stepped_function().pattern().nonzeros());
+}  // namespace
+
+Vector cancelling_forces(const Scene& scene, const Sample& point) {
+  return cancelling_forces(scene, point, {scene, point});
 }
+
+RestSizes::RestSizes(const Scene& scene)
+    : scene_(scene), force_(Vector::Zero(scene.dimension())), momentum_(force_), own_(force_) {}
 
 void RestSizes::see(const Sample& point) {
   const double t = point.time;
@@ -40,13 +54,12 @@ void RestSizes::see(const Sample& point) {
     force_ = force_.cwiseAbs() + own_.cwiseAbs();
   }
   // Energies are squares: what cancels in the forces, which grows with the origin, is no part of them.
-  own_ = cancelling_forces(scene_, point);
+  const SecondDerivatives second(scene_, point);
+  own_ = cancelling_forces(scene_, point, second);
   const bool by_momentum = scene_.by_hamiltonian();
-  const PhaseFunction& function = scene_.stepped_function();
-  function.hessian(t, point.q, by_momentum ? point.p : point.v, qq_, qy_, yy_);
   speed_ = energy_ = largest_force_ = 0.0;
-  function.pattern().for_each([&](Eigen::Index k, int i, int j) {
-    const double entry = std::abs(yy_[k]), force = std::abs(force_[i]);
+  scene_.stepped_function().pattern().for_each([&](Eigen::Index k, int i, int j) {
+    const double entry = std::abs(second.yy[k]), force = std::abs(force_[i]);
     const double terms = force + (std::isfinite(own_[i]) ? own_[i] : 0.0);
     const double per_mass = by_momentum ? entry : 1.0 / entry;
     if (i != j || !(entry > 0.0) || !std::isfinite(force * per_mass)) return;

@@ -28,7 +28,7 @@ class RestSizes {
 
  private:
   const Scene& scene_;
-  Vector force_, momentum_, own_, qq_, qy_, yy_;
+  Vector force_, momentum_, own_;
   double speed_ = 0.0, energy_ = 0.0, largest_force_ = 0.0;
 };
 

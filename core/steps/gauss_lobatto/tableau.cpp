@@ -1,6 +1,7 @@
 #include <array>
 #include <cmath>
 #include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/core/numerics/gauss_rule.hpp>
 #include <diracstep/core/steps/gauss_lobatto/tableau.hpp>
 #include <mutex>
 #include <numbers>
@@ -14,59 +15,20 @@ namespace {
 
 using Extended = long double;
 using Row = std::vector<Extended>;
-using ExtendedVector = Eigen::Matrix<Extended, Eigen::Dynamic, 1>;
 using ExtendedColumns = Eigen::Matrix<Extended, Eigen::Dynamic, Eigen::Dynamic>;
-
-struct Legendre {
-  Extended value, derivative;
-};
-
-/// P_n and P_n' at x.
-Legendre legendre_polynomial(int n, Extended x) {
-  Extended before = 1.0L, value = n == 0 ? 1.0L : x;
-  for (int k = 2; k <= n; ++k) {
-    const Extended next = ((2 * k - 1) * x * value - (k - 1) * before) / k;
-    before = value;
-    value = next;
-  }
-  return {value, n * (before - x * value) / (1.0L - x * x)};
-}
-
-/// Newton's method from x on, with f and its derivative from `step`: x ← x − step(x).
-template <class Step>
-Extended root(Extended x, Step step) {
-  for (int i = 0; i < 100; ++i) {
-    const Extended change = step(x);
-    x -= change;
-    if (std::abs(change) < 1e-20L) break;
-  }
-  return x;
-}
-
-/// Zeros of P_s, moved to [0,1].
-Row gauss_nodes(int s) {
-  Row nodes;
-  for (int i = 0; i < s; ++i) {
-    const Extended start = -std::cos(std::numbers::pi_v<Extended> * (i + 0.75L) / (s + 0.5L));
-    const Extended x = root(start, [s](Extended y) {
-      const Legendre p = legendre_polynomial(s, y);
-      return p.value / p.derivative;
-    });
-    nodes.push_back((1.0L + x) / 2.0L);
-  }
-  return nodes;
-}
 
 /// The ends and the zeros of P_s', moved to [0,1]; P_s'' from Legendre's equation.
 Row lobatto_nodes(int s) {
   Row nodes{0.0L};
   for (int i = 1; i < s; ++i) {
-    const Extended start = -std::cos(std::numbers::pi_v<Extended> * i / s);
-    const Extended x = root(start, [s](Extended y) {
-      const Legendre p = legendre_polynomial(s, y);
-      const Extended second = (2.0L * y * p.derivative - s * (s + 1) * p.value) / (1.0L - y * y);
-      return p.derivative / second;
-    });
+    Extended x = -std::cos(std::numbers::pi_v<Extended> * i / s);
+    for (int k = 0; k < 100; ++k) {
+      const LegendrePoint p = legendre_polynomial(s, x);
+      const Extended second = (2.0L * x * p.derivative - s * (s + 1) * p.value) / (1.0L - x * x),
+                     change = p.derivative / second;
+      x -= change;
+      if (std::abs(change) < 1e-20L) break;
+    }
     nodes.push_back((1.0L + x) / 2.0L);
   }
   nodes.push_back(1.0L);
@@ -78,16 +40,6 @@ Extended basis(const Row& nodes, std::size_t j, Extended x) {
   for (std::size_t k = 0; k < nodes.size(); ++k)
     if (k != j) product *= (x - nodes[k]) / (nodes[j] - nodes[k]);
   return product;
-}
-
-Row gauss_weights(const Row& nodes) {
-  const int s = static_cast<int>(nodes.size());
-  Row weights;
-  for (const Extended c : nodes) {
-    const Extended x = 2.0L * c - 1.0L, d = legendre_polynomial(s, x).derivative;
-    weights.push_back(1.0L / ((1.0L - x * x) * d * d));
-  }
-  return weights;
 }
 
 Row lobatto_weights(const Row& nodes) {
@@ -111,14 +63,12 @@ ExtendedVector column(const Row& row) {
   return ExtendedVector::Map(row.data(), static_cast<Eigen::Index>(row.size()));
 }
 
-}  // namespace
-
-namespace {
-
 ExtendedGaussLobattoTableau computed_tableau(int s) {
-  const Row c = gauss_nodes(s), b = gauss_weights(c), lc = lobatto_nodes(s), lb = lobatto_weights(lc);
-  ExtendedGaussLobattoTableau t{column(c),
-                                column(b),
+  const GaussRule gauss = gauss_rule(s);
+  const Row c(gauss.places.begin(), gauss.places.end()), b(gauss.weights.begin(), gauss.weights.end()),
+      lc = lobatto_nodes(s), lb = lobatto_weights(lc);
+  ExtendedGaussLobattoTableau t{gauss.places,
+                                gauss.weights,
                                 column(lc),
                                 column(lb),
                                 ExtendedColumns(s, s),
