@@ -16,6 +16,9 @@ namespace {
 
 /// Half the width of a difference, in steps.
 constexpr double difference_width = 1e-3;
+/// Radians of the control that stand for a turn by all that a retraction is injective on: steps of the usual
+/// 0.2 turn by half of that at most, also where nothing else changes.
+constexpr double turned = 0.4;
 
 Vector probing_velocity(const Vector& v) {
   const double size = v.size() > 0 && v.lpNorm<Eigen::Infinity>() > 0.0 ? v.lpNorm<Eigen::Infinity>() : 1.0;
@@ -69,6 +72,7 @@ RateMeter::RateMeter(const Scene& scene, const SolverFactory& solvers, Monitor m
   q_.setZero(scene.storage_size());
   v_.setZero(scene.dimension());
   origin_ = v_;
+  if (scene.space) turn_.setZero(scene.space->group_dimension());
   motion_ = std::make_unique<PointwiseMotion>(scene, solvers);
 }
 
@@ -109,11 +113,17 @@ void RateMeter::read_ramps(int place, double t, ConstVectorRef q, ConstVectorRef
   if (ramps_->count() > 0) ramps_->evaluate(t, q, v, g_.col(place));
 }
 
-double RateMeter::generic_rate(int place, double t, ConstVectorRef v, double delta) const {
+double RateMeter::generic_rate(int place, double t, ConstVectorRef v, double delta) {
   const double tau = (place - 2) * delta, typical = typical_ * typical_;
   const double v2 = (v + tau * a_.col(2)).squaredNorm(), a2 = a_.col(place).squaredNorm();
   const double jerk2 = (a_.col(place + 1) - a_.col(place - 1)).squaredNorm() / (4.0 * delta * delta);
   double floor = scales_.lowest * scales_.lowest;
+  if (const Space* space = motion_->space()) {
+    v_ = v + tau * a_.col(2);
+    space->embed(v_, turn_);
+    const double turning = turned * space->part_of_chart(turn_);
+    floor += turning * turning;
+  }
   const double below = typical * v2 + a2;
   if (!ramps_->none())
     floor += ramps_->squared(t + tau, g_.col(place - 1), g_.col(place), g_.col(place + 1), delta);

@@ -49,9 +49,11 @@ struct MonitorScales {
 ///   ω² = (ω0² |a|² + |ȧ|²) / (ω0² |v|² + |a|²) + ω_min² + Ω²,
 ///
 /// the relative rate of change of the field (v, a), and Ω that at which the motion comes to ramps and pulses
-/// of the formulas (RampRates): from before one nothing else tells of it.  ȧ and d(ln ω)/dt are central
-/// differences over points of the Taylor polynomial q + τv + τ²a/2 + τ³ȧ/6, v + τa + τ²ȧ/2; an odd function
-/// of τ stays odd under v → −v whatever its truncation error, and that is all that reversibility needs.
+/// of the formulas (RampRates): from before one nothing else tells of it.  On groups and spheres Ω² holds
+/// (0.4 times the rate at which v turns, in parts of what the retraction is injective on)² as well.  ȧ and
+/// d(ln ω)/dt are central differences over points of the Taylor polynomial q + τv + τ²a/2 + τ³ȧ/6, v + τa +
+/// τ²ȧ/2; an odd function of τ stays odd under v → −v whatever its truncation error, and that is all that
+/// reversibility needs.
 class RateMeter {
  public:
   /// Of a step: so far ahead of a kink that was just crossed no difference reaches back across it.
@@ -79,7 +81,7 @@ class RateMeter {
  private:
   /// Accelerations at τ = −2δ … 2δ, all or the inner three.
   bool accelerations(double t, ConstVectorRef q, ConstVectorRef v, double delta, int reach);
-  double generic_rate(int place, double t, ConstVectorRef v, double delta) const;
+  double generic_rate(int place, double t, ConstVectorRef v, double delta);
   void read_ramps(int place, double t, ConstVectorRef q, ConstVectorRef v);
   double own_rate(double t, ConstVectorRef q, ConstVectorRef v, double delta, int place);
   Rate failed() const;
@@ -96,6 +98,7 @@ class RateMeter {
   Columns g_;  ///< their switching functions, likewise
   Vector q_, v_;
   Vector origin_;  ///< zero
+  Vector turn_;    ///< a velocity as a group column
 };
 
 }  // namespace diracstep
