@@ -24,7 +24,7 @@ KinkCheck::KinkCheck(const Integrator& integrator, double end)
     : scene_(integrator.scene()), kinks_(scene_.kinks), crossings_(kinks_, integrator.time(), end) {
   if (crossings_.none() || scene_.space) kinks_ = nullptr;  // the path between points is one of R^n
   if (!kinks_) return;
-  for (Vector* column : {&force_, &between_, &beside_, &change_, &momentum_, &own_})
+  for (Vector* column : {&force_, &between_, &beside_, &beyond_, &change_, &momentum_, &own_})
     column->setZero(scene_.dimension());
   read(integrator, to_);
   force_at(to_.time, to_.q, to_.v, to_.p, force_);
@@ -63,22 +63,30 @@ void KinkCheck::force_at(double t, const Vector& q, const Vector& v, const Vecto
   force += own_;
 }
 
-double KinkCheck::missed(const std::vector<KinkCrossing>& cuts, const PathCubic& path) {
+KinkCheck::Missed KinkCheck::missed(const std::vector<KinkCrossing>& cuts, const PathCubic& path) {
   const double h = path.end() - path.begin();
-  double sum = 0.0, begin = path.begin();
+  Missed sum;
+  double begin = path.begin();
   for (std::size_t k = 0; k <= cuts.size(); ++k) {
     const double end = k < cuts.size() ? cuts[k].time : path.end();
     beside_.setZero(force_.size());
+    beyond_.setZero(force_.size());
     for (const auto& [place, weight] : gauss_points) {
       const double t = begin + place * (end - begin), s = (t - path.begin()) / h;
       path.at(t, q_, v_);
       path.momentum_at(t, p_);
       force_at(t, q_, v_, p_, between_);
+      beyond_ += weight *
+                 (between_ -
+                  between_.cwiseMax(force_before_.cwiseMin(force_)).cwiseMin(force_before_.cwiseMax(force_)))
+                     .cwiseAbs();
       between_ -= (1.0 - s) * force_before_ + s * force_;
       beside_ += weight * between_.cwiseAbs();
     }
-    beside_ -= 2.0 * change_;
-    sum += std::max(0.0, beside_.maxCoeff()) * std::abs(end - begin);
+    const double length = std::abs(end - begin);
+    sum.all += std::max(0.0, (beside_ - 2.0 * change_).maxCoeff()) * length;
+    sum.beyond +=
+        std::max(0.0, (beyond_ - (force_ - force_before_).cwiseAbs() - 2.0 * change_).maxCoeff()) * length;
     begin = end;
   }
   return sum;
@@ -100,7 +108,8 @@ void KinkCheck::look(const Integrator& integrator) {
     // Taken undivided over a contact it may have any impulse, and its ends know nothing of that.
     const double unknown = max_norm(to_.p - from_.p - 0.5 * h * (force_before_ + force_));
     if (unknown > too_much_of_undivided * largest_momentum_) {
-      sum_ += unknown;
+      sum_.all += unknown;
+      sum_.beyond += unknown;
       if (++jumps_ == 1) first_time_ = integrator.time();
     }
   }
@@ -122,23 +131,26 @@ void KinkCheck::look(const Integrator& integrator) {
     change_.setZero();
     return;
   }
-  const double impulse = missed(cuts, path);
-  if (!(impulse > 0.0)) return;
-  const bool instants = std::ranges::any_of(cuts, &KinkCrossing::instant);
-  (instants ? sum_of_instants_ : sum_) += part_unknown * impulse;
+  const Missed impulse = missed(cuts, path);
+  if (!(impulse.all > 0.0)) return;
+  Missed& sum = std::ranges::any_of(cuts, &KinkCrossing::instant) ? sum_of_instants_ : sum_;
+  sum.all += part_unknown * impulse.all;
+  sum.beyond += part_unknown * impulse.beyond;
   if (++jumps_ > 1) return;
   first_ = cuts.front().number;
   first_time_ = integrator.time();
 }
 
-std::string KinkCheck::text() const {
+std::string KinkCheck::text(bool confirmed) const {
   if (unresolved_ > too_unresolved)
     return "the step from t = " + to_text(unresolved_time_) +
            " crosses two kinks of the force, and what lies between them, as a contact, is not resolved in "
            "it: "
            "take shorter steps, or ask for an error, --error";
-  if (!(sum_of_instants_ > too_much_at_instants * largest_momentum_) &&
-      !(sum_ + sum_of_instants_ > too_much * largest_momentum_))
+  const double by_instants = confirmed ? sum_of_instants_.beyond : sum_of_instants_.all,
+               others = confirmed ? sum_.beyond : sum_.all;
+  if (!(by_instants > too_much_at_instants * largest_momentum_) &&
+      !(others + by_instants > too_much * largest_momentum_))
     return {};
   std::ostringstream text;
   text.precision(4);

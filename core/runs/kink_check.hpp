@@ -19,6 +19,10 @@ namespace diracstep {
 /// up, and doubted above 1/200 of the largest momentum; above 1/2000 where the time alone brings the change,
 /// since nodes can be put there.
 ///
+/// A run that was repeated with finer steps and ended alike has crossed its jumps well enough, but pulses
+/// both runs may have stepped over: what F leaves the range of F(t0) and F(t1) by counts then alone, less
+/// |F(t1) − F(t0)|.
+///
 /// Steps that resolve what changes, and kinks at which forces stay continuous, as of a contact, count for
 /// little or nothing.  Where a step could not resolve what lies between two kinks that it crosses, it is
 /// doubted for what that leaves.  Not seen is what Kinks do not show.
@@ -33,23 +37,29 @@ class KinkCheck {
     if (kinks_) look(integrator);
   }
 
-  /// Empty, or a line that names the first kink that was crossed with a jump.
-  std::string text() const;
+  /// Empty, or a line that names the first kink that was crossed with a jump.  `confirmed` by a run of finer
+  /// steps.
+  std::string text(bool confirmed = false) const;
 
  private:
   void look(const Integrator& integrator);
   void read(const Integrator& integrator, PathPoint& point) const;
   bool may_cross();
   void force_at(double t, const Vector& q, const Vector& v, const Vector& p, Vector& force);
-  double missed(const std::vector<KinkCrossing>& cuts, const PathCubic& path);
+  /// What a step does not know of its impulse, and what of it is a pulse between its ends.
+  struct Missed {
+    double all = 0.0, beyond = 0.0;
+  };
+  Missed missed(const std::vector<KinkCrossing>& cuts, const PathCubic& path);
 
   const Scene& scene_;
   std::shared_ptr<const Kinks> kinks_;
   KinkCrossings crossings_;
   PathPoint from_, to_;
   Vector switches_, switches_before_, changes_;  ///< of each switching function, and in the step before
-  Vector force_, force_before_, change_, between_, beside_, momentum_, own_, q_, v_, p_;
-  double sum_ = 0.0, sum_of_instants_ = 0.0, largest_momentum_ = 0.0, first_time_ = 0.0;
+  Vector force_, force_before_, change_, between_, beside_, beyond_, momentum_, own_, q_, v_, p_;
+  Missed sum_, sum_of_instants_;
+  double largest_momentum_ = 0.0, first_time_ = 0.0;
   long jumps_ = 0;
   double unresolved_ = 0.0, unresolved_time_ = 0.0;  ///< between kinks, the largest of a step
   int first_ = -1;

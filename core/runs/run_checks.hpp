@@ -63,7 +63,7 @@ class RunChecks {
   }
   /// Where the run has come to its end.
   void finish(Integrator& integrator) {
-    step_.finish(integrator);
+    step_.finish(integrator, !kinks_.text().empty());
     growth_.finish(integrator, step_.part_of_motion());
   }
 
@@ -72,7 +72,7 @@ class RunChecks {
   std::string text() const {
     return joined_doubts({energy_.text(), step_.confirmed() ? std::string() : work_.text(), step_.text(),
                           nodes_.text(), branch_.text(), growth_.text(), impulse_.text(), jumps_.text(),
-                          kinks_.text(), scene_.doubt ? scene_.doubt() : std::string()});
+                          kinks_.text(step_.confirmed()), scene_.doubt ? scene_.doubt() : std::string()});
   }
 
  private:

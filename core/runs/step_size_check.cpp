@@ -90,7 +90,8 @@ void StepSizeCheck::see(const Sample& point) {
 /// The run once more, with finer steps.
 void StepSizeCheck::repeat(Integrator& integrator) {
   if (taken_ == 0 || taken_ != wanted_ || integrator.work().steps - taken_before_ != taken_ ||
-      !(way_ > 0.0) || !(largest_momentum_ > 0.0) || !integrator.sample(Momentum::projected, whole_).ok())
+      !(way_ > 0.0) || !(largest_momentum_ > 0.0) || comparison_.at_rest_throughout() ||
+      !integrator.sample(Momentum::projected, whole_).ok())
     return;
   const Snapshot end = integrator.save();
   const long count = finer(taken_);

@@ -17,7 +17,8 @@ namespace diracstep {
 /// off by more than 2e-4 of the motion, forces act behind kinks that its steps are too long for, as contacts
 /// of a few steps.
 ///
-/// A run of at most 2000 steps and 12 coordinates and rows that crosses kinks in q or v is repeated from its
+/// A run of at most 2000 steps and 12 coordinates and rows that crosses kinks in q or v, or is doubted for
+/// those that its steps are not divided at, is repeated from its
 /// start with about 0.62 of the step: how far apart both end, divided by 1 − 0.62^p, is its error to first
 /// order, in parts of the way and of the largest momentum.  Doubted above 1e-3, of order 2 above 1e-2, of
 /// order 1 above 0.1; below, what steps at kinks and parts of them differ by counts for nothing.  Behind a
@@ -54,10 +55,10 @@ class StepSizeCheck {
   }
   /// Points of the run, the start first.
   void see(const Sample& point);
-  /// Behind the last step.
-  void finish(Integrator& integrator) {
+  /// Behind the last step; `doubted` for steps over kinks that they were not divided at.
+  void finish(Integrator& integrator, bool doubted) {
     if (!kinks_.empty()) look_behind_kinks(integrator);
-    if (repeats_ && over_kinks_ > 0) repeat(integrator);
+    if (repeats_ && (over_kinks_ > 0 || doubted)) repeat(integrator);
   }
 
   /// Empty, or a line that names the worst step so far.
