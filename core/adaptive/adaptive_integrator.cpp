@@ -111,6 +111,7 @@ AdaptiveIntegrator::AdaptiveIntegrator(const std::shared_ptr<const Scene>& scene
     if (adaptive_.end) instants_ = instants_on_the_way(main_.scene(), *adaptive_.end);
     if (adaptive_.end && may_change_later(main_.scene(), *adaptive_.end))
       longest_ = longest_of_such * std::abs(options_.step);
+    if (adaptive_.largest_step > 0.0) longest_ = std::min(longest_, adaptive_.largest_step);
   } else {
     meter_.emplace(make_meter(main_.scene(), solvers, adaptive_, options_.step, report_.accelerations));
   }
@@ -220,10 +221,7 @@ StepReport AdaptiveIntegrator::sample_from(double node, ConstVectorRef q, ConstV
   else if (t != node)
     report = side_.step(t - node);
   kinks_beside_ = kinks_beside_ || (report.ok() && side_.met_kinks());
-  if (!local_ && report.ok() && !side_.kinks_passed().empty()) {
-    kinks_beside_ = true;
-    report = side_steps_behind_kinks(t);
-  }
+  if (!local_ && report.ok() && !side_.kinks_passed().empty()) report = side_steps_behind_kinks(t);
   if (!report.ok()) return report;
   report.solve = side_.sample(momentum, sample);
   sample.time = t;

@@ -51,6 +51,7 @@ struct AdaptiveOptions {
   double smallest_step =
       0.0;  ///< without sign: ω counts as at most eps over it; 0: 1e-9 of the time to `end`.  Steps by their
             ///< local error are accepted below it whatever their error; 0: never
+  double largest_step = 0.0;    ///< of steps by their local error, without sign; 0: any
   long max_steps = 10'000'000;  ///< the next one fails
 };
 

@@ -52,9 +52,9 @@ class EventRuns {
 
   double difference(const Run& a, const Run& b) const {
     if (a.met != b.met) return 1.0;
-    return std::max({detail::relative_change(a.end.q, b.end.q, b.q),
-                     detail::relative_change(a.end.p, b.end.p, b.p),
-                     detail::relative_change(a.end.v, b.end.v, b.v),
+    return std::max({detail::relative_change(a.end.q, b.end.q, {b.q}),
+                     detail::relative_change(a.end.p, b.end.p, {b.p}),
+                     detail::relative_change(a.end.v, b.end.v, {b.v}),
                      std::abs(a.end.time - b.end.time) / std::abs(end_ - start_)});
   }
 

@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <cmath>
-#include <diracstep/core/adaptive/end_errors.hpp>
 #include <diracstep/core/adaptive/refinement_search.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/runs/frames.hpp>
@@ -19,6 +18,7 @@ constexpr std::size_t runs_to_converge = 8, runs_to_resolve_kinks = 24;  // befo
 constexpr double missed_allowed = 0.1;          // by the forces surveyed, in parts of the error asked for
 constexpr double least_part_left = 0.01;        // of an end beside the motion, that the forces are held to
 constexpr double error_out_of_reach = 1e-15;    // differences of runs hold nothing but round-off below it
+constexpr double part_of_time = 0.01;           // of the motion, in which balanced forces would act
 constexpr double growth_of_no_power = 1e6;      // of two runs apart: powers of the time lead to less
 constexpr double deviations_of_times = 2.0;     // standard ones, of what their round-off leaves
 constexpr double smallest_local_error = 2e-14;  // below it steps have one of round-off
@@ -123,14 +123,28 @@ std::vector<PathPoint> RefinementSearch::path_of(long refinement) {
   return path;
 }
 
+void RefinementSearch::see_sizes(const Sample& node) {
+  rest_.see(node);
+  const double time = part_of_time * (motion_.end - motion_.scene->start.time), speed = rest_.speed(time);
+  positions_.see(max_norm(node.q), std::abs(time) * speed);
+  momenta_.see(max_norm(node.p), rest_.momentum(time));
+  velocities_.see(max_norm(node.v), speed);
+  const auto raise = [](Vector& sizes, const Vector& column) {
+    if (sizes.size() != column.size()) sizes.setZero(column.size());
+    sizes = sizes.cwiseMax(column.cwiseAbs());
+  };
+  raise(sizes_of_q_, node.q);
+  raise(sizes_of_v_, node.v);
+}
+
 /// The size of the end in parts of the largest on the way, of q or p whichever is less: what the forces miss
 /// along the motion is to be small beside the end.
 double RefinementSearch::part_left_at_end() const {
-  const auto part = [](const Vector& column, double largest) {
-    return largest > 0.0 ? size_at_end(column, largest) / largest : 1.0;
+  const auto part = [](const Vector& column, const WaySize& way) {
+    return way.largest > 0.0 ? size_at_end(column, way) / way.largest : 1.0;
   };
-  return std::clamp(std::min(part(report_.end.q, largest_position_), part(report_.end.p, largest_momentum_)),
-                    least_part_left, 1.0);
+  return std::clamp(std::min(part(report_.end.q, positions_), part(report_.end.p, momenta_)), least_part_left,
+                    1.0);
 }
 
 /// Looks for what the steps of the last run do not resolve, before it is accepted or because the runs do not
@@ -180,8 +194,9 @@ void RefinementSearch::divide(const ForceSurveyReport& found) {
 /// A run from beside the start: its first point and its end, which is empty where it does not get there or
 /// where the rows allow no such start.
 std::pair<Sample, Sample> RefinementSearch::run_beside(const Counted& run) {
+  if (sizes_of_q_.size() == 0) return {};
   auto moved = std::make_shared<Scene>(*motion_.scene);
-  moved->start = beside(moved->start, largest_position_, largest_velocity_);
+  moved->start = beside(moved->start, sizes_of_q_, sizes_of_v_);
   Sample first, end;
   Work work;
   const auto at_node = [&](const ReadNode& read, bool last) {
@@ -210,12 +225,11 @@ double RefinementSearch::amplification(const Counted& run) {
   const auto [first, moved] = run_beside(run);
   if (moved.q.size() == 0) return 0.0;
   const Sample end = in_frames_of(run.end.q, moved, motion_.scene->space.get());
-  double growth = relative_change(end.q, run.end.q, largest_position_) / distance_beside;
-  if (largest_momentum_ > 0.0) {
+  double growth = relative_change(end.q, run.end.q, positions_) / distance_beside;
+  if (const double size = std::max(momenta_.largest, momenta_.unbalanced); size > 0.0) {
     // The momenta of a heavy coordinate whose way is short are far apart from the first.
-    const double begin = path_.empty() ? 0.0 : max_norm(first.p - path_.front().p) / largest_momentum_;
-    growth = std::max(
-        growth, relative_change(end.p, run.end.p, largest_momentum_) / std::max(distance_beside, begin));
+    const double begin = path_.empty() ? 0.0 : max_norm(first.p - path_.front().p) / size;
+    growth = std::max(growth, relative_change(end.p, run.end.p, momenta_) / std::max(distance_beside, begin));
   }
   return std::isfinite(growth) ? growth : 0.0;
 }

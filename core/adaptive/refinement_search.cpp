@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <cmath>
-#include <diracstep/core/adaptive/end_errors.hpp>
 #include <diracstep/core/adaptive/refinement_search.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/numerics/scales.hpp>
@@ -19,7 +18,8 @@ namespace {
 constexpr double unresolved_allowed = 0.01, least_unresolved = 1e-11;
 constexpr int max_failures = 12;  // of runs in a row
 constexpr int most_stuck = 5;     // of them, of a motion that sticks at a kink: shorter steps do not free it
-constexpr long fewest_steps = 4;  // of a run with variable steps that counts
+constexpr double steps_of_coarsest = 8.0;  // by their local error, at least
+constexpr long fewest_steps = 4;           // of a run with variable steps that counts
 constexpr long nodes_between_looks = 64;
 constexpr std::size_t runs_kept = 3;
 constexpr std::size_t runs_to_measure = 3;  // what a run to the error asked for would take
@@ -37,7 +37,8 @@ RefinementSearch::RefinementSearch(const Motion& motion, ErrorControlReport& rep
       first_(first),
       eps_step_(std::copysign(first, motion.end - motion.scene->start.time)),
       unit_(motion.options.first_step > 0.0 ? 1 : 2),
-      refinement_(unit_) {
+      refinement_(unit_),
+      rest_(*motion.scene) {
   if (!report.adaptive)
     plan_ = StepPlan(known_stretches(*motion.scene, motion.end), first * static_cast<double>(unit_));
 }
@@ -56,6 +57,11 @@ ErrorControlReport::Steps RefinementSearch::steps_of(long refinement) const {
                       .monitor = motion_.options.monitor,
                       .scales = motion_.scales,
                       .end = motion_.end};
+    // Steps that pass over what both they and their halves damp at once have no local error.
+    if (local_)
+      steps.variable.largest_step = std::abs(motion_.end - motion_.scene->start.time) *
+                                    static_cast<double>(unit_) /
+                                    (steps_of_coarsest * static_cast<double>(refinement));
   } else {
     steps.plan = plan_;
     steps.plan.allow_unresolved(std::max(unresolved_allowed * motion_.options.error, least_unresolved));
@@ -113,9 +119,7 @@ RefinementSearch::Passed RefinementSearch::pass(long refinement, ErrorControlRun
       if (!last && wanted) windows->see(nodes, node);
       if (!last && (wanted || looked_at)) {
         energy.see(node);
-        largest_position_ = std::max(largest_position_, max_norm(node.q));
-        largest_momentum_ = std::max(largest_momentum_, max_norm(node.p));
-        largest_velocity_ = std::max(largest_velocity_, max_norm(node.v));
+        see_sizes(node);
       }
     }
     if (last) read_end = read(Momentum::projected, passed.end);
@@ -145,18 +149,16 @@ RefinementSearch::Passed RefinementSearch::pass(long refinement, ErrorControlRun
     return passed;
   }
   energy.see(end);
-  passed.doubt =
-      joined_doubts({energy.denied(end, motion_.options.error, size_at_end(end.q, largest_position_),
-                                   size_at_end(end.p, largest_momentum_)),
-                     energy.text(), windows ? windows->text() : std::string()});
+  passed.doubt = joined_doubts({energy.denied(end, motion_.options.error, size_at_end(end.q, positions_),
+                                              size_at_end(end.p, momenta_)),
+                                energy.text(), windows ? windows->text() : std::string()});
   return passed;
 }
 
 double RefinementSearch::difference(const Sample& fine, const Sample& given) const {
   const Sample coarse = in_frames_of(fine.q, given, motion_.scene->space.get());
-  return std::max({relative_change(fine.q, coarse.q, largest_position_),
-                   relative_change(fine.p, coarse.p, largest_momentum_),
-                   relative_change(fine.v, coarse.v, largest_velocity_)});
+  return std::max({relative_change(fine.q, coarse.q, positions_), relative_change(fine.p, coarse.p, momenta_),
+                   relative_change(fine.v, coarse.v, velocities_)});
 }
 
 RefinementSearch::Outcome RefinementSearch::run(long refinement) {

@@ -3,9 +3,11 @@
 #include <chrono>
 #include <cmath>
 #include <diracstep/core/adaptive/convergence.hpp>
+#include <diracstep/core/adaptive/end_errors.hpp>
 #include <diracstep/core/adaptive/error_control.hpp>
 #include <diracstep/core/adaptive/force_survey.hpp>
 #include <diracstep/core/adaptive/search_run.hpp>
+#include <diracstep/core/runs/rest_sizes.hpp>
 #include <utility>
 
 namespace diracstep::detail {
@@ -73,6 +75,7 @@ class RefinementSearch {
   bool reached_end(double t) const;
   bool stopped(long max_solves);
   bool survey(bool accepted);
+  void see_sizes(const Sample& node);
   void add_to_path(const Sample& point, std::vector<PathPoint>& path) const;
   double part_left_at_end() const;
   std::vector<PathPoint> path_of(long refinement);
@@ -97,7 +100,9 @@ class RefinementSearch {
   Counted coarsest_{};                ///< of the runs that count
   std::vector<PathPoint> path_ = {};  ///< of that run, or of the last one with variable steps
   std::vector<Counted> last_ = {};    ///< the last three runs that count, the finest at the end
-  double largest_position_ = 0.0, largest_momentum_ = 0.0, largest_velocity_ = 0.0;  ///< at the nodes read
+  WaySize positions_ = {}, momenta_ = {}, velocities_ = {};
+  Vector sizes_of_q_ = {}, sizes_of_v_ = {};  ///< the largest of each at the nodes read
+  RestSizes rest_;
   int failures_ = 0, stuck_ = 0, divisions_ = 0;
   double growth_ = 0.0;             ///< of errors, where it has been asked for
   double rounding_of_times_ = 0.0;  ///< ForceSurveyReport::rounding of the last survey

@@ -66,7 +66,8 @@ void VariableRunChecks::finish() {
   const long resets = integrator_.control().resets - resets_before_;
   if (main.method().damped || first_.q.size() == 0 || taken_ > most_steps_repeated ||
       scene.dimension() + scene.rows() > StepComparison::most_unknowns_repeated ||
-      resets * steps_for_a_reset <= taken_ || !(way_ > 0.0) || !(largest_momentum_ > 0.0))
+      resets * steps_for_a_reset <= taken_ || !(way_ > 0.0) || !(largest_momentum_ > 0.0) ||
+      comparison_.at_rest_throughout())
     return;
   constexpr double part = 1.0 - StepComparison::first_part;
   if (!integrator_.sample(Momentum::projected, whole_).ok() ||

@@ -18,12 +18,15 @@ constexpr double steady_growth = 40.0, least_share = 0.6;  // of the mean of the
 
 }  // namespace
 
-Start beside(const Start& start, double position_size, double velocity_size) {
+Start beside(const Start& start, const Vector& position_sizes, const Vector& velocity_sizes) {
   Start moved = start;
+  const auto distance = [](const Vector& sizes, Eigen::Index i) {
+    return distance_beside * (sizes[i] > 0.0 ? sizes[i] : max_norm(sizes));
+  };
   for (Eigen::Index i = 0; i < moved.q.size(); ++i)
-    moved.q[i] += distance_beside * position_size * std::sin(1.0 + 1.7 * static_cast<double>(i));
+    moved.q[i] += distance(position_sizes, i) * std::sin(1.0 + 1.7 * static_cast<double>(i));
   for (Eigen::Index i = 0; i < moved.v.size(); ++i)
-    moved.v[i] += distance_beside * velocity_size * std::cos(0.4 + 1.3 * static_cast<double>(i));
+    moved.v[i] += distance(velocity_sizes, i) * std::cos(0.4 + 1.3 * static_cast<double>(i));
   return moved;
 }
 
@@ -65,7 +68,8 @@ void GrowthCheck::mark(Integrator& integrator) {
 std::vector<double> GrowthCheck::distances(Integrator& integrator, const Part& part) const {
   const Sample& first = part.points.front();
   try {
-    Start other_start = beside({first.time, first.q, first.v, {}}, way_, largest_velocity_);
+    Start other_start = beside({first.time, first.q, first.v, {}}, Vector::Constant(first.q.size(), way_),
+                               Vector::Constant(first.v.size(), largest_velocity_));
     if (const auto& space = integrator.scene().space) other_start.q = space->normalised(other_start.q);
     integrator.reset(other_start);
   } catch (const Misuse&) {  // a point that nothing may be moved at

@@ -6,9 +6,10 @@
 
 namespace diracstep {
 
-/// A start whose positions and velocities differ by 1e-13 of the sizes given, in a fixed pattern.  Rows hold
+/// A start whose positions and velocities differ by 1e-13 of the sizes given for each, of the largest where
+/// that is zero, in a fixed pattern.  Rows hold
 /// at it as at the start itself, to the 1e-10 of require_consistent().
-Start beside(const Start& start, double position_size, double velocity_size);
+Start beside(const Start& start, const Vector& position_sizes, const Vector& velocity_sizes);
 inline constexpr double distance_beside = 1e-13;
 
 /// Measures how much a run amplifies errors, by a second run from beside its start: after it the ends are G

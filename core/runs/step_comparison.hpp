@@ -51,6 +51,8 @@ class StepComparison {
 
   /// Empty, or a line that names the worst step so far.
   std::string text() const;
+  /// Whether all that moved is round-off of positions and of forces in balance.
+  bool at_rest_throughout() const { return longest_way_ <= rounding_; }
   /// The largest difference of positions so far; NaN before the first.
   double worst() const;
   /// The largest difference of positions so far, in parts of the way of the motion, or of momenta in parts of
