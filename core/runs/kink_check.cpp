@@ -14,6 +14,7 @@ constexpr double part_unknown = 0.25;  // of the impulse that a step cannot know
 constexpr double too_much = 0.005, too_much_at_instants = 0.0005;  // of the largest momentum
 constexpr double too_much_of_undivided = 0.1;                      // for one step that no division leads over
 constexpr double too_unresolved = 1e-3;                            // of q or p
+constexpr double of_a_jump = 4.0;  // where the path is not that of the motion, its forces are beyond those
 constexpr int looks_in_a_step = 2;
 constexpr double finest_cut = 1e-12;      // in parts of a step
 constexpr double at_the_beginning = 4.0;  // of these
@@ -85,8 +86,8 @@ KinkCheck::Missed KinkCheck::missed(const std::vector<KinkCrossing>& cuts, const
     }
     const double length = std::abs(end - begin);
     sum.all += std::max(0.0, (beside_ - 2.0 * change_).maxCoeff()) * length;
-    sum.beyond +=
-        std::max(0.0, (beyond_ - (force_ - force_before_).cwiseAbs() - 2.0 * change_).maxCoeff()) * length;
+    beyond_ -= of_a_jump * (force_ - force_before_).cwiseAbs() + 2.0 * change_;
+    sum.pulses += std::max(0.0, beyond_.maxCoeff()) * length;
     begin = end;
   }
   return sum;
@@ -109,7 +110,7 @@ void KinkCheck::look(const Integrator& integrator) {
     const double unknown = max_norm(to_.p - from_.p - 0.5 * h * (force_before_ + force_));
     if (unknown > too_much_of_undivided * largest_momentum_) {
       sum_.all += unknown;
-      sum_.beyond += unknown;
+      sum_.pulses += unknown;
       if (++jumps_ == 1) first_time_ = integrator.time();
     }
   }
@@ -134,8 +135,8 @@ void KinkCheck::look(const Integrator& integrator) {
   const Missed impulse = missed(cuts, path);
   if (!(impulse.all > 0.0)) return;
   Missed& sum = std::ranges::any_of(cuts, &KinkCrossing::instant) ? sum_of_instants_ : sum_;
-  sum.all += part_unknown * impulse.all;
-  sum.beyond += part_unknown * impulse.beyond;
+  sum.all += std::max(part_unknown * impulse.all, impulse.pulses);
+  sum.pulses += impulse.pulses;
   if (++jumps_ > 1) return;
   first_ = cuts.front().number;
   first_time_ = integrator.time();
@@ -147,8 +148,8 @@ std::string KinkCheck::text(bool confirmed) const {
            " crosses two kinks of the force, and what lies between them, as a contact, is not resolved in "
            "it: "
            "take shorter steps, or ask for an error, --error";
-  const double by_instants = confirmed ? sum_of_instants_.beyond : sum_of_instants_.all,
-               others = confirmed ? sum_.beyond : sum_.all;
+  const double by_instants = confirmed ? sum_of_instants_.pulses : sum_of_instants_.all,
+               others = confirmed ? sum_.pulses : sum_.all;
   if (!(by_instants > too_much_at_instants * largest_momentum_) &&
       !(others + by_instants > too_much * largest_momentum_))
     return {};

@@ -19,9 +19,9 @@ namespace diracstep {
 /// up, and doubted above 1/200 of the largest momentum; above 1/2000 where the time alone brings the change,
 /// since nodes can be put there.
 ///
-/// A run that was repeated with finer steps and ended alike has crossed its jumps well enough, but pulses
-/// both runs may have stepped over: what F leaves the range of F(t0) and F(t1) by counts then alone, less
-/// |F(t1) − F(t0)|.
+/// Of a pulse between two nodes it is all that is missed: what F leaves the range of F(t0) and F(t1) by, less
+/// 4 |F(t1) − F(t0)|, counts whole.  Where a run was repeated with finer steps and ended alike, pulses alone
+/// count: both runs may have stepped over them.
 ///
 /// Steps that resolve what changes, and kinks at which forces stay continuous, as of a contact, count for
 /// little or nothing.  Where a step could not resolve what lies between two kinks that it crosses, it is
@@ -48,7 +48,7 @@ class KinkCheck {
   void force_at(double t, const Vector& q, const Vector& v, const Vector& p, Vector& force);
   /// What a step does not know of its impulse, and what of it is a pulse between its ends.
   struct Missed {
-    double all = 0.0, beyond = 0.0;
+    double all = 0.0, pulses = 0.0;
   };
   Missed missed(const std::vector<KinkCrossing>& cuts, const PathCubic& path);
 
