@@ -3,7 +3,9 @@
 #include <diracstep/core/adaptive/adaptive_event_steps.hpp>
 #include <diracstep/core/adaptive/variable_run_checks.hpp>
 #include <diracstep/core/runs/run.hpp>
+#include <cmath>
 #include <functional>
+#include <limits>
 #include <optional>
 #include <string>
 #include <type_traits>
@@ -129,12 +131,16 @@ StepReport run_through_events(CheckedMotion<Stepper>& checked, const EventCourse
   StepReport report;
   report.solve = motion.sample(here);
   if (report.ok()) show();
+  const double round_off =
+      4.0 * std::numeric_limits<double>::epsilon() * std::max(std::abs(course.end), std::abs(here.time));
   for (long taken = 0; report.ok() && !motion.stopped() && !at_end && goes();) {
     const bool read = course.steps == 0 && left() < 1.0 - same_time;
     report = read ? checked.read_up_to(course.end, here, at_end) : checked.step();
     if (!report.ok() || motion.stopped()) break;
     if (!read) at_end = course.steps > 0 ? taken + 1 == course.steps : on_a_grid && left() <= same_time;
     if (!read || !at_end) report.solve = motion.sample(here);
+    // What acted at the end was the last: from there on no time passes.
+    at_end = at_end || (read && std::abs(course.end - motion.time()) <= round_off);
     if (report.ok() && (at_end || ++taken % course.every == 0)) show();
   }
   if (motion.stopped()) {

@@ -184,7 +184,8 @@ std::string Integrator::broken_left_out_row(const Vector& end) {
 StepReport Integrator::failed(const SolveReport& solve, double time, const std::string& why) const {
   std::ostringstream message;
   message << "step " << work_.steps << " from t = " << time << ": " << why;
-  if (solve.status == SolveStatus::no_convergence && !method().damped && may_be_damped(*scene_))
+  if (solve.status == SolveStatus::no_convergence && division_->stuck().empty() && !method().damped &&
+      may_be_damped(*scene_))
     message << "; what is damped much faster than the steps is taken by damped/radau:3, with steps by their "
                "local error: --method damped/radau:3 --adaptive";
   return {solve, work_.steps, time, message.str()};

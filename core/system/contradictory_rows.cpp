@@ -7,6 +7,7 @@
 #include <diracstep/core/system/redundant_rows.hpp>
 #include <iterator>
 #include <sstream>
+#include <unordered_map>
 #include <unordered_set>
 
 namespace diracstep {
@@ -50,7 +51,7 @@ class RowsBesideOthers {
     const auto pose = pose_near(space_, others_, t, near, {});
     if (!pose || !pose->allFinite()) return {};
     if (std::string rates = different_rates(t, *pose); !rates.empty()) return rates;
-    return no_common_pose(t, *pose);
+    return no_common_pose(t, *pose, std::max(max_norm(*pose), max_norm(near)));
   }
 
   std::string different_rates_near(double t, const Vector& near) {
@@ -59,9 +60,9 @@ class RowsBesideOthers {
   }
 
   /// Empty, or that a point of the others is off these.
-  std::string left_at(double t, const Vector& q) const {
-    const double off = distance_of(holonomic_these_, t, q);
-    if (off <= differs) return {};
+  std::string left_at(double t, const Vector& q) {
+    const double off = distance_of(holonomic_these_, t, q, max_norm(q));
+    if (off <= differs || off_as_others(t, q)) return {};
     std::ostringstream text;
     text << "'" << holonomic_these_.front()->names().front() << "' is not met at t = " << t << ", by " << off
          << " of its size, where the other rows are";
@@ -96,11 +97,11 @@ class RowsBesideOthers {
 
  private:
   /// Poses that the others allow are none of these rows, and none is found that all allow.
-  std::string no_common_pose(double t, const Vector& q) {
-    const double off = distance_of(holonomic_these_, t, q);
+  std::string no_common_pose(double t, const Vector& q, double size) {
+    const double off = distance_of(holonomic_these_, t, q, size);
     if (!(off > differs)) return {};
     const auto common = pose_near(space_, all_, t, q, {});
-    if (!common || !(distance_of(all_, t, *common) > differs)) return {};
+    if (!common || !(distance_of(all_, t, *common, size) > differs)) return {};
     rows_.evaluate(t, q);
     std::ostringstream text;
     text << "'" << names_[static_cast<std::size_t>(these_.front())] << "' contradicts "
@@ -134,13 +135,42 @@ class RowsBesideOthers {
     return text;
   }
 
-  static double distance_of(const ConstraintBlocks& blocks, double t, const Vector& q) {
+  /// Whether these rows are combinations of the others here and off by as much as those are: all positions
+  /// that are held may be zero, and then nothing but round-off has a size.
+  bool off_as_others(double t, const Vector& q) {
+    constexpr double as_much = 10.0;
+    std::unordered_map<std::string, double> distances;
+    for (const auto& block : all_) {
+      Vector phi(block->rows());
+      block->position(t, q, phi);
+      for (Eigen::Index r = 0; r < phi.size(); ++r)
+        distances[block->names()[static_cast<std::size_t>(r)]] = std::abs(phi[r]);
+    }
+    const auto distance = [&](int row) {
+      const auto found = distances.find(names_[static_cast<std::size_t>(row)]);
+      return found != distances.end() ? found->second : 0.0;
+    };
+    rows_.evaluate(t, q);
+    const Columns a = rows_.pattern().full(rows_.coefficients()), others = one_forms_of_others(a);
+    const Eigen::CompleteOrthogonalDecomposition<Columns> solver(others);
+    return std::ranges::all_of(these_, [&](int row) {
+      const Vector one_form = a.row(row).transpose(), c = solver.solve(one_form);
+      if (max_norm(others * c - one_form) > differs * max_norm(one_form)) return false;
+      double by_others = 0.0;
+      for (std::size_t k = 0; k < those_.size(); ++k)
+        by_others += std::abs(c[static_cast<Eigen::Index>(k)]) * distance(those_[k]);
+      return distance(row) <= as_much * by_others;
+    });
+  }
+
+  /// Of positions of this size.
+  static double distance_of(const ConstraintBlocks& blocks, double t, const Vector& q, double size) {
     double largest = 0.0;
     for (const auto& block : blocks) {
       Vector phi(block->rows()), a(block->pattern().nonzeros()), b(block->rows());
       block->position(t, q, phi);
       block->coefficients(t, q, a, b);
-      largest = std::max(largest, max_norm(phi) / size_or_one(max_norm(a) * max_norm(q)));
+      largest = std::max(largest, max_norm(phi) / size_or_one(max_norm(a) * size));
     }
     return largest;
   }

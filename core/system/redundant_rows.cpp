@@ -101,14 +101,14 @@ std::vector<int> best_choice(std::vector<int> at_start, const std::vector<Column
   return at_start;
 }
 
-/// How far the rows of these blocks are from zero, in parts of their one-forms times the size of the pose.
-double distance_from(const ConstraintBlocks& holonomic, double t, const Vector& q) {
+/// How far the rows of these blocks are from zero, in parts of their one-forms times a size of positions.
+double distance_from(const ConstraintBlocks& holonomic, double t, const Vector& q, double position_size) {
   double largest = 0.0;
   for (const auto& block : holonomic) {
     Vector phi(block->rows()), a(block->pattern().nonzeros()), b(block->rows());
     block->position(t, q, phi);
     block->coefficients(t, q, a, b);
-    const double size = a.lpNorm<Eigen::Infinity>() * q.lpNorm<Eigen::Infinity>();
+    const double size = a.lpNorm<Eigen::Infinity>() * position_size;
     largest = std::max(largest, phi.lpNorm<Eigen::Infinity>() / size);
   }
   return largest;
@@ -124,10 +124,11 @@ bool broken_by_the_others(const Scene& scene, const Start& start, const std::vec
   const ConstraintBlocks these = only_holonomic(without_rows(scene, kept)->constraints);
   bool any = false;
   for (const double distance : {-0.1, -0.03, -0.01, 0.01, 0.03, 0.1}) {
-    const auto pose =
-        pose_near(scene.space.get(), others, start.time, moved_start(scene.space.get(), start, distance), {});
+    const Vector moved = moved_start(scene.space.get(), start, distance);
+    const auto pose = pose_near(scene.space.get(), others, start.time, moved, {});
     if (!pose) continue;
-    if (distance_from(these, start.time, *pose) <= met) return false;
+    const double size = std::max(moved.lpNorm<Eigen::Infinity>(), pose->lpNorm<Eigen::Infinity>());
+    if (distance_from(these, start.time, *pose, size) <= met) return false;
     any = true;
   }
   return any;

@@ -1,11 +1,14 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <cmath>
 #include <diracstep/scene_format/compiler/lookup_table.hpp>
 
 namespace diracstep::scene_compiler {
 
 namespace {
+
+constexpr double round_off = 1e-15;  // of a time at an end of the table
 
 /// As in the source below, word for word but for the language.
 double value_of_part(const double* c, double u, int order) {
@@ -37,7 +40,12 @@ double LookupTable::value(double u, int order) const {
     return value_of_part(coefficients.data() + width * part, u - from, order);
   };
   const long before = knots_up_to(knots, u, false), behind = knots_up_to(knots, u, true);
-  return before == behind ? side(before) : 0.5 * (side(before) + side(behind));
+  if (order > 0 && before == 0 && knots.front() - u <= round_off * std::abs(u))
+    return side(knots_up_to(knots, knots.front(), true));
+  if (order > 0 && behind == static_cast<long>(knots.size()) && u - knots.back() <= round_off * std::abs(u))
+    return side(knots_up_to(knots, knots.back(), false));
+  if (before == behind) return side(before);
+  return 0.5 * (side(before) + side(behind));
 }
 
 const char* LookupTable::source_of_value() {
@@ -59,6 +67,14 @@ static double diracstep_table(const double* knots, const double* parts, long siz
   const long before = diracstep_up_to(knots, size, u, 0), behind = diracstep_up_to(knots, size, u, 1);
   double left, right;
   if (u != u) return u;
+  if (order > 0 && before == 0 && knots[0] - u <= 1e-15 * fabs(u)) {
+    const long first = diracstep_up_to(knots, size, knots[0], 1);
+    return diracstep_part(parts + 4 * first, u - knots[first - 1], order);
+  }
+  if (order > 0 && behind == size && u - knots[size - 1] <= 1e-15 * fabs(u)) {
+    const long last = diracstep_up_to(knots, size, knots[size - 1], 0);
+    return diracstep_part(parts + 4 * last, u - knots[last > 0 ? last - 1 : 0], order);
+  }
   left = diracstep_part(parts + 4 * before, u - knots[before > 0 ? before - 1 : 0], order);
   if (before == behind) return left;
   right = diracstep_part(parts + 4 * behind, u - knots[behind > 0 ? behind - 1 : 0], order);

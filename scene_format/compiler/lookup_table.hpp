@@ -6,8 +6,8 @@
 namespace diracstep::scene_compiler {
 
 /// A function of one variable by cubic polynomials between knots, a constant before the first and behind the
-/// last; at a knot the mean of both sides.  The part is found by bisection, so that a table of many knots
-/// costs little more than one of few.
+/// last; at a knot the mean of both sides, of derivatives at the first and the last, to round-off, the one
+/// within.  The part is found by bisection, so that a table of many knots costs little more than one of few.
 struct LookupTable {
   static constexpr int width = 4;    ///< coefficients of a part
   int degree = 0;                    ///< the highest of any part
