@@ -47,7 +47,7 @@ StepReport step(StepChecks& checks, FixedMotion& motion) {
   StepReport report = motion.step();
   if (report.ok() && !motion.acted()) {
     checks.pushed->after(motion.stepper());
-    checks.pushed->finish(motion.stepper());  // with the force of this step
+    checks.pushed->finish(motion.stepper(), false);  // with the force of this step
   }
   if (motion.acted()) checks.begin_anew();
   return report;

@@ -77,9 +77,9 @@ const Plot = (() => {
     return ticks.filter(t => t.at >= range.low && t.at <= range.high);
   }
 
-  // Leaves out labels that would touch the one before or the edge of the picture.
-  function apart(ticks, at, width) {
-    let end = -gap;
+  // Leaves out labels that would touch the one before, what is left of `from` or the edge of the picture.
+  function apart(ticks, at, from, width) {
+    let end = from - gap;
     return ticks.filter(t => {
       const half = widthOf(t.label) / 2;
       if (at(t.at) - half < end + gap || at(t.at) + half > width) return false;
@@ -214,8 +214,9 @@ const Plot = (() => {
     area.left = Math.ceil(Math.max(0, ...names) + tick + 5 + (spec.y.label ? fontSize + gap + 4 : 2));
     if (spec.equal) equalise(ranges, area);
     const at = scalesOf(ranges, area, categories);
-    const ticks = { x: apart(ticksOf(spec.x, ranges.x, area.right - area.left, 56), at.x, width),
-      y: ticksOf(spec.y, ranges.y, tall, 30) };
+    const y = ticksOf(spec.y, ranges.y, tall, 30), corner = y.some(t => at.y(t.at) > area.bottom - fontSize);
+    const from = corner && !categories ? area.left - tick - 3 : 0;  // a label of y stands beside the corner
+    const ticks = { x: apart(ticksOf(spec.x, ranges.x, area.right - area.left, 56), at.x, from, width), y };
     const foot = area.bottom + 2 * fontSize + 22;
     return { narrow, shown, beside, keys, ranges, area, at, ticks, foot,
       height: beside ? Math.max(foot, keys.height + 20) : foot + keys.height };
