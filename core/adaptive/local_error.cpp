@@ -73,8 +73,6 @@ void LocalErrorControl::start(const Integrator& at) {
   seen_ = {at.position().cwiseAbs(), at.momentum().cwiseAbs()};
   least_ = Vector::Zero(seen_.q.size() + seen_.p.size());
   rest_.emplace(at.scene());
-  later_seen_ = false;
-  later_speed_ = later_momentum_ = 0.0;
   refused_ = 0;
   stuck_ = 0;
   sliding_ = 0;
@@ -131,7 +129,7 @@ Vector LocalErrorControl::differences(const Integrator& fine, const Integrator& 
 }
 
 LocalErrorControl::Worst LocalErrorControl::error(const Integrator& fine, const Integrator& whole,
-                                                  double size, double way, double momentum) {
+                                                  double size, bool by_forces) {
   const Vector difference = differences(fine, whole);
   Worst worst;
   const auto add = [&](const Vector& start, const Vector& end, const Vector& seen, Eigen::Index first,
@@ -147,15 +145,15 @@ LocalErrorControl::Worst LocalErrorControl::error(const Integrator& fine, const 
       if (e != 0.0 && std::abs(e) / allowed > worst.part) worst = {std::abs(e) / allowed, e, first + i};
     }
   };
-  add(q_, fine.position(), seen_.q, 0, way);
-  add(p_, fine.momentum(), seen_.p, q_.size(), momentum);
+  add(q_, fine.position(), seen_.q, 0, by_forces ? std::abs(size) * rest_->speed(size) : 0.0);
+  add(p_, fine.momentum(), seen_.p, q_.size(), by_forces ? rest_->momentum(size) : 0.0);
   return worst;
 }
 
 /// Forces are asked for where the step would be refused without them.
 LocalErrorControl::Worst LocalErrorControl::error(const Integrator& fine, const Integrator& whole,
                                                   double size) {
-  const Worst worst = error(fine, whole, size, 0.0, 0.0);
+  const Worst worst = error(fine, whole, size, false);
   if (worst.part <= 1.0 || !std::isfinite(worst.part) || fine.scene().space) return worst;
   Sample start;
   start.time = fine.time() - size;
@@ -163,22 +161,7 @@ LocalErrorControl::Worst LocalErrorControl::error(const Integrator& fine, const 
   start.p = p_;
   start.v = v_;
   rest_->see(start);
-  const double speed = rest_->speed(size), momentum = rest_->momentum(size), h = std::abs(size);
-  if (!later_seen_) see_later_forces(start, std::copysign(1.0, size));
-  return error(fine, whole, size, h * std::max(speed, h * later_speed_),
-               std::max(momentum, h * later_momentum_));
-}
-
-/// With q and v as they are: a source that begins with zero acts later.
-void LocalErrorControl::see_later_forces(Sample& start, double direction) {
-  later_seen_ = true;
-  const double from = start.time;
-  for (const double part : {1e-6, 1e-5, 1e-4, 1e-3}) {
-    start.time = from + direction * part * span_;
-    rest_->see(start);
-    later_speed_ = std::max(later_speed_, rest_->speed(1.0));
-    later_momentum_ = std::max(later_momentum_, rest_->momentum(1.0));
-  }
+  return error(fine, whole, size, true);
 }
 
 /// Takes the step again with a size that hardly differs; what is allowed grows where differences are

@@ -27,12 +27,11 @@ bool may_change_later(const Scene& scene, double end);
 ///   it)
 ///
 /// for positions and momenta apart, T being the time to the end.  The largest s is no less than what the
-/// forces at the start would do in the step, were they not balanced (RestSizes), there or up to
-/// T/1000 later: at rest all else is round-off of it, and before a source has begun there is nothing else.
-/// The difference is about 2^p − 1 times the error of the halves of a method of order p. The next step is 0.9
-/// eps/|e| to the power 1/(p + 1) times as long, at most ten times; a step that is refused shrinks by the
-/// power 1/(s + 1) of its s stages, which is how its error falls where it is stiff (Hairer, Wanner, Solving
-/// Ordinary Differential Equations II, IV.8), at most to a tenth.
+/// forces at the start would do in the step, were they not balanced (RestSizes): at rest all else is
+/// round-off of it.  The difference is about 2^p − 1 times the error of the halves of a method of order p.
+/// The next step is 0.9 eps/|e| to the power 1/(p + 1) times as long, at most ten times; a step that is
+/// refused shrinks by the power 1/(s + 1) of its s stages, which is how its error falls where it is stiff
+/// (Hairer, Wanner, Solving Ordinary Differential Equations II, IV.8), at most to a tenth.
 ///
 /// A step ends behind the first kink in q and v that the motion crosses, the halves where the whole does:
 /// each side is judged by its own error, and a first step is taken behind it.
@@ -76,9 +75,8 @@ class LocalErrorControl {
 
   bool is_round_off(Integrator& fine, Integrator& whole, double start, double size, const Worst& worst);
   bool take_both(Integrator& fine, Integrator& whole, double& size, StepReport& report);
-  Worst error(const Integrator& fine, const Integrator& whole, double size, double way, double momentum);
+  Worst error(const Integrator& fine, const Integrator& whole, double size, bool by_forces);
   Worst error(const Integrator& fine, const Integrator& whole, double size);
-  void see_later_forces(Sample& start, double direction);
   Vector differences(const Integrator& fine, const Integrator& whole) const;
 
   double eps_, span_, smallest_;
@@ -90,9 +88,7 @@ class LocalErrorControl {
   Sizes seen_;
   Vector least_;  ///< of the sizes of (q, p), by round-off
   std::optional<RestSizes> rest_;
-  bool later_seen_ = false;
-  double later_speed_ = 0.0, later_momentum_ = 0.0;  ///< in a unit of time, by forces at later times
-  Vector q_, p_, v_, sizes_;                         ///< where the step starts; workspace
+  Vector q_, p_, v_, sizes_;  ///< where the step starts; workspace
 };
 
 }  // namespace diracstep

@@ -35,6 +35,9 @@ class RadauStep final : public StepProblem {
         affine_(affine(scene)),
         quadratic_(scene.lagrangian->structure().quadratic && !scene.force),
         velocities_by_force_(velocities_by_force),
+        coupled_masses_(scene.lagrangian->structure().y_hessian_constant &&
+                        !scene.lagrangian->structure().y_hessian_diagonal),
+        none_of_q_(Vector::Zero(n_)),
         row_scales_(size()) {
     impulses_.setZero(n_, s_);
     for (Vector* column : {&q0_, &p0_, &q_, &v_, &largest_q_, &largest_v_, &sizes_, &largest_})
@@ -161,6 +164,11 @@ class RadauStep final : public StepProblem {
     double terms = std::max(largest_entry(momentum_.momenta().data(), n_ * s_),
                             h * largest_entry(momentum_.forces().data(), n_ * s_));
     if (m_ > 0) terms = std::max(terms, rows_.impulse_size(x.data() + n_ * s_));
+    if (coupled_masses_) {  // as of tight inductors, whose flux is a small difference
+      sizes_.setZero();
+      momentum_.add_sizes(0.0, none_of_q_, x.segment(n_ * (s_ - 1), n_).cwiseAbs(), sizes_);
+      terms = std::max(terms, max_norm(sizes_));
+    }
     if (std::isfinite(terms)) blocks_[0].scale = std::max(known_momentum_, terms);
     if (m_ == 0) return;
     const double position = largest_entry(points_.gauss.data(), n_ * s_),
@@ -200,7 +208,8 @@ class RadauStep final : public StepProblem {
   double length_;   ///< of the rows
   bool affine_;     ///< the residual is affine in the unknowns
   bool quadratic_;  ///< L, without a force
-  bool velocities_by_force_;
+  bool velocities_by_force_, coupled_masses_;
+  Vector none_of_q_;
   RowScales row_scales_;
   Columns impulses_;  ///< A(Q_j)ᵀ λ_j
   Vector q0_, p0_, last_x_;

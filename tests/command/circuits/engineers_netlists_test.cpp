@@ -227,6 +227,15 @@ TEST_F(Circuits, ADiodeThatBlocksBehindATightTransformer) {
     }
 }
 
+/// Fluxes of inductors with K = 1 are small differences, all the more in the first steps: by ngspice 39,
+/// gear, reltol 1e-6.
+TEST_F(Circuits, APerfectTransformerStartsFromNothing) {
+  const Json out =
+      json(netlist("K = 1\nV1 a 0 SIN(0 10 1k)\nR1 a b 10\nL1 b 0 10m\nL2 c 0 40m\nK1 L1 L2 1\n"
+                   "RL c 0 100\nC1 c 0 100n\n.tran 10u 3.2m\n.print V(c)\n"))["outputs"];
+  EXPECT_NEAR(value(out, "V(c)"), 13.71862, 2e-5);
+}
+
 /// The leakage of the inductors rings with 1 pF, in few steps of high order: from predicted charges beyond
 /// the threshold of the diode Newton's method took twice the iterations, and what turns in four steps was
 /// doubted.
