@@ -1,9 +1,9 @@
 #pragma once
 
+#include <cmath>
 #include <diracstep/core/adaptive/adaptive_event_steps.hpp>
 #include <diracstep/core/adaptive/variable_run_checks.hpp>
 #include <diracstep/core/runs/run.hpp>
-#include <cmath>
 #include <functional>
 #include <limits>
 #include <optional>

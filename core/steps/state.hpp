@@ -50,8 +50,8 @@ struct StepMemory {
 
 /// Where a step ends.  A value: nothing of it counts before it is accepted.
 struct StepEnd {
-  /// (q1, p1), and as v the mean velocity of the step, (q1 − q0)/h in R^n; where the last stage is the end and
-  /// forces determine velocities, that of the stage.
+  /// (q1, p1), and as v the mean velocity of the step, (q1 − q0)/h in R^n; where the last stage is the end
+  /// and forces determine velocities, that of the stage.
   State at;
   Vector impulse;  ///< λ (momentum over the unit of a row) that entered at q0 as A(q0)ᵀλ
   StepMemory memory;
