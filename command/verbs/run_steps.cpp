@@ -108,6 +108,9 @@ void run_fixed(const RunArguments& options, const CatalogueScene& entry, const S
     saved = read_checkpoint(options.resume);
     require_same_run(*saved, keeping.identity, options.resume);
     go_on(*saved, options, motion);
+    if (motion.work().steps > steps)
+      throw Misuse(fmt::format("--resume: '{}' stands at t = {:g}, behind the end at {:g}", options.resume,
+                               motion.time(), end));
   }
   std::optional<RunSensitivities> derivatives;
   if (!options.sensitivities.empty())

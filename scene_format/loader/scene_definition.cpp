@@ -98,9 +98,11 @@ std::vector<std::pair<std::string, std::string>> scene_definition(const SceneDoc
     all.add("if" + of, event.condition);
     all.add("restitution" + of, event.restitution);
     for (const auto& entry : event.set) all.add("set" + of + ',', entry);
-    for (const std::string& name : event.on) all.add("on" + of, name);
-    for (const std::string& name : event.off) all.add("off" + of, name);
+    if (!event.on.empty()) all.add("on" + of, fmt::format("{}", fmt::join(event.on, ", ")));
+    if (!event.off.empty()) all.add("off" + of, fmt::format("{}", fmt::join(event.off, ", ")));
   }
+  for (const auto& output : document.outputs) all.add("output " + output.name, formula(output.formula));
+  for (const auto& kept : document.invariants) all.add("invariant " + kept.name, formula(kept.formula));
   all.add("redundant rows dropped", document.drop_redundant_rows ? "yes" : "no");
   return all.take();
 }

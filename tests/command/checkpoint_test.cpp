@@ -95,6 +95,27 @@ TEST_F(CheckpointCommand, OtherRunsAreRefusedWithBothValues) {
                 {"trajectory is none"});
 }
 
+/// Events that switch several rows, formulas of columns, and an end that lies behind.
+TEST_F(CheckpointCommand, WhatARunIsMadeOfIsKnown) {
+  const std::string begun = " --out '" + path("r.csv") + "' --checkpoint '" + path("r") + "'",
+                    resumed = " --out '" + path("r.csv") + "' --resume '" + path("r") + "'";
+  ASSERT_EQ(run("run rocking_block --end 1" + begun).status, 0);
+  expect_misuse("run rocking_block --end 0.5" + resumed, {"stands at t = 1"});
+  const Outcome on = run("run rocking_block --end 2" + resumed);
+  EXPECT_EQ(on.status, 0) << on.err;
+  const auto with_output = [&](const std::string& formula) {
+    std::ofstream(path("s.toml")) << "name = \"s\"\nlagrangian = \"v_x^2/2 - x^2/2\"\n[coordinates]\nx = {}\n"
+                                     "[start]\nx = 1\n[outputs]\nshown = \"" +
+                                         formula + "\"\n[span]\nend = 1\nstep = 0.1\n";
+    return "run '" + path("s.toml") + "'";
+  };
+  ASSERT_EQ(
+      run(with_output("x*v_x") + " --out '" + path("o.csv") + "' --checkpoint '" + path("o") + "'").status,
+      0);
+  expect_misuse(with_output("1000") + " --end 2 --out '" + path("o.csv") + "' --resume '" + path("o") + "'",
+                {"output shown", "x*v_x", "1000"});
+}
+
 TEST_F(CheckpointCommand, DamagedFilesAreRefused) {
   const std::string first = "run knife_edge --step 0.1 --end 1 --out " + path("k.csv");
   const std::string second =
