@@ -8,7 +8,11 @@
 #include <array>
 #include <cerrno>
 #include <csignal>
+#include <cstdlib>
 #include <cstring>
+#include <diracstep/core/numerics/errors.hpp>
+#include <diracstep/files/input_file.hpp>
+#include <diracstep/files/output_file.hpp>
 #include <diracstep/files/shown_text.hpp>
 #include <diracstep/reports/plot.hpp>
 #include <filesystem>
@@ -20,18 +24,20 @@ namespace diracstep {
 
 namespace {
 
+constexpr std::size_t largest_picture = std::size_t{1} << 28;
+
 /// A terminal for each file, at a width and a height in points.
 struct Terminal {
-  const char* ending;
+  const char *ending, *end;  ///< of the name, and what stands at the end of a whole file
   std::string (*settings)(std::size_t width, std::size_t height);
 };
 constexpr std::array<Terminal, 2> terminals{
-    {{".svg",
+    {{".svg", "</svg>",
       [](std::size_t width, std::size_t height) {
         return fmt::format("svg size {},{} font 'Helvetica,Arial,sans-serif,17' background 'white'", width,
                            height);
       }},
-     {".png", [](std::size_t width, std::size_t height) {
+     {".png", "IEND", [](std::size_t width, std::size_t height) {
         return fmt::format("pngcairo size {},{} font 'Helvetica,15' fontscale 1.9 linewidth 2 pointscale 2",
                            2 * width, 2 * height);
       }}}};
@@ -115,6 +121,27 @@ class Gnuplot {
   int input_ = -1;
 };
 
+/// Where gnuplot draws, so that a picture that is there stays until the next one is whole.
+class DrawingFolder {
+ public:
+  DrawingFolder() {
+    std::error_code none;
+    std::string name = (std::filesystem::temp_directory_path(none) / "diracstep_plot_XXXXXX").string();
+    if (::mkdtemp(name.data()) != nullptr) path_ = name;
+  }
+  DrawingFolder(const DrawingFolder&) = delete;
+  DrawingFolder& operator=(const DrawingFolder&) = delete;
+  ~DrawingFolder() {
+    std::error_code none;
+    if (!path_.empty()) std::filesystem::remove_all(path_, none);
+  }
+
+  const std::string& path() const { return path_; }
+
+ private:
+  std::string path_;
+};
+
 std::string run_gnuplot(const std::string& script) {
   const PipeSignalBlocked blocked;
   Gnuplot gnuplot;
@@ -139,15 +166,22 @@ std::string gnuplot_text(std::string_view text) {
 
 std::string render(const std::string& picture, const std::string& stem, std::size_t width,
                    std::size_t height) {
+  const DrawingFolder folder;
+  if (folder.path().empty()) return "no temporary folder can be made to draw in";
+  const auto drawn = [&](const Terminal& terminal) { return folder.path() + "/picture" + terminal.ending; };
   std::string script;
-  for (const auto& [ending, settings] : terminals)
-    script += fmt::format("reset\nset terminal {}\nset output {}\n{}unset output\n", settings(width, height),
-                          gnuplot_text(stem + ending), picture);
-  std::string failure = run_gnuplot(script);
-  if (!failure.empty()) return failure;
-  for (const auto& [ending, settings] : terminals)
-    if (std::error_code error; !std::filesystem::file_size(stem + ending, error))
-      return fmt::format("gnuplot did not write {}{}", stem, ending);
+  for (const Terminal& terminal : terminals)
+    script += fmt::format("reset\nset terminal {}\nset output {}\n{}unset output\n",
+                          terminal.settings(width, height), gnuplot_text(drawn(terminal)), picture);
+  if (std::string failure = run_gnuplot(script); !failure.empty()) return failure;
+  for (const Terminal& terminal : terminals) try {
+      const std::string bytes = read_file(drawn(terminal), "the picture", largest_picture);
+      if (bytes.find(terminal.end) == std::string::npos)  // gnuplot does not tell of a full disk
+        return fmt::format("{}{}: gnuplot did not draw all of it; is the disk full?", stem, terminal.ending);
+      replace_file(stem + terminal.ending, bytes);
+    } catch (const Error& error) {
+      return error.what();
+    }
   return {};
 }
 

@@ -12,7 +12,7 @@ std::string file_name(std::string scene);
 std::string gnuplot_text(std::string_view text);
 
 /// Writes STEM.svg and STEM.png of a script that sets neither terminal nor output; width and height in
-/// points. Empty, or what went wrong.
+/// points. A picture that is there is replaced by a whole one or stays. Empty, or what went wrong.
 std::string render(const std::string& picture, const std::string& stem, std::size_t width,
                    std::size_t height);
 

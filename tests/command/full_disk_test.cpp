@@ -34,6 +34,15 @@ TEST_F(FullDisk, ATrajectoryEndsWithAWholeLine) {
   EXPECT_EQ(written.back(), '\n');
 }
 
+TEST_F(FullDisk, APictureStaysWhereTheNextOneHasNoRoom) {
+  if (std::system("command -v gnuplot >/dev/null") != 0) GTEST_SKIP() << "gnuplot is missing";
+  const std::string line = "equilibrium hanging_chain --picture '" + path("p") + "'";
+  ASSERT_EQ(run(line).status, 0);
+  const std::string picture = contents(path("p.svg"));
+  EXPECT_EQ(run(line, limit(2)).status, 1);
+  EXPECT_EQ(contents(path("p.svg")), picture);
+}
+
 TEST_F(FullDisk, TheLastCheckpointStaysAndTheRunCanGoOn) {
   const std::string whole = "run knife_edge --method type1/gl:2 --step 0.01 --end 100 --json";
   const std::string files = " --out " + path("k.csv") + " --checkpoint-every 100";
