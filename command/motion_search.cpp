@@ -22,6 +22,9 @@ void add_search_options(CLI::App& verb, Session& session, MotionSearchArguments&
 }
 
 CatalogueScene searched_scene(MotionSearchArguments& arguments, Session& session, const std::string& verb) {
+  std::vector<NamedPath> inputs = inputs_of({arguments.scene}, session);
+  if (!arguments.guess.empty()) inputs.push_back({"--guess", arguments.guess});
+  if (!arguments.out.empty()) require_outputs({{"--out", arguments.out}}, inputs);
   CatalogueScene entry = make_scene(session, arguments.scene, parameters(arguments.set));
   require_flat(*entry.scene, verb);
   if (!entry.events.empty())

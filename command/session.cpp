@@ -10,6 +10,7 @@
 #include <diracstep/command/session.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/files/shown_text.hpp>
+#include <diracstep/scene_format/scene_file.hpp>
 
 namespace diracstep::command {
 
@@ -90,6 +91,14 @@ void add_tolerance_option(CLI::App& verb, Session& session) {
 void say(std::string_view message) {
   const std::string line = "diracstep: " + shown_lines(message) + '\n';
   std::fwrite(line.data(), 1, line.size(), stderr);  // where nobody can be told, the work goes on
+}
+
+std::vector<NamedPath> inputs_of(const std::vector<std::string>& scenes, const Session& session) {
+  std::vector<NamedPath> inputs;
+  for (const std::string& scene : scenes)
+    if (is_scene_file(scene)) inputs.push_back({"the scene", scene});
+  for (const Plugin& plugin : session.plugins) inputs.push_back({"the plugin", plugin.path()});
+  return inputs;
 }
 
 void print(std::string_view given) {

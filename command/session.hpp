@@ -3,6 +3,7 @@
 #include <diracstep/command/processes.hpp>
 #include <diracstep/core/integrator/integrator.hpp>
 #include <diracstep/core/methods/registry.hpp>
+#include <diracstep/files/paths.hpp>
 #include <diracstep/plugins/loaded_plugin.hpp>
 #include <diracstep/scene_format/scene_catalogue.hpp>
 #include <diracstep/solvers/direct_solver.hpp>
@@ -45,6 +46,9 @@ void load_plugins(Session& session);
 /// A scene of a plugin or of the catalogue, or a file, with what was changed in it told to the person; throws
 /// Misuse as diracstep::make_scene does.
 CatalogueScene make_scene(const Session& session, const std::string& name, const Parameters& changes = {});
+
+/// What a verb reads: those of the scenes that are files, and the plugins.
+std::vector<NamedPath> inputs_of(const std::vector<std::string>& scenes, const Session& session);
 
 /// "bounce, lands": the events of a scene that change its motion or end it; empty where there are none.
 std::string acting_events(const CatalogueScene& entry);

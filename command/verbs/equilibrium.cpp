@@ -221,6 +221,9 @@ void draw(const EquilibriumArguments& options, const CatalogueScene& entry, cons
 }
 
 void equilibrium(const EquilibriumArguments& options, Session& session) {
+  if (!options.picture.empty())
+    require_outputs({{"--picture", options.picture + ".svg"}, {"--picture", options.picture + ".png"}},
+                    inputs_of({options.scene}, session));
   CatalogueScene entry = make_scene(session, options.scene, parameters(options.set));
   const std::shared_ptr<const Scene> independent = entry.scene;
   const bool all = entry.events.empty() && entry.all_rows && !session.drop_redundant_rows;

@@ -142,6 +142,13 @@ void run_fit(FitArguments arguments, Session& session) {
           fmt::format("--from: '{}' is not among the parameters that are fitted; --set fixes others", name));
     changes[name] = value;
   }
+  std::vector<NamedPath> inputs = inputs_of({arguments.scene}, session), outputs;
+  inputs.push_back({"the data", arguments.data});
+  if (!arguments.residuals.empty()) outputs.push_back({"--residuals", arguments.residuals});
+  if (!arguments.picture.empty())
+    for (const char* extension : {".svg", ".png"})
+      outputs.push_back({"--picture", arguments.picture + extension});
+  require_outputs(outputs, inputs);
   const CatalogueScene entry = make_scene(session, arguments.scene, changes);
   const FittedScene of{arguments.scene, std::nullopt, changes, parameters_fitted};
   const Vector begin = fit_start(of, entry);

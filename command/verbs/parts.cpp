@@ -1,6 +1,7 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <CLI/App.hpp>
@@ -61,8 +62,9 @@ double sum_of_parts(const std::vector<double>& numbers) {
 /// once it is whole.
 class EndFile {
  public:
-  EndFile(std::string path, long size, const Processes& processes)
-      : path_(std::move(path)), size_(size), processes_(processes) {
+  /// The path names no input.
+  EndFile(const std::string& path, long size, const Processes& processes)
+      : path_(behind_links(path)), size_(size), processes_(processes) {
     if (processes_.number == 0) begin();
     if (processes_.count > 1) processes_.meet();
     if (processes_.number > 0) open(0);
@@ -71,6 +73,7 @@ class EndFile {
   EndFile& operator=(const EndFile&) = delete;
   ~EndFile() {
     if (descriptor_ >= 0) ::close(descriptor_);
+    if (begun_) ::unlink(unfinished().c_str());
   }
 
   void write(const PartMotion& part) {
@@ -83,6 +86,7 @@ class EndFile {
     if (::fsync(descriptor_) != 0) refuse("written");
     if (processes_.count > 1) processes_.meet();
     if (processes_.number == 0 && std::rename(unfinished().c_str(), path_.c_str()) != 0) refuse("renamed");
+    begun_ = false;
   }
 
  private:
@@ -90,11 +94,20 @@ class EndFile {
 
   std::string unfinished() const { return path_ + ".new"; }
   void open(int flags) {
-    descriptor_ = ::open(unfinished().c_str(), O_WRONLY | O_CLOEXEC | flags, 0666);
+    descriptor_ = ::open(unfinished().c_str(), O_WRONLY | O_CLOEXEC | O_NOFOLLOW | flags, 0666);
     if (descriptor_ < 0) refuse("opened");
   }
   void begin() {
-    open(O_CREAT | O_TRUNC);
+    struct stat there {};
+    if (::stat(path_.c_str(), &there) == 0 && !S_ISREG(there.st_mode))
+      throw Misuse(fmt::format("--out: '{}' is no file that can be replaced", path_));
+    if (::lstat(unfinished().c_str(), &there) == 0) {  // of a run that was killed
+      if (!S_ISREG(there.st_mode))
+        throw Misuse(fmt::format("--out: '{}', which is written on the way, is no file", unfinished()));
+      if (::unlink(unfinished().c_str()) != 0) refuse("removed");
+    }
+    open(O_CREAT | O_EXCL);
+    begun_ = true;
     std::string text = "\x93NUMPY";
     text += {'\x01', '\x00', static_cast<char>(header_size - 10), '\x00'};
     text += fmt::format("{{'descr': '<f8', 'fortran_order': False, 'shape': (2, {}), }}", size_);
@@ -121,13 +134,14 @@ class EndFile {
   long size_;
   const Processes& processes_;
   int descriptor_ = -1;
+  bool begun_ = false;  ///< by this process, and not whole yet
 };
 
 /// The whole motion, by this process or by all that mpirun started.
 class PartsRun {
  public:
   PartsRun(const PartsArguments& arguments, const Session& session)
-      : arguments_(arguments), processes_(session.processes) {
+      : arguments_(arguments), session_(session), processes_(session.processes) {
     const std::string text = scene_text(arguments.scene);
     const Parameters changes = parameters(arguments.set);
     const bool shared = processes_.count > 1;
@@ -141,6 +155,8 @@ class PartsRun {
   }
 
   void run() {
+    if (!arguments_.out.empty() && processes_.number == 0)
+      require_outputs({{"--out", arguments_.out}}, inputs_of({arguments_.scene}, session_));
     std::optional<EndFile> file;  // refused before the run where it cannot be written
     if (!arguments_.out.empty())
       file.emplace(arguments_.out, parts_.front().part().scene_coordinates(), processes_);
@@ -229,6 +245,7 @@ class PartsRun {
   }
 
   const PartsArguments& arguments_;
+  const Session& session_;
   const Processes& processes_;
   std::vector<PartMotion> parts_;
   StepGrid grid_{};

@@ -5,7 +5,6 @@
 #include <diracstep/command/verbs/run_arguments.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/files/paths.hpp>
-#include <diracstep/scene_format/scene_file.hpp>
 
 namespace diracstep::command {
 
@@ -156,15 +155,13 @@ void require_sense(const RunArguments& options) {
 }
 
 void require_files(const RunArguments& options, const Session& session) {
-  std::vector<NamedPath> inputs, outputs;
-  if (is_scene_file(options.scene)) inputs.push_back({"the scene", options.scene});
-  for (const Plugin& plugin : session.plugins) inputs.push_back({"the plugin", plugin.path()});
+  std::vector<NamedPath> outputs;
   if (!options.out.empty() && options.out != standard_output) outputs.push_back({"--out", options.out});
   if (const std::string checkpoint = checkpoint_path(options); !checkpoint.empty())
     outputs.push_back({options.checkpoint.empty() ? "--resume" : "--checkpoint", checkpoint});
   if (!options.resume.empty() && !options.out.empty() && same_file(options.resume, options.out))
     throw Misuse(fmt::format("--out and --resume are both '{}'", options.resume));
-  require_outputs(outputs, inputs);
+  require_outputs(outputs, inputs_of({options.scene}, session));
 }
 
 }  // namespace diracstep::command

@@ -21,7 +21,6 @@
 #include <diracstep/reports/study_comparison.hpp>
 #include <diracstep/reports/study_page.hpp>
 #include <diracstep/reports/study_plot.hpp>
-#include <diracstep/scene_format/scene_file.hpp>
 #include <diracstep/solvers/sundials_build.hpp>
 #include <diracstep/validation/references/explicit_reference.hpp>
 #include <exception>
@@ -221,10 +220,7 @@ std::string earlier_study(const std::string& path) {
 /// Before anything is computed: what would be written over something read or over another output, and a table
 /// that cannot be written.
 void require_files(const StudyArguments& options, const Session& session) {
-  std::vector<NamedPath> inputs;
-  for (const std::string& scene : options.scenes)
-    if (is_scene_file(scene)) inputs.push_back({"the scene", scene});
-  for (const Plugin& plugin : session.plugins) inputs.push_back({"the plugin", plugin.path()});
+  std::vector<NamedPath> inputs = inputs_of(options.scenes, session);
   if (!options.compare.empty()) inputs.push_back({"--compare", options.compare});
   if (!options.table.empty()) require_outputs({{"--table", options.table}}, inputs);
   if (options.out.empty()) return;

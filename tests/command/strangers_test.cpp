@@ -72,6 +72,31 @@ TEST_F(Strangers, NoOutputMeetsAnInputOrAnotherOutput) {
   EXPECT_EQ(contents(path("s.toml")), text);
 }
 
+TEST_F(Strangers, NoVerbWritesOverWhatItReads) {
+  const std::string own = scene("s.toml", "m*v_x^2/2 - x^2/2", "[parameters]\nm = 1\n"),
+                    text = contents(path("s.toml"));
+  write("m.csv", "t,x\n0,1\n0.5,0.9\n1,0.5\n");
+  expect_misuse("fit " + own + " '" + path("m.csv") + "' --parameters m --residuals '" + path("m.csv") + "'",
+                {"--residuals", "the data"});
+  expect_misuse("boundary " + own + " --to x=0.5 --out '" + path("s.toml") + "'", {"--out", "the scene"});
+  fs::copy_file(DIRACSTEP_SOURCE "/scenes/toda_200.toml", path("t.toml"));
+  const std::string parts = "parts '" + path("t.toml") + "' --end 0.1 --out '",
+                    toda = contents(path("t.toml"));
+  expect_misuse(parts + path("t.toml") + "'", {"--out", "the scene"});
+  write("victim", "precious");
+  fs::create_symlink("victim", path("p.npy.new"));
+  expect_misuse(parts + path("p.npy") + "'", {"p.npy.new"});
+  fs::remove(path("p.npy.new"));
+  ASSERT_EQ(::mkfifo(path("f.npy.new").c_str(), 0600), 0);
+  expect_misuse(parts + path("f.npy") + "'", {"f.npy.new"});
+  expect_misuse(parts + "/dev/null'", {"--out", "/dev/null"});
+  fs::create_symlink("victim", path("link.npy"));
+  EXPECT_EQ(run(parts + path("link.npy") + "'").status, 0);
+  EXPECT_TRUE(fs::is_symlink(path("link.npy"))) << "what it leads to is written";
+  EXPECT_EQ(contents(path("s.toml")), text);
+  EXPECT_EQ(contents(path("t.toml")), toda);
+}
+
 TEST_F(Strangers, AMissingFolderIsRefusedBeforeTheRun) {
   for (const char* line :
        {"run kepler_e06 --end 1e9 --out ", "run kepler_e06 --error 1e-13 --end 1e9 --out ",
