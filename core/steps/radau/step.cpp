@@ -166,7 +166,8 @@ class RadauStep final : public StepProblem {
     if (m_ > 0) terms = std::max(terms, rows_.impulse_size(x.data() + n_ * s_));
     if (coupled_masses_) {  // as of tight inductors, whose flux is a small difference
       sizes_.setZero();
-      momentum_.add_sizes(0.0, none_of_q_, x.segment(n_ * (s_ - 1), n_).cwiseAbs(), sizes_);
+      v_ = x.segment(n_ * (s_ - 1), n_).cwiseAbs();
+      momentum_.add_sizes(0.0, none_of_q_, v_, sizes_);
       terms = std::max(terms, max_norm(sizes_));
     }
     if (std::isfinite(terms)) blocks_[0].scale = std::max(known_momentum_, terms);
