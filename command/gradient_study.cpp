@@ -9,6 +9,7 @@
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/files/csv_table.hpp>
 #include <diracstep/files/input_file.hpp>
+#include <diracstep/files/temporary_folder.hpp>
 #include <diracstep/reports/json.hpp>
 #include <diracstep/reports/plot.hpp>
 #include <diracstep/reports/report.hpp>
@@ -24,26 +25,6 @@ namespace {
 constexpr double most_gradient_seconds = 3600.0;
 constexpr std::size_t most_gradient_bytes = 1'000'000;
 
-/// A directory of this process, with what is in it until the end.
-class TemporaryDirectory {
- public:
-  TemporaryDirectory() {
-    std::string name = (std::filesystem::temp_directory_path() / "diracstep-gradients-XXXXXX").string();
-    if (mkdtemp(name.data()) == nullptr) throw Error("no temporary directory can be made: " + name);
-    path_ = name;
-  }
-  TemporaryDirectory(const TemporaryDirectory&) = delete;
-  TemporaryDirectory& operator=(const TemporaryDirectory&) = delete;
-  ~TemporaryDirectory() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
-  std::string file(const std::string& name) const { return (path_ / name).string(); }
-
- private:
-  std::filesystem::path path_;
-};
-
 std::string program_for_gradients() {
   std::error_code failed;
   const auto own = std::filesystem::read_symlink("/proc/self/exe", failed).parent_path();
@@ -58,7 +39,7 @@ std::string program_for_gradients() {
 
 /// After an interrupt those that were computed, nothing where there are none.
 std::optional<CsvTable> gradients_of(const std::string& program, const GradientStudy& study,
-                                     const std::string& scene, const TemporaryDirectory& directory) {
+                                     const std::string& scene, const TemporaryFolder& directory) {
   const std::string file = directory.file("gradients.csv"), messages = directory.file("messages");
   std::vector<std::string> words{program, file, scene, fmt::format("{:.17g}", study.end.value_or(0.0))};
   words.insert(words.end(), study.set.begin(), study.set.end());
@@ -131,7 +112,7 @@ void study_gradients(const GradientStudy& study, Session& session) {
   std::vector<std::string> scenes = study.scenes;
   if (scenes.empty()) scenes = {"kepler_e06", "chaplygin_sleigh", "pendulum_cartesian", "double_pendulum"};
   const std::filesystem::path out = study.out.empty() ? std::filesystem::path{} : output_directory(study.out);
-  const TemporaryDirectory directory;
+  const TemporaryFolder directory("gradients");
   Json all = Json::array();
   catch_interrupts();
   for (const std::string& scene : scenes) {

@@ -8,16 +8,14 @@
 #include <array>
 #include <cerrno>
 #include <csignal>
-#include <cstdlib>
 #include <cstring>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/files/input_file.hpp>
 #include <diracstep/files/output_file.hpp>
 #include <diracstep/files/shown_text.hpp>
+#include <diracstep/files/temporary_folder.hpp>
 #include <diracstep/reports/plot.hpp>
-#include <filesystem>
 #include <string_view>
-#include <system_error>
 #include <utility>
 
 namespace diracstep {
@@ -121,27 +119,6 @@ class Gnuplot {
   int input_ = -1;
 };
 
-/// Where gnuplot draws, so that a picture that is there stays until the next one is whole.
-class DrawingFolder {
- public:
-  DrawingFolder() {
-    std::error_code none;
-    std::string name = (std::filesystem::temp_directory_path(none) / "diracstep_plot_XXXXXX").string();
-    if (::mkdtemp(name.data()) != nullptr) path_ = name;
-  }
-  DrawingFolder(const DrawingFolder&) = delete;
-  DrawingFolder& operator=(const DrawingFolder&) = delete;
-  ~DrawingFolder() {
-    std::error_code none;
-    if (!path_.empty()) std::filesystem::remove_all(path_, none);
-  }
-
-  const std::string& path() const { return path_; }
-
- private:
-  std::string path_;
-};
-
 std::string run_gnuplot(const std::string& script) {
   const PipeSignalBlocked blocked;
   Gnuplot gnuplot;
@@ -164,25 +141,33 @@ std::string gnuplot_text(std::string_view text) {
   return all + "'";
 }
 
+std::vector<std::string> picture_files(const std::string& stem) {
+  std::vector<std::string> files;
+  for (const Terminal& terminal : terminals) files.push_back(stem + terminal.ending);
+  return files;
+}
+
+/// gnuplot draws elsewhere, so that a picture that is there stays until the next one is whole.
 std::string render(const std::string& picture, const std::string& stem, std::size_t width,
-                   std::size_t height) {
-  const DrawingFolder folder;
-  if (folder.path().empty()) return "no temporary folder can be made to draw in";
-  const auto drawn = [&](const Terminal& terminal) { return folder.path() + "/picture" + terminal.ending; };
+                   std::size_t height) try {
+  const TemporaryFolder folder("plot");
+  const auto drawn = [&](const Terminal& terminal) {
+    return folder.file(std::string("picture") + terminal.ending);
+  };
   std::string script;
   for (const Terminal& terminal : terminals)
     script += fmt::format("reset\nset terminal {}\nset output {}\n{}unset output\n",
                           terminal.settings(width, height), gnuplot_text(drawn(terminal)), picture);
   if (std::string failure = run_gnuplot(script); !failure.empty()) return failure;
-  for (const Terminal& terminal : terminals) try {
-      const std::string bytes = read_file(drawn(terminal), "the picture", largest_picture);
-      if (bytes.find(terminal.end) == std::string::npos)  // gnuplot does not tell of a full disk
-        return fmt::format("{}{}: gnuplot did not draw all of it; is the disk full?", stem, terminal.ending);
-      replace_file(stem + terminal.ending, bytes);
-    } catch (const Error& error) {
-      return error.what();
-    }
+  for (const Terminal& terminal : terminals) {
+    const std::string bytes = read_file(drawn(terminal), "the picture", largest_picture);
+    if (bytes.find(terminal.end) == std::string::npos)  // gnuplot does not tell of a full disk
+      return fmt::format("{}{}: gnuplot did not draw all of it; is the disk full?", stem, terminal.ending);
+    replace_file(stem + terminal.ending, bytes);
+  }
   return {};
+} catch (const Error& error) {
+  return error.what();
 }
 
 std::string file_name(std::string scene) {

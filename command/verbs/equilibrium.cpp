@@ -9,6 +9,7 @@
 #include <diracstep/eigenvalues/largest_eigenpairs.hpp>
 #include <diracstep/reports/json.hpp>
 #include <diracstep/reports/modes_plot.hpp>
+#include <diracstep/reports/plot.hpp>
 #include <diracstep/reports/report.hpp>
 #include <diracstep/scene_format/position_names.hpp>
 #include <memory>
@@ -222,8 +223,8 @@ void draw(const EquilibriumArguments& options, const CatalogueScene& entry, cons
 
 void equilibrium(const EquilibriumArguments& options, Session& session) {
   if (!options.picture.empty())
-    require_outputs({{"--picture", options.picture + ".svg"}, {"--picture", options.picture + ".png"}},
-                    inputs_of({options.scene}, session));
+    for (const std::string& file : picture_files(options.picture))
+      require_outputs({{"--picture", file}}, inputs_of({options.scene}, session));
   CatalogueScene entry = make_scene(session, options.scene, parameters(options.set));
   const std::shared_ptr<const Scene> independent = entry.scene;
   const bool all = entry.events.empty() && entry.all_rows && !session.drop_redundant_rows;

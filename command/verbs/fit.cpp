@@ -146,8 +146,7 @@ void run_fit(FitArguments arguments, Session& session) {
   inputs.push_back({"the data", arguments.data});
   if (!arguments.residuals.empty()) outputs.push_back({"--residuals", arguments.residuals});
   if (!arguments.picture.empty())
-    for (const char* extension : {".svg", ".png"})
-      outputs.push_back({"--picture", arguments.picture + extension});
+    for (const std::string& file : picture_files(arguments.picture)) outputs.push_back({"--picture", file});
   require_outputs(outputs, inputs);
   const CatalogueScene entry = make_scene(session, arguments.scene, changes);
   const FittedScene of{arguments.scene, std::nullopt, changes, parameters_fitted};
