@@ -116,67 +116,61 @@ void OutputFile::refuse(const char* what) const {
   throw Error(fmt::format("'{}' {}: {}", path_, what, std::strerror(errno)));
 }
 
-namespace {
-
-/// A new file beside `path` that becomes the one of that name, or nothing.
-class Replacement {
- public:
-  explicit Replacement(const std::string& path) : path_(path), fresh_(path + ".new") {
-    // O_EXCL follows no link: whatever stands in the way is never written to
-    for (int attempts = 0; descriptor_ < 0; ++attempts) {
-      descriptor_ =
-          ::open(fresh_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);  // NOLINT
-      if (descriptor_ < 0 && (errno != EEXIST || attempts > 2 || !remove_leftover()))
-        throw Misuse(fmt::format("'{}' cannot be written: '{}': {}", path, fresh_, std::strerror(errno)));
-    }
-    take_lock(descriptor_);
-    struct stat old {};
-    if (::stat(path.c_str(), &old) == 0) ::fchmod(descriptor_, old.st_mode & 0777);
+Replacement::Replacement(const std::string& path) : path_(path), fresh_(path + ".new") {
+  // O_EXCL follows no link: whatever stands in the way is never written to
+  for (int attempts = 0; descriptor_ < 0; ++attempts) {
+    descriptor_ =
+        ::open(fresh_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);  // NOLINT
+    if (descriptor_ < 0 && (errno != EEXIST || attempts > 2 || !remove_leftover()))
+      throw Misuse(fmt::format("'{}' cannot be written: '{}': {}", path, fresh_, std::strerror(errno)));
   }
-  ~Replacement() {
-    if (descriptor_ < 0) return;
-    ::unlink(fresh_.c_str());
-    ::close(descriptor_);
-  }
-  Replacement(const Replacement&) = delete;
-  Replacement& operator=(const Replacement&) = delete;
+  take_lock(descriptor_);
+  struct stat old {};
+  if (::stat(path.c_str(), &old) == 0) ::fchmod(descriptor_, old.st_mode & 0777);
+}
 
-  void become(std::string_view bytes) {
-    while (!bytes.empty()) {
-      const ssize_t written = ::write(descriptor_, bytes.data(), bytes.size());
-      if (written < 0 && errno == EINTR) continue;
-      if (written < 0) refuse("could not be written in full");
-      bytes.remove_prefix(static_cast<std::size_t>(written));
-    }
-    if (::fsync(descriptor_) != 0) refuse("could not be written in full");
-    if (std::rename(fresh_.c_str(), path_.c_str()) != 0) refuse("could not be replaced");
-    ::close(std::exchange(descriptor_, -1));
-    sync_folder_of(path_);
-  }
+Replacement::~Replacement() {
+  if (descriptor_ < 0) return;
+  ::unlink(fresh_.c_str());
+  ::close(descriptor_);
+}
 
- private:
-  /// What a killed process left: a regular file that nobody has locked.
-  bool remove_leftover() const {
-    const int left = ::open(fresh_.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);  // NOLINT
-    if (left < 0) {
-      errno = EEXIST;
-      return false;
-    }
-    struct stat status {};
-    const bool removed = ::fstat(left, &status) == 0 && S_ISREG(status.st_mode) && take_lock(left) &&
-                         ::unlink(fresh_.c_str()) == 0;
-    ::close(left);
+void Replacement::write(std::string_view bytes) const {
+  while (!bytes.empty()) {
+    const ssize_t written = ::write(descriptor_, bytes.data(), bytes.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) refuse("could not be written in full");
+    bytes.remove_prefix(static_cast<std::size_t>(written));
+  }
+}
+
+void Replacement::become() {
+  if (::fsync(descriptor_) != 0) refuse("could not be written in full");
+  if (std::rename(fresh_.c_str(), path_.c_str()) != 0) refuse("could not be replaced");
+  ::close(std::exchange(descriptor_, -1));
+  sync_folder_of(path_);
+}
+
+/// What a killed process left: a regular file that nobody has locked.
+bool Replacement::remove_leftover() const {
+  const int left = ::open(fresh_.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);  // NOLINT
+  if (left < 0) {
     errno = EEXIST;
-    return removed;
+    return false;
   }
+  struct stat status {};
+  const bool removed = ::fstat(left, &status) == 0 && S_ISREG(status.st_mode) && take_lock(left) &&
+                       ::unlink(fresh_.c_str()) == 0;
+  ::close(left);
+  errno = EEXIST;
+  return removed;
+}
 
-  [[noreturn]] void refuse(const char* what) const {
-    throw Error(fmt::format("'{}' {}: {}", path_, what, std::strerror(errno)));
-  }
+void Replacement::refuse(const char* what) const {
+  throw Error(fmt::format("'{}' {}: {}", path_, what, std::strerror(errno)));
+}
 
-  std::string path_, fresh_;
-  int descriptor_ = -1;
-};
+namespace {
 
 void write_to_device(const std::string& path, std::string_view bytes) {
   OutputFile file(path, OutputFile::Mode::fresh);
@@ -191,7 +185,9 @@ void replace_file(const std::string& given, std::string_view bytes) {
   std::error_code none;
   const fs::file_status status = fs::status(given, none);
   if (fs::exists(status) && !fs::is_regular_file(status)) return write_to_device(given, bytes);
-  Replacement(behind_links(given)).become(bytes);
+  Replacement fresh(behind_links(given));
+  fresh.write(bytes);
+  fresh.become();
 }
 
 }  // namespace diracstep

@@ -46,6 +46,28 @@ class OutputFile {
   bool name_is_new_ = false;  ///< its folder has not been synchronised since it was opened
 };
 
+/// A new file PATH.new that becomes the one at `path` at once, or nothing: see replace_file().  `path` is no
+/// link and no device.
+class Replacement {
+ public:
+  explicit Replacement(const std::string& path);
+  ~Replacement();
+  Replacement(const Replacement&) = delete;
+  Replacement& operator=(const Replacement&) = delete;
+
+  const std::string& name() const { return fresh_; }  ///< until it becomes the other
+  int descriptor() const { return descriptor_; }
+  void write(std::string_view bytes) const;
+  void become();
+
+ private:
+  bool remove_leftover() const;
+  [[noreturn]] void refuse(const char* what) const;
+
+  std::string path_, fresh_;
+  int descriptor_ = -1;
+};
+
 /// Replaces the file at `path` by `bytes` at once: whoever reads it, at whatever moment the machine stops,
 /// finds the old contents or the new ones.  A new file PATH.new is used on the way; a link or folder of that
 /// name is refused, and a file there is removed unless its writer lives.  Where `path` is a link, the file it

@@ -15,6 +15,7 @@
 #include <diracstep/command/verbs.hpp>
 #include <diracstep/core/numerics/errors.hpp>
 #include <diracstep/core/runs/run.hpp>
+#include <diracstep/files/output_file.hpp>
 #include <diracstep/reports/json.hpp>
 #include <diracstep/reports/report.hpp>
 #include <diracstep/scene_format/parts/part_motion.hpp>
@@ -67,13 +68,12 @@ class EndFile {
       : path_(behind_links(path)), size_(size), processes_(processes) {
     if (processes_.number == 0) begin();
     if (processes_.count > 1) processes_.meet();
-    if (processes_.number > 0) open(0);
+    if (processes_.number > 0) open();
   }
   EndFile(const EndFile&) = delete;
   EndFile& operator=(const EndFile&) = delete;
   ~EndFile() {
-    if (descriptor_ >= 0) ::close(descriptor_);
-    if (begun_) ::unlink(unfinished().c_str());
+    if (!whole_ && descriptor_ >= 0) ::close(descriptor_);
   }
 
   void write(const PartMotion& part) {
@@ -85,29 +85,21 @@ class EndFile {
   void finish() {
     if (::fsync(descriptor_) != 0) refuse("written");
     if (processes_.count > 1) processes_.meet();
-    if (processes_.number == 0 && std::rename(unfinished().c_str(), path_.c_str()) != 0) refuse("renamed");
-    begun_ = false;
+    if (whole_) whole_->become();
   }
 
  private:
   static constexpr long header_size = 128;
 
-  std::string unfinished() const { return path_ + ".new"; }
-  void open(int flags) {
-    descriptor_ = ::open(unfinished().c_str(), O_WRONLY | O_CLOEXEC | O_NOFOLLOW | flags, 0666);
+  void open() {
+    descriptor_ = ::open((path_ + ".new").c_str(), O_WRONLY | O_CLOEXEC | O_NOFOLLOW);
     if (descriptor_ < 0) refuse("opened");
   }
   void begin() {
     struct stat there {};
     if (::stat(path_.c_str(), &there) == 0 && !S_ISREG(there.st_mode))
       throw Misuse(fmt::format("--out: '{}' is no file that can be replaced", path_));
-    if (::lstat(unfinished().c_str(), &there) == 0) {  // of a run that was killed
-      if (!S_ISREG(there.st_mode))
-        throw Misuse(fmt::format("--out: '{}', which is written on the way, is no file", unfinished()));
-      if (::unlink(unfinished().c_str()) != 0) refuse("removed");
-    }
-    open(O_CREAT | O_EXCL);
-    begun_ = true;
+    descriptor_ = whole_.emplace(path_).descriptor();
     std::string text = "\x93NUMPY";
     text += {'\x01', '\x00', static_cast<char>(header_size - 10), '\x00'};
     text += fmt::format("{{'descr': '<f8', 'fortran_order': False, 'shape': (2, {}), }}", size_);
@@ -127,14 +119,14 @@ class EndFile {
     }
   }
   [[noreturn]] void refuse(const char* what) const {
-    throw Error(fmt::format("'{}' cannot be {}: {}", unfinished(), what, std::strerror(errno)));
+    throw Error(fmt::format("'{}.new' cannot be {}: {}", path_, what, std::strerror(errno)));
   }
 
   std::string path_;
   long size_;
   const Processes& processes_;
+  std::optional<Replacement> whole_;  ///< of the first process
   int descriptor_ = -1;
-  bool begun_ = false;  ///< by this process, and not whole yet
 };
 
 /// The whole motion, by this process or by all that mpirun started.
